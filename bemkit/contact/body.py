@@ -93,11 +93,11 @@ class SlipHistory:
     Parameters
     ----------
     time, time_step : float [s]
-        Now, and since the increment before.
+        Time at the end of the increment, and its duration.
     slip : (n_contact,) array [m]
         Length of the path that each node has slipped while it was closed, this increment included; never falls.
     last_slip : (n_contact,) array [m]
-        What this increment has added.
+        Its part in this increment, not negative.
     """
 
     time: float
@@ -107,7 +107,7 @@ class SlipHistory:
 
     @classmethod
     def at_rest(cls, n_contact: int) -> SlipHistory:
-        """Return what is before any load."""
+        """Return the history before any load: time zero and no slip."""
         return cls(0.0, 0.0, np.zeros(n_contact), np.zeros(n_contact))
 
     @property
@@ -116,12 +116,21 @@ class SlipHistory:
         return self.last_slip / self.time_step if self.time_step > 0.0 else np.zeros_like(self.last_slip)
 
     def followed(self, time: float, slip: FloatArray, is_closed: BoolArray) -> SlipHistory:
-        """Return the history after one increment more, in which closed nodes slip by (n_contact,) lengths [m]."""
+        """Return the history after one more increment.
+
+        Parameters
+        ----------
+        time : float [s]
+            At the end of that increment.
+        slip : (n_contact,) array [m]
+            Slip of each node in it, of either sign; that of open nodes does not count.
+        is_closed : (n_contact,) bool array
+        """
         added = np.where(is_closed, np.abs(slip), 0.0)
         return SlipHistory(time, time - self.time, self.slip + added, added)
 
     def of(self, nodes: IntArray) -> SlipHistory:
-        """Return that of some of the nodes."""
+        """Return the history of some of the nodes."""
         return SlipHistory(self.time, self.time_step, self.slip[nodes], self.last_slip[nodes])
 
 
@@ -138,10 +147,11 @@ class LinearBody(Protocol):
     weights : (n_contact,) array [m]
         Positive: nodal force = weight times traction.
     accuracy : float
-        Relative error of the displacements and tractions of a response: 1e-14 (the default) for a direct solver, what
-        it stops at for an iterative one. Drivers take their tolerances from it.
+        Relative error of the displacements and tractions of a response: 1e-14 (the default) for a direct solver, the
+        tolerance at which it stops for an iterative one. Drivers take their tolerances from it.
     is_costly : bool
-        Whether drivers should ask for few responses, tens rather than several for each contact node. False by default.
+        Whether drivers should ask for tens of responses at most, rather than for several per contact node. False by
+        default.
     """
 
     weights: FloatArray
@@ -157,7 +167,7 @@ class LinearBody(Protocol):
     def stiffness_scale(self) -> float:
         """Typical traction per displacement of a single contact node [Pa/m], positive; the unit of automatic rho.
 
-        For a material of plane modulus E' that is E' by the weight of a node, however the body is held.
+        For a material of plane modulus E' this is E' divided by the weight of a node, however the body is held.
         """
         ...
 
@@ -208,20 +218,27 @@ class LinearBody(Protocol):
         return np.zeros(self.rigid_motions().shape[0])
 
     def moving_bodies(self, coefficients: FloatArray) -> str:
-        """Name what a combination (n_motions,) of the rigid motions moves, in words that go before "moves"."""
+        """Name the bodies that a combination (n_motions,) of the rigid motions moves; messages go on with "moves"."""
         return "the body"
 
     def partners_of(self, coefficients: FloatArray) -> str:
-        """Name what that may touch, in words that go after "along"."""
+        """Name what these bodies may touch; messages put "along" before it."""
         return "the obstacle"
 
     def shares(self, forces: FloatArray) -> FloatArray:
-        """Return by which share (n_contact,) of the largest of some forces each node is measured; all by default.
+        """Return by which share of the largest force the certificate measures each node; by default by all of it.
+
+        Of several bodies a node is measured by the contact forces of its own partners, not by those of all bodies.
 
         Parameters
         ----------
         forces : (n_contact,) array [N/m]
-            Sizes, some of them positive.
+            Sizes of the nodal forces, some of them positive.
+
+        Returns
+        -------
+        (n_contact,) array [-]
+            Positive, at most one.
         """
         return np.ones(self.n_contact)
 
@@ -236,9 +253,10 @@ class LinearBody(Protocol):
         Returns
         -------
         Imbalance
-            Relative to the largest force (times the size of the body) at hand. By default `force` is what has to be
-            added to the tractions to hold the displacements, which takes a response, and `moment` the work of load and
-            tractions on the rigid motions.
+            Relative to the forces on the body, moments also to its size. By default `force` is the largest nodal force
+            that is missing to hold the displacements of the state, which takes a response, and `moment` the work of
+            load and tractions on the rigid motions, whose largest component is one; both relative to the largest nodal
+            force of the state and of that response.
         """
         is_eliminated = self.tangent_is_eliminated
         held = np.stack([np.ones_like(is_eliminated), ~is_eliminated], axis=1)
@@ -248,11 +266,13 @@ class LinearBody(Protocol):
         largest = float(np.abs(forces).max())
         if largest == 0.0:
             return Imbalance(0.0, 0.0)
-        astray = self.stiffness_scale * np.abs(response.displacement - state.displacement).max(axis=1)
-        missing = max(float(np.abs(forces[0] - forces[1]).max()), float((self.weights * astray).max()))
+        # displacements that the response does not reach count as the tractions that would cause them
+        misfit = self.stiffness_scale * np.abs(response.displacement - state.displacement).max(axis=1)
+        missing = max(float(np.abs(forces[0] - forces[1]).max()), float((self.weights * misfit).max()))
         motions = as_rows(self.rigid_motions())
         size = float(largest_components(motions).max(initial=0.0)) or 1.0
-        work = np.abs(self.rigid_load() + motions @ forces[0].ravel()) / size
-        # what an error of the displacements makes of the tractions
-        most = max(largest, self.stiffness_scale * float((self.weights[:, None] * np.abs(state.displacement)).max()))
-        return Imbalance(missing / largest, float(np.max(work, initial=0.0)) / largest, self.accuracy * most / largest)
+        work = float(np.max(np.abs(self.rigid_load() + motions @ forces[0].ravel()) / size, initial=0.0))
+        # an error of the displacements causes tractions, too
+        by_displacement = self.stiffness_scale * float((self.weights[:, None] * np.abs(state.displacement)).max())
+        round_off = self.accuracy * max(largest, by_displacement) / largest
+        return Imbalance(missing / largest, work / largest, round_off)

@@ -1,4 +1,4 @@
-"""Linear conditions at the contact nodes: what drivers ask of a body; and the rigid motions that they leave free.
+"""Two linear conditions at each contact node, under which a body responds, and the rigid motions they leave free.
 
 Components are (n, t) throughout: index 0 along the outward normal, index 1 along the tangent. The first of the two
 conditions at a node is its normal, the second its tangential one.
@@ -23,14 +23,14 @@ else:
 
 
 FREE_MOTION_TOLERANCE = 1e-9
-"""A unit rigid motion that changes no condition by more than this is free of them. Normals leave about 1e-16; one held
-node out of a million gives 1e-3."""
-_FREE_OF_NORMAL_EQUATIONS = 1e-7
-"""The same where squares of the changes are formed, which hold half of the digits."""
+"""A rigid motion of unit size is free if it changes no condition by more than this. The round-off of normals gives
+1e-16, a single held node out of a million 1e-3."""
+_NORMAL_EQUATIONS_TOLERANCE = 1e-7
+"""The same tolerance where normal equations are formed, which hold half of the digits."""
 _SHIFT = 1e-12
-"""Added to the normal equations, which are singular: well above their round-off, far below what holds anything."""
-_FEW_MOTIONS = 400
-"""So many motions that hang together are examined by a singular value decomposition, more of them by iteration."""
+"""Added to the diagonal of the singular normal equations: well above their round-off, far below any condition."""
+_MOST_DENSE_MOTIONS = 400
+"""Most coupled motions whose null space is found by a singular value decomposition; that of more is by iteration."""
 
 
 def as_rows(motions: RigidMotions) -> RigidMotions:
@@ -59,7 +59,7 @@ def orthonormal(motions: FloatArray) -> FloatArray:
 
 
 def null_space(matrix: csr_array) -> csr_array:
-    """Return an orthonormal basis of the vectors that a sparse matrix takes to zero.
+    """Return an orthonormal basis of the null space of a sparse matrix.
 
     Parameters
     ----------
@@ -69,17 +69,17 @@ def null_space(matrix: csr_array) -> csr_array:
     Returns
     -------
     (n_null, n) sparse array
-        Columns that hang together through no row are treated apart.
+        One vector a row. Groups of columns that share no row are treated one by one, so vectors stay sparse.
     """
     from scipy.sparse import csgraph, csr_array
 
     n = matrix.shape[1]
-    felt = matrix.copy()
-    felt.eliminate_zeros()
-    n_groups, group = csgraph.connected_components(abs(felt).T @ abs(felt), directed=False)
+    nonzero = matrix.copy()
+    nonzero.eliminate_zeros()
+    n_groups, group = csgraph.connected_components(abs(nonzero).T @ abs(nonzero), directed=False)
     order = np.argsort(group, kind="stable")
     groups = np.split(order, np.cumsum(np.bincount(group, minlength=n_groups))[:-1])
-    by_column = felt.tocsc()
+    by_column = nonzero.tocsc()
     n_entries = np.diff(by_column.indptr)
     rows, columns, values, n_null = [], [], [], 0
     for members in groups:
@@ -101,13 +101,14 @@ def null_space(matrix: csr_array) -> csr_array:
 
 
 def _null_space_of_group(part: csr_array) -> FloatArray:
-    if part.shape[1] <= _FEW_MOTIONS:
+    """Return an orthonormal basis (n_null, n) of the null space of a matrix whose columns are coupled."""
+    if part.shape[1] <= _MOST_DENSE_MOTIONS:
         _, singular, directions = np.linalg.svd(np.linalg.qr(part.toarray(), mode="r"))
         return np.asarray(directions[np.count_nonzero(singular > FREE_MOTION_TOLERANCE) :])
     from scipy.sparse import csc_array, eye_array
     from scipy.sparse.linalg import splu
 
-    # inverse iteration on the normal equations, on more and more vectors until not all of them are null
+    # inverse iteration on the normal equations, with more and more vectors until some lie outside of the null space
     normal = csc_array(part.T @ part)
     factors = splu(
         normal + _SHIFT * eye_array(part.shape[1], format="csc"),
@@ -122,7 +123,7 @@ def _null_space_of_group(part: csr_array) -> FloatArray:
         for _ in range(3):
             vectors = np.linalg.qr(factors.solve(vectors))[0]
         _, singular, directions = np.linalg.svd(part @ vectors, full_matrices=False)
-        is_null = singular <= _FREE_OF_NORMAL_EQUATIONS
+        is_null = singular <= _NORMAL_EQUATIONS_TOLERANCE
         if not is_null.all() or n_tried >= part.shape[1]:
             return np.asarray(directions[is_null] @ vectors.T)
         n_tried *= 4
@@ -181,34 +182,35 @@ class LinearConditions:
         )
 
     def with_given_displacements(self, displacement: FloatArray) -> FloatArray:
-        """Return displacements (n_contact, 2) with those that conditions prescribe met to the last digit."""
-        met = displacement.copy()
+        """Return displacements (n_contact, 2) [m], those that conditions prescribe exact to the last digit."""
+        corrected = displacement.copy()
         for row in (0, 1):
             factor, other = self.on_displacement[:, row, row], self.on_displacement[:, row, 1 - row]
             is_given = (factor != 0.0) & (other == 0.0) & ~self.on_traction[:, row].any(axis=1)
-            np.divide(self.value[:, row], factor, out=met[:, row], where=is_given)
-        return met
+            np.divide(self.value[:, row], factor, out=corrected[:, row], where=is_given)
+        return corrected
 
     def with_given_tractions(self, traction: FloatArray) -> FloatArray:
-        """Return tractions (n_contact, 2) with those that conditions give, or tie to the other component, met exactly.
+        """Return tractions (n_contact, 2) [Pa], those that conditions prescribe exact to the last digit.
 
-        Ties such as ``|sigma_t| = s |sigma_n|`` are then decided alike in all units.
+        That includes a component that follows from the other one. Ties such as ``|sigma_t| = s |sigma_n|`` are then
+        decided alike in all units.
         """
-        met = traction.copy()
+        corrected = traction.copy()
         for row in (0, 1):
             factor = self.on_traction[:, row, row]
             is_given = (factor != 0.0) & ~self.on_displacement[:, row].any(axis=1)
-            rest = self.value[:, row] - self.on_traction[:, row, 1 - row] * met[:, 1 - row]
-            np.divide(rest, factor, out=met[:, row], where=is_given)
-        return met
+            right_side = self.value[:, row] - self.on_traction[:, row, 1 - row] * corrected[:, 1 - row]
+            np.divide(right_side, factor, out=corrected[:, row], where=is_given)
+        return corrected
 
     def free_motions(self, motions: RigidMotions) -> RigidMotions:
-        """Return the rigid motions that change no condition: nothing but tractions are prescribed along them.
+        """Return the rigid motions that change no condition: along them only tractions are prescribed.
 
         Parameters
         ----------
         motions : (n_motions, n_contact, 2) array, or sparse (n_motions, 2 n_contact) array
-            Motions without tractions, linearly independent.
+            Rigid motions, which change no traction; linearly independent.
 
         Returns
         -------
@@ -220,32 +222,35 @@ class LinearConditions:
         if not isinstance(motions, np.ndarray):
             return self._sparse_free_motions(motions)
         basis = orthonormal(motions)
-        return np.tensordot(self._unfelt(basis), basis, axes=1)
+        return np.tensordot(self._free_combinations(basis), basis, axes=1)
 
     def hold(self, basis: FloatArray) -> bool:
         """Whether every combination of orthonormal motions (n_motions, n_contact, 2) changes some condition."""
         return not len(basis) or bool(
-            (np.linalg.svd(self._felt(basis), compute_uv=False) > FREE_MOTION_TOLERANCE).all()
+            (np.linalg.svd(self._changes(basis), compute_uv=False) > FREE_MOTION_TOLERANCE).all()
         )
 
-    def _unfelt(self, basis: FloatArray) -> FloatArray:
+    def _free_combinations(self, basis: FloatArray) -> FloatArray:
         """Return the combinations (n_free, n_motions) of orthonormal motions that change no condition."""
-        _, singular, directions = np.linalg.svd(np.linalg.qr(self._felt(basis), mode="r"))
+        _, singular, directions = np.linalg.svd(np.linalg.qr(self._changes(basis), mode="r"))
         return np.asarray(directions[np.count_nonzero(singular > FREE_MOTION_TOLERANCE) :])
 
-    def _felt(self, basis: FloatArray) -> FloatArray:
-        """Return the changes (2 n_contact, n_motions) of the conditions, each scaled to one, by orthonormal motions."""
+    def _changes(self, basis: FloatArray) -> FloatArray:
+        """Return the changes (2 n_contact, n_motions) of the scaled conditions by orthonormal motions."""
+        return np.asarray(self._scaled_on_displacement @ basis.transpose(1, 2, 0)).reshape(-1, len(basis))
+
+    @property
+    def _scaled_on_displacement(self) -> FloatArray:
+        """(n_contact, 2, 2) array: A_u with the largest factor of each condition scaled to one."""
         size = np.abs(self.on_displacement).max(axis=2, keepdims=True)
-        rows = self.on_displacement / np.where(size > 0.0, size, 1.0)
-        return np.asarray(rows @ basis.transpose(1, 2, 0)).reshape(-1, len(basis))
+        return np.asarray(self.on_displacement / np.where(size > 0.0, size, 1.0))
 
     def _sparse_free_motions(self, motions: csr_array) -> csr_array:
         from scipy import sparse
 
-        size = np.abs(self.on_displacement).max(axis=2, keepdims=True)
-        rows = self.on_displacement / np.where(size > 0.0, size, 1.0)
-        at = np.arange(self.n_contact)
-        conditions = sparse.bsr_array((np.ascontiguousarray(rows), at, np.arange(self.n_contact + 1)))
+        nodes = np.arange(self.n_contact)
+        blocks = np.ascontiguousarray(self._scaled_on_displacement)
+        conditions = sparse.bsr_array((blocks, nodes, np.arange(self.n_contact + 1)))
         norms = np.sqrt((motions**2).sum(axis=1))
         unit = sparse.csr_array(sparse.diags_array(1.0 / norms) @ motions)
         return sparse.csr_array(null_space(sparse.csr_array(sparse.csr_array(conditions) @ unit.T)) @ unit)

@@ -9,13 +9,13 @@ from bemkit.contact.body import LinearBody, SingularResponse
 from bemkit.contact.conditions import LinearConditions, of_statuses, separated, stick
 
 LARGEST_COEFFICIENT = 1e3
-"""No friction is larger; what round-off leaves of the coupling of alike bodies would give such numbers."""
+"""Larger coefficients are taken for round-off of a coupling that vanishes, as between bodies of equal material."""
 _NEARLY_REAL = 1e-9
-"""Imaginary parts below this share of an eigenvalue are those of two real ones that round-off has joined."""
+"""Imaginary part, relative to an eigenvalue, up to which it counts as real: round-off may join two real ones."""
 
 
 def sliding_response(body: LinearBody, is_closed: BoolArray, slides: BoolArray) -> tuple[FloatArray, FloatArray]:
-    """Return what tangential motions of nodes in contact do to the tractions there.
+    """Return the changes of tractions by tangential displacements of nodes in contact.
 
     Parameters
     ----------
@@ -33,7 +33,7 @@ def sliding_response(body: LinearBody, is_closed: BoolArray, slides: BoolArray) 
     Raises
     ------
     SingularResponse
-        If without friction the body is free to slide, so that no coefficient is needed.
+        If the body is free to slide without friction.
     """
     n_contact = len(is_closed)
     zero = np.zeros(n_contact)
@@ -81,7 +81,7 @@ def critical_coefficient(normal: FloatArray, tangential: FloatArray, direction: 
 
     if not len(direction):
         return np.inf
-    # of the inverse problem, whose matrix on the right is positive definite however many zeros the left one has
+    # eigenvalues 1 / s: `tangential` is positive definite, `normal` may be singular
     inverse = eigvals(direction[:, None] * normal, tangential)
     is_real = np.abs(inverse.imag) <= _NEARLY_REAL * np.abs(inverse)
     largest = float(inverse.real[is_real].max(initial=0.0))

@@ -1,4 +1,4 @@
-"""Laws beside Coulomb and Tresca: with cohesion and a cap, dependent on the slip, different from part to part."""
+"""Further friction laws: with cohesion and a cap, dependent on slip or its speed, different from part to part."""
 
 from __future__ import annotations
 
@@ -29,8 +29,8 @@ class CohesiveCoulomb(LawOfCoefficients):
 
     Notes
     -----
-    Because cohesion is lost by jump when a node opens, a problem with ``c > 0`` and a moving edge of contact need
-    not have a solution; drivers then say so by their status.
+    Cohesion drops to zero at once when a node opens. So a problem with ``c > 0`` and a moving edge of contact need not
+    have a solution; the status of a driver then says that it has found none.
     """
 
     friction_coefficient: Coefficient
@@ -110,11 +110,11 @@ class SlipWeakening(LawOfCoefficients):
         return Coulomb(last + (np.asarray(first) - last) * share)
 
     def bound(self, sigma_n: FloatArray) -> FloatArray:
-        """Return that before any slip."""
+        """Return that of Coulomb's law before any slip; `at_slip` gives the law of a load step."""
         return Coulomb(self.static_friction).bound(sigma_n)
 
     def bound_derivative(self, sigma_n: FloatArray) -> FloatArray:
-        """Return that before any slip."""
+        """Return that of Coulomb's law before any slip; `at_slip` gives the law of a load step."""
         return Coulomb(self.static_friction).bound_derivative(sigma_n)
 
 
@@ -157,22 +157,22 @@ class RateStrengthening(LawOfCoefficients):
         return Coulomb(slow + a * np.log1p(motion.rate / v_0))
 
     def bound(self, sigma_n: FloatArray) -> FloatArray:
-        """Return that of slow slip."""
+        """Return that of Coulomb's law under slow slip; `at_slip` gives the law of a load step."""
         return Coulomb(self.friction_coefficient).bound(sigma_n)
 
     def bound_derivative(self, sigma_n: FloatArray) -> FloatArray:
-        """Return that of slow slip."""
+        """Return that of Coulomb's law under slow slip; `at_slip` gives the law of a load step."""
         return Coulomb(self.friction_coefficient).bound_derivative(sigma_n)
 
 
 @dataclass(frozen=True, eq=False)
 class PiecewiseLaw(FrictionLaw):
-    """Each contact node under the law of its part.
+    """Different laws at different contact nodes.
 
     Parameters
     ----------
     laws : sequence of FrictionLaw
-        Each for as many nodes as it has below.
+        Each sees the tractions of its own nodes only.
     nodes : sequence of (m,) int arrays
         The contact nodes of each law; together every contact node exactly once.
 
@@ -192,12 +192,12 @@ class PiecewiseLaw(FrictionLaw):
 
     @property
     def is_frictionless(self) -> bool:
-        """Whether all the laws are."""
+        """Whether all laws are frictionless."""
         return all(law.is_frictionless for law in self.laws)
 
     @property
     def needs_history(self) -> bool:
-        """Whether one of the laws does."""
+        """Whether one of the laws needs a history."""
         return any(law.needs_history for law in self.laws)
 
     def at_slip(self, motion: SlipHistory) -> PiecewiseLaw:
@@ -206,7 +206,7 @@ class PiecewiseLaw(FrictionLaw):
 
     @cached_property
     def acts_across_gap(self) -> BoolArray:
-        """(n_contact,) bool array: what the law of each node says."""
+        """(n_contact,) bool array: as of the law of each node."""
         values = [np.broadcast_to(law.acts_across_gap, nodes.shape) for law, nodes in self._pairs]
         return self._assembled(values).astype(bool)
 
@@ -234,7 +234,7 @@ class PiecewiseLaw(FrictionLaw):
 
 
 def law_name(law: FrictionLaw) -> str:
-    """Return the name of the class that the user gave, also of a law wrapped by others, for messages."""
+    """Return the class name of a law for messages: the original of a rescaled law, all names of several laws."""
     if isinstance(law, RescaledLaw):
         return law_name(law.law)
     if isinstance(law, PiecewiseLaw):

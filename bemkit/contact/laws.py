@@ -5,7 +5,7 @@ traction stays within the bound, and where the node slips it has the size of the
 
     |sigma_t| <= bound(sigma_n),    sigma_t = -bound(sigma_n) u_t / |u_t|  where  u_t != 0.
 
-An own law is a class with `bound` and `bound_derivative`; deriving it from `FrictionLaw` supplies the rest.
+A law of your own is a class with `bound` and `bound_derivative`; deriving it from `FrictionLaw` supplies the rest.
 
 Coefficients may vary along the boundary: as numbers per contact node, or as formulas or functions of the coordinates,
 which `FrictionLaw.at` turns into numbers per node.
@@ -28,11 +28,17 @@ Coefficient: TypeAlias = ScalarField | FloatArray
 
 
 class LawError(InputError):
-    """A friction law failed or returned what no bound can be; the message names the law."""
+    """A friction law failed or returned values that are no bounds; the message names the law."""
 
 
 def checked_coefficient(name: str, value: Coefficient, *, may_be_infinite: bool = False) -> Coefficient:
-    """Check a coefficient and return it as a float, a read-only array of its own, or the formula it is."""
+    """Check a coefficient and return it as a float, a read-only copy of an array, or the formula or function itself.
+
+    Raises
+    ------
+    InputError
+        If a number is negative, infinite (unless it may be) or NaN, or an array has more than one axis.
+    """
     if callable(value):
         check_field(value, name)
         return value
@@ -49,7 +55,7 @@ def checked_coefficient(name: str, value: Coefficient, *, may_be_infinite: bool 
 
 
 def numbers_of(name: str, value: Coefficient) -> float | FloatArray:
-    """Return a coefficient that is known in numbers; InputError if it is a function of the coordinates."""
+    """Return a coefficient that is a number or an array; InputError if it is a function of the coordinates."""
     if callable(value):
         raise InputError(f"{name} is a function of the coordinates; take law.at(points) for the contact nodes first")
     return value
@@ -106,7 +112,7 @@ class FrictionLaw(Protocol):
         Parameters
         ----------
         motion : SlipHistory
-            What the contact nodes have slipped, and the time.
+            How far the contact nodes have slipped, and the time.
 
         Returns
         -------
@@ -178,10 +184,16 @@ class FrictionLaw(Protocol):
 
 
 class LawOfCoefficients(FrictionLaw):
-    """A law whose fields are coefficients: checked, evaluated, rescaled and compared in one way.
+    """Base of laws whose fields are coefficients: checks, evaluates, rescales and compares them.
 
-    Two are equal if their classes and coefficients are; arrays are compared as a whole. `stresses` names the
-    coefficients [Pa], which change with the unit of stress.
+    Two laws are equal if their classes and coefficients are; arrays are compared as a whole.
+
+    Attributes
+    ----------
+    stresses : tuple of str
+        Names of the coefficients that are stresses [Pa]; `scaled` divides them by the unit of stress.
+    may_be_infinite : tuple of str
+        Names of the coefficients that may be infinite.
     """
 
     stresses: ClassVar[tuple[str, ...]] = ()
@@ -231,7 +243,7 @@ class Frictionless(LawOfCoefficients):
 
     @property
     def is_frictionless(self) -> bool:
-        """True."""
+        """True: the bound is zero."""
         return True
 
     def bound(self, sigma_n: FloatArray) -> FloatArray:
@@ -311,7 +323,7 @@ class Coulomb(LawOfCoefficients):
 
 @dataclass(frozen=True)
 class RescaledLaw(FrictionLaw):
-    """Any law, seen through another unit of stress; what `FrictionLaw.scaled` returns by default.
+    """A law in another unit of stress; `FrictionLaw.scaled` returns one by default.
 
     Parameters
     ----------
@@ -328,12 +340,12 @@ class RescaledLaw(FrictionLaw):
 
     @property
     def is_frictionless(self) -> bool:
-        """What the law says."""
+        """As of the original law."""
         return self.law.is_frictionless
 
     @property
     def needs_history(self) -> bool:
-        """What the law says."""
+        """As of the original law."""
         return self.law.needs_history
 
     def at_slip(self, motion: SlipHistory) -> FrictionLaw:
@@ -342,7 +354,7 @@ class RescaledLaw(FrictionLaw):
 
     @property
     def acts_across_gap(self) -> bool | BoolArray:
-        """What the law says."""
+        """As of the original law."""
         return self.law.acts_across_gap
 
     def at(self, points: FloatArray) -> FrictionLaw:

@@ -17,8 +17,8 @@ from bemkit.errors import InputError
 from bemkit.formulas import ScalarField, check_field, evaluate_field
 
 FACING_TOLERANCE = 1e-12
-"""Cosine of the angle between the body's normal and the contact direction below which a point does not face the
-obstacle: round-off of a side that runs along it."""
+"""Cosine of the angle between the body's normal and the direction of contact up to which a point does not face the
+obstacle: it is zero, but for round-off, where a side runs along the direction of contact."""
 
 
 class Obstacle(Protocol):
@@ -67,7 +67,7 @@ class DirectedObstacle(Obstacle, Protocol):
 
 
 def measure_contact(obstacle: Obstacle, points: FloatArray, normals: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Measure gap and direction of contact, with points that face away left out.
+    """Measure gap and direction of contact; points that face away from the obstacle can never touch it.
 
     Parameters
     ----------
@@ -182,7 +182,18 @@ class Circle(_Round):
 
 @dataclass(frozen=True)
 class Cavity(_Round):
-    """The obstacle fills everything outside a circle, as `Circle`; the body lies inside it (a disc in a rigid ring)."""
+    """The obstacle fills everything outside a circle; the body lies inside it (a disc in a rigid ring).
+
+    Parameters
+    ----------
+    centre : (x, y) [m]
+    radius : float [m]
+
+    Raises
+    ------
+    InputError
+        If the centre is not finite or the radius not positive.
+    """
 
     def gap(self, points: FloatArray, normals: FloatArray) -> FloatArray:
         """Measure the distance from the circle; see `Obstacle.gap`."""
@@ -240,12 +251,12 @@ class Gap:
 def unit_vectors(vectors: FloatArray, otherwise: FloatArray) -> FloatArray:
     """Return unit vectors (n, 2), those of `otherwise` where a vector is zero."""
     largest = np.abs(vectors).max(axis=1, initial=0.0)[:, None]
-    is_known = largest > 0.0
-    scaled = vectors / np.where(is_known, largest, 1.0)  # lengths of tiny vectors have few digits
-    return np.where(is_known, scaled / np.where(is_known, np.hypot(*scaled.T)[:, None], 1.0), otherwise)
+    is_nonzero = largest > 0.0
+    scaled = vectors / np.where(is_nonzero, largest, 1.0)  # lengths of tiny vectors have few digits
+    return np.where(is_nonzero, scaled / np.where(is_nonzero, np.hypot(*scaled.T)[:, None], 1.0), otherwise)
 
 
 def check_pair(name: str, pair: tuple[float, float]) -> None:
-    """Refuse a pair that is not two finite numbers."""
+    """Raise InputError unless a pair is two finite numbers."""
     if len(pair) != 2 or not all(math.isfinite(component) for component in pair):
         raise InputError(f"{name} is {pair}: give two finite numbers")

@@ -1,4 +1,4 @@
-"""A periodic half-plane as contact sees it: responses by iterations with Fourier transforms, without a matrix."""
+"""The periodic half-plane as a `LinearBody`: responses by GMRES with Fourier transforms, without a matrix."""
 
 from __future__ import annotations
 
@@ -20,9 +20,10 @@ from bemkit.operators.steklov_poincare.forces_inside import ForcesInside
 from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions
 
 _ROUND_OFF = 4.0 * float(np.finfo(float).eps)
-"""Round-off of a displacement, relative to the largest; the shortest wave takes it for n times the tractions."""
+"""Round-off of a displacement, relative to the largest. In tractions the shortest of n waves magnifies it n times."""
 _LEAST_ACCURACY = 1e-11
 _RESTART, _MOST_RESTARTS, _MOST_CORRECTIONS = 100, 8, 6
+"""Steps of GMRES before it restarts, restarts for one right-hand side, and corrections by new right-hand sides."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,9 +41,9 @@ class PeriodicBody(LinearBody):
 
     Notes
     -----
-    Unknown are the tractions that no condition gives, and the motions that forces far away drive. GMRES is
-    preconditioned by the tractions that would hold the same displacements of the whole surface, so that the number of
-    iterations depends on the pattern of contact and hardly on the number of nodes.
+    Unknowns are the tractions that no condition gives, and the motions that forces far away drive. GMRES is
+    preconditioned by the stiffness of the whole surface (tractions that hold given displacements everywhere), so that
+    the number of iterations depends on the pattern of contact and hardly on the number of nodes.
     """
 
     elastic: PeriodicElasticity
@@ -61,7 +62,7 @@ class PeriodicBody(LinearBody):
 
     @property
     def accuracy(self) -> float:  # type: ignore[override]
-        """What GMRES stops at."""
+        """Relative error at which GMRES stops; at least n times the round-off of displacements."""
         return max(_LEAST_ACCURACY, _ROUND_OFF * self.elastic.mesh.n_elements)
 
     @property
@@ -90,7 +91,7 @@ class PeriodicBody(LinearBody):
         return self.elastic.to_complex(self.nodes.frame[:, 1])
 
     def _on_surface(self, numbers: ComplexArray) -> ComplexArray:
-        """Return what contact nodes have in their frames on all elements, zero elsewhere."""
+        """Return a field at the contact nodes, in their frames, as one on all elements, zero elsewhere."""
         field = np.zeros(self.elastic.mesh.n_elements, complex)
         field[self.nodes.nodes] = numbers * self._turn
         return field
@@ -133,28 +134,30 @@ class PeriodicBody(LinearBody):
         unknowns, motion = system.solved()
         traction = reduced.tractions(unknowns)
         displacement = self._rest + self._caused(traction) + motion @ self._motions[self._driven]
-        met = conditions.with_given_tractions(as_pairs(traction))
-        return ContactState(conditions.with_given_displacements(as_pairs(displacement)), met)
+        return ContactState(
+            conditions.with_given_displacements(as_pairs(displacement)),
+            conditions.with_given_tractions(as_pairs(traction)),
+        )
 
     def _caused(self, traction: ComplexArray) -> ComplexArray:
         return self._at_contact(self.elastic.displaced(self._on_surface(traction)))
 
     def imbalance(self, state: ContactState) -> Imbalance:
-        """Return the tractions to be added so that the displacements are held, and the forces that are missing."""
+        """Return the largest tractions and driving forces that are missing; see `LinearBody.imbalance`."""
         traction, motions = as_complex(state.traction), self._motions[self._driven]
-        astray = as_complex(state.displacement) - self._rest - self._caused(traction)
+        misfit = as_complex(state.displacement) - self._rest - self._caused(traction)
         if len(motions):
             rows = np.concatenate([motions.real, motions.imag], axis=1)
-            moved = np.linalg.lstsq(rows.T, np.concatenate([astray.real, astray.imag]), rcond=None)[0]
-            astray = astray - moved @ motions
-        missing = self._at_contact(self.elastic.held(self._on_surface(astray)))
+            amounts = np.linalg.lstsq(rows.T, np.concatenate([misfit.real, misfit.imag]), rcond=None)[0]
+            misfit = misfit - amounts @ motions
+        missing = self._at_contact(self.elastic.held(self._on_surface(misfit)))
         force = (self.weights * traction * motions.conj()).real.sum(axis=1) + self.rigid_load()
         largest = float(np.abs(traction).max())
         total = float(np.abs(self.weights * traction).sum())
         if largest == 0.0:
             is_pushed = bool(np.abs(force).max(initial=0.0) > 0.0)
             return Imbalance(float(is_pushed or np.abs(missing).max() > 0.0), float(is_pushed))
-        # a uniform traction too much moves the surface as a driven motion does
+        # an error of the mean traction moves the surface as a driven motion does
         on_motions = float(np.abs(force).max(initial=0.0)) / total
         return Imbalance(max(float(np.abs(missing).max()) / largest, on_motions), on_motions, self.accuracy)
 
@@ -163,9 +166,8 @@ class PeriodicBody(LinearBody):
         lengths = self.elastic.mesh.lengths[:, None]
         force = self.force + lengths * self.elastic.to_vectors(self._on_surface(as_complex(state.traction)))
         displacement = self.elastic.strain_displacement(force)
-        astray = as_complex(state.displacement) - self._at_contact(self.elastic.to_complex(displacement))
-        moved = self.elastic.to_vectors(np.array([(astray * self._turn).mean()]))
-        displacement = displacement + moved
+        misfit = as_complex(state.displacement) - self._at_contact(self.elastic.to_complex(displacement))
+        displacement = displacement + self.elastic.to_vectors(np.array([(misfit * self._turn).mean()]))
         at_nodes = as_complex(state.displacement) * self._turn
         displacement[self.nodes.nodes] = self.elastic.to_vectors(at_nodes)
         return displacement, force
@@ -173,7 +175,7 @@ class PeriodicBody(LinearBody):
 
 @dataclass(frozen=True, eq=False)
 class _System:
-    """The equations for the tractions that no condition gives and for the driven motions, made nearly the identity."""
+    """The preconditioned equations for the tractions that no condition gives and for the driven motions."""
 
     body: PeriodicBody
     reduced: ReducedConditions
@@ -181,7 +183,8 @@ class _System:
     def solved(self) -> tuple[FloatArray, FloatArray]:
         """Return unknown tractions (n_unknowns,) and driven motions (n_driven,).
 
-        GMRES begins far above the size of the solution; what it leaves is corrected until it is small against that.
+        GMRES stops relative to the right-hand side, which may be far larger than the solution. So its residual is the
+        next right-hand side, until it is small relative to the solution.
         """
         from scipy.sparse.linalg import LinearOperator, gmres
 
@@ -192,19 +195,20 @@ class _System:
         n = reduced.n_unknowns
         if n == 0:
             return np.zeros(0), np.zeros(0)
-        # a travel that is long beside the deformation is taken out first, or nothing would be left of the deformation
+        # a long travel is subtracted first: beside it the deformation would have few digits
         columns = [reduced.rows(motion, np.zeros_like(known)) for motion in self._motions]
         travel, right = _fitted(columns, right)
-        rest = right = self._nearly_solved(np.concatenate([right, load]))
-        operator = LinearOperator((right.size, right.size), lambda x: self._nearly_solved(self._left(x)), dtype=float)
+        residual = right = self._preconditioned(np.concatenate([right, load]))
+        operator = LinearOperator((right.size, right.size), lambda x: self._preconditioned(self._left(x)), dtype=float)
         solution = np.zeros(right.size)
         for _ in range(_MOST_CORRECTIONS):
             largest = float(np.abs(reduced.tractions(solution[:n])).max())
-            if np.abs(rest).max() <= 0.5 * body.accuracy * largest:
+            size = float(np.abs(residual).max())
+            if size <= 0.5 * body.accuracy * largest:
                 break
-            aim = max(0.1 * body.accuracy, 0.2 * body.accuracy * largest / float(np.abs(rest).max()))
-            solution = solution + gmres(operator, rest, rtol=min(aim, 0.1), restart=_RESTART, maxiter=_MOST_RESTARTS)[0]
-            rest = right - operator.matvec(solution)
+            rtol = min(max(0.1 * body.accuracy, 0.2 * body.accuracy * largest / size), 0.1)
+            solution = solution + gmres(operator, residual, rtol=rtol, restart=_RESTART, maxiter=_MOST_RESTARTS)[0]
+            residual = right - operator.matvec(solution)
         else:
             raise SingularResponse(f"{_MOST_CORRECTIONS} corrections have not led to a response")
         return solution[:n], travel + solution[n:] / self._sizes
@@ -216,7 +220,7 @@ class _System:
 
     @cached_property
     def _works(self) -> ComplexArray:
-        """(n_driven, n_contact) array: what tractions are multiplied by for their work on these."""
+        """(n_driven, n_contact) array: weighted driven motions; the real part of a product with tractions is work."""
         return np.asarray(self.body.weights * self._motions.conj())
 
     def _resultants(self, traction: ComplexArray) -> FloatArray:
@@ -231,7 +235,7 @@ class _System:
         return np.concatenate([reduced.rows(displacement, traction), self._resultants(traction)])
 
     def _tractions_of(self, right: FloatArray) -> FloatArray:
-        """Return about the unknowns that have the left-hand sides given while no motion is driven."""
+        """Return approximate unknowns for given left-hand sides, without driven motions."""
         body, reduced = self.body, self.reduced
         displacement = reduced.displacements(right, body.stiffness_scale)
         held = body._at_contact(body.elastic.held(body._on_surface(displacement)))
@@ -239,30 +243,30 @@ class _System:
 
     @cached_property
     def _for_motions(self) -> tuple[FloatArray, FloatArray]:
-        """Return tractions (n_unknowns, n_driven) that unit motions take, and the inverse of their work."""
-        reduced, nothing = self.reduced, np.zeros(self.body.n_contact, complex)
-        taken = [self._tractions_of(reduced.rows(motion, nothing)) for motion in self._motions]
-        works = [self._resultants(reduced.changes(each)) for each in taken]
-        return np.array(taken).T, np.asarray(np.linalg.inv(np.array(works).T))
+        """Return the tractions (n_unknowns, n_driven) that unit motions cause, and the inverse of their work."""
+        reduced, zero = self.reduced, np.zeros(self.body.n_contact, complex)
+        tractions = [self._tractions_of(reduced.rows(motion, zero)) for motion in self._motions]
+        works = [self._resultants(reduced.changes(unknowns)) for unknowns in tractions]
+        return np.array(tractions).T, np.asarray(np.linalg.inv(np.array(works).T))
 
     @cached_property
     def _sizes(self) -> FloatArray:
-        """(n_driven,) array [Pa/m]: the largest traction that each unit motion takes, by which motions are measured."""
+        """(n_driven,) array [Pa/m]: the largest traction that each unit motion causes; scales motions to tractions."""
         return np.asarray(np.abs(self._for_motions[0]).max(axis=0)) if len(self._motions) else np.zeros(0)
 
-    def _nearly_solved(self, right: FloatArray) -> FloatArray:
-        """Return about the solution for given right-hand sides."""
+    def _preconditioned(self, right: FloatArray) -> FloatArray:
+        """Return the approximate solution for given right-hand sides."""
         n = self.reduced.n_unknowns
         unknowns = self._tractions_of(right[:n])
         if right.size == n:
             return unknowns
-        taken, inverse = self._for_motions
+        tractions, inverse = self._for_motions
         motion = inverse @ (self._resultants(self.reduced.changes(unknowns)) - right[n:])
-        return np.concatenate([unknowns - taken @ motion, self._sizes * motion])
+        return np.concatenate([unknowns - tractions @ motion, self._sizes * motion])
 
 
 def _fitted(columns: Sequence[FloatArray], values: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the amounts of some columns (n,) that come nearest to values (n,), and what is left of these."""
+    """Return the least-squares amounts of columns (n,) for values (n,), and the residual (n,)."""
     if not columns:
         return np.zeros(0), values
     matrix = np.stack(columns, axis=1)

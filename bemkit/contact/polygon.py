@@ -55,7 +55,7 @@ class PolygonalObstacle:
         """Return the direction to the nearest point, out of it where the polygon holds the point."""
         towards, inward, is_beside = self._nearest(points)
         away = np.where(self._holds(points)[:, None], -towards, towards)
-        # of a point on the polygon itself the vector is round-off: its side knows better, and at a corner the body
+        # for a point on the polygon the vector is round-off: take the normal of the side, at a corner that of the body
         direction = np.where(is_beside[:, None], inward, unit_vectors(away, normals))
         return np.where(self._is_at_corner(points)[:, None], normals, direction)
 
@@ -68,13 +68,13 @@ class PolygonalObstacle:
         return start, np.roll(start, -1, axis=0) - start
 
     def _nearest(self, points: FloatArray) -> tuple[FloatArray, FloatArray, BoolArray]:
-        """Return vectors (n, 2) to the nearest points, the inward normals (n, 2) there, and which are no corners."""
+        """Return vectors (n, 2) to the nearest points, inward normals (n, 2) there, and (n,) bool: no corners."""
         start, along = self._sides()
         offset = start - points[:, None, :]
         share = np.clip(-np.sum(offset * along, axis=2) / np.sum(along**2, axis=1), 0.0, 1.0)
         to_side = offset + share[:, :, None] * along
         distance, is_beside = np.hypot(*np.moveaxis(to_side, -1, 0)), (share > 0.0) & (share < 1.0)
-        # in the middle of a wedge round-off shall not decide through which side
+        # of sides that are equally near, but for round-off, take the first
         is_as_near = distance <= distance.min(axis=1, keepdims=True) + self._round_off(points)
         rows, nearest = np.arange(len(points)), np.argmin(np.where(is_as_near & is_beside, -1.0, distance), axis=1)
         unit = along[nearest] / np.hypot(*along[nearest].T)[:, None]

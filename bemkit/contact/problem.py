@@ -1,8 +1,9 @@
 """The contact problem: a body, a gap, a friction law; and the certificate of a solution, numbers anyone can check."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -26,15 +27,18 @@ __all__ = [
     "certify",
 ]
 
+Result = TypeVar("Result")
+
 _ROUND_OFF = 1e-13
 """Tractions below this share of those of the sticking state are round-off (450 eps) of the sums they come from. Larger
-ones mean something, however small they are."""
-_HELD = 100.0
-"""Tractions of the sticking state measure those in a state that are so many times smaller at most: to 1e-9 of them
-these are known to 1e-7, and where few nodes carry all, by the mean of an element, to 1e-6."""
+ones count, however small they are."""
+_LARGEST_STICKING_RATIO = 100.0
+"""The tractions of the sticking state measure a state only up to this multiple of its own tractions. These are then
+known to 1e-7 at a tolerance of 1e-9, and to 1e-6 (the mean of an element) where few nodes carry all."""
 DEFORMED = 1e-3
-"""Share of its displacement by which a body counts as deformed that contact does not touch: more than round-off of the
-displacement leaves to a tolerance of 1e-9, less than the load may deform a body that has given way to an overlap."""
+"""Share of its displacement that counts as deformation of a body without contact tractions. It lies above the round-off
+of the displacement at a tolerance of 1e-9, and below the deformation by a load under which the body gives way to an
+overlap."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,8 +73,8 @@ class ContactProblem:
         _check_members(self.body, self.law)
         n_contact = self.body.n_contact
         slip = np.zeros(n_contact) if self.reference_slip is None else self.reference_slip
-        for name, given in (("gap", self.gap), ("reference_slip", slip)):
-            array = np.array(given, dtype=float)
+        for name, values in (("gap", self.gap), ("reference_slip", slip)):
+            array = np.array(values, dtype=float)
             if array.shape != (n_contact,):
                 raise InputError(f"{name} has the shape {array.shape}; the body has {n_contact} contact nodes")
             is_wrong = np.isnan(array) | (np.isneginf(array) if name == "gap" else np.isinf(array))
@@ -78,7 +82,7 @@ class ContactProblem:
                 node = int(np.argmax(is_wrong))
                 raise InputError(f"{name} is {array[node]} at contact node {node}; give a number")
             object.__setattr__(self, name, read_only(array))
-        _ = self.cohesion  # a law that fails does so at once
+        _ = self.cohesion  # asks the law once, so that a law that fails does so here
 
     @property
     def n_contact(self) -> int:
@@ -97,23 +101,34 @@ class ContactProblem:
         Nodes are held at ``u_n = min(g, 0)`` and ``u_t = reference_slip``, or ``sigma_t = 0`` where the body has
         eliminated the tangent.
         """
-        return self.respond(stick(np.minimum(self.gap, 0.0), self.slip_origin))
+        sticking = stick(np.minimum(self.gap, 0.0), self.slip_origin)
+        return self.for_all_laws("sticking_state", lambda: self.respond(sticking))
 
     @cached_property
     def modulus(self) -> float:
-        """Force by which a typical node resists its displacement [Pa]: about E' of the material."""
+        """Nodal force per displacement of a typical node [Pa]: about E' of the material."""
         return self.body.stiffness_scale * float(np.median(self.body.weights))
 
+    def for_all_laws(self, name: str, compute: Callable[[], Result]) -> Result:
+        """Return a result that does not depend on the law, computed once for the problems that `with_law` makes."""
+        if name not in self._law_independent:
+            self._law_independent[name] = compute()
+        result: Result = self._law_independent[name]
+        return result
+
     @cached_property
-    def of_body(self) -> dict[str, Any]:
-        """What drivers have found out of the body and its load, to be kept under other laws; see `with_law`."""
+    def _law_independent(self) -> dict[str, Any]:
         return {}
 
     def respond(self, conditions: LinearConditions) -> ContactState:
-        """Return the response of the body; where it has eliminated the tangent, ``sigma_t = 0`` whatever is asked.
+        """Return the response of the body, with the condition ``sigma_t = 0`` where it has eliminated the tangent.
 
-        Drivers ask this instead of the body itself, and need not know where there is no friction. Raises
-        `SingularResponse` if the conditions do not determine the response.
+        Drivers call this instead of `LinearBody.respond`, and need not know where there is no friction.
+
+        Raises
+        ------
+        SingularResponse
+            If the conditions do not determine the response.
         """
         return self.body.respond(self.without_eliminated(conditions))
 
@@ -125,11 +140,9 @@ class ContactProblem:
         return conditions.replaced(np.stack([np.zeros_like(rows), rows], axis=1), separated(self.n_contact))
 
     def with_law(self, law: FrictionLaw) -> "ContactProblem":
-        """Return the problem under another law."""
+        """Return the problem under another law, with the results that do not depend on it."""
         other = replace(self, law=law)
-        other.__dict__["of_body"] = self.of_body
-        if "sticking_state" in self.__dict__:  # it does not depend on the law
-            other.__dict__["sticking_state"] = self.sticking_state
+        other.__dict__["_law_independent"] = self._law_independent
         return other
 
     @cached_property
@@ -183,7 +196,7 @@ class ContactProblem:
     def _ask_law(self, method: str, sigma_n: FloatArray) -> FloatArray:
         try:
             values = np.asarray(getattr(self.law, method)(sigma_n), dtype=float)
-        except Exception as error:  # whatever an own law raises must surface with the law's name
+        except Exception as error:  # whatever a law raises must surface with the name of the law
             raise LawError(f"{self._name(method)} failed: {type(error).__name__}: {error}") from error
         if values.shape != sigma_n.shape:
             shapes = f"the shape {values.shape} for {sigma_n.shape}"
@@ -233,15 +246,15 @@ class Certificate:
     tension : float
         ``sigma_n`` where positive.
     complementarity : float
-        The smaller of traction and distance where both exist: a node that is open and carries traction.
+        The smaller of traction and distance to the obstacle: both are there where an open node carries traction.
     cone_excess : float
         ``|sigma_t| - bound(sigma_n)`` where positive, the bound taken at the *present* normal traction.
     slip_opposition : float
         The smaller of ``|slip|`` and ``|sigma_t + bound(sigma_n) sign(slip)|``: slip without full, opposing friction.
     force_imbalance, moment_imbalance : float
-        What the body says about equilibrium, see `LinearBody.imbalance`.
+        Distance of all forces on the body from equilibrium, see `LinearBody.imbalance`.
     round_off : float
-        No violation, but how much of the two imbalances round-off alone may leave, at most 1e-6.
+        No violation: how much of the two imbalances may be round-off, at most 1e-6.
     """
 
     penetration: float
@@ -255,16 +268,16 @@ class Certificate:
 
     @property
     def violations(self) -> dict[str, float]:
-        """What was measured, by name: all but `round_off`."""
+        """The measured violations by name: all entries but `round_off`."""
         return {name: value for name, value in self.as_dict().items() if name != "round_off"}
 
     @property
     def worst(self) -> float:
-        """The largest violation, whatever it is put down to; ``nan`` if any is."""
+        """The largest violation, round-off included; ``nan`` if any violation is."""
         return float(np.max(list(self.violations.values())))
 
     def is_below(self, tolerance: float) -> bool:
-        """Whether every violation is at most `tolerance`, an imbalance `round_off` more (never true for ``nan``)."""
+        """Whether violations are at most `tolerance`, imbalances at most `tolerance + round_off`; never for ``nan``."""
         allowed = {name: tolerance for name in self.violations}
         for name in ("force_imbalance", "moment_imbalance"):
             allowed[name] += self.round_off
@@ -276,20 +289,38 @@ class Certificate:
 
 
 def certify(problem: ContactProblem, state: ContactState) -> Certificate:
-    """Measure a state against conditions (6) to (8), whoever produced it.
+    """Measure how far a state violates conditions (6) to (8) of the paper and the equilibrium of the body.
+
+    Parameters
+    ----------
+    problem : ContactProblem
+    state : ContactState
+        Of any origin: it need not be a response of the body.
+
+    Returns
+    -------
+    Certificate
+
+    Raises
+    ------
+    LawError
+        If the friction law fails.
 
     Notes
     -----
-    Tractions are measured by the largest traction in the state or in the sticking state (all nodes held), whichever is
-    larger, so that a nearly lifted body is judged by its load; but by no more than a hundred times those in the state.
-    Of several bodies each contact is measured so by the one of its partners that carries less, down to a thousandth of
-    what the others carry: a light block is not judged by the heaviest; see `LinearBody.shares`.
-    A node to which that would give more than the largest nodal force is measured by this force, so that tractions of
-    tiny elements in a corner excuse nothing. Lengths are measured by the displacement which the largest nodal force
-    causes at its node, ``force / E'``, however few nodes or small elements carry it: a far obstacle or a long rigid
-    motion does not loosen the test until it exceeds 1e6 times that displacement, where round-off would speak instead. A
-    state without tractions, such as that of a loose body which has given way to an overlap, has no length but its
-    displacement: a thousandth of it is what counts as deformation.
+    Tractions are divided by a stress, distances and slips by a length:
+
+    * The stress is the largest traction of the state or of the sticking state (all nodes held), whichever is larger, so
+      that a nearly lifted body is judged by its load. It is at most a hundred times the largest traction of the state.
+    * At a node the stress is at most the largest nodal force divided by the weight of the node, so that the high
+      tractions of tiny elements in a corner do not loosen the test elsewhere.
+    * The length is the displacement that the largest nodal force causes at its node, ``force / E'``, however few nodes
+      carry it. It is at least 1e-6 of the largest displacement: further digits are round-off. So a far obstacle or a
+      long rigid motion does not loosen the test until it exceeds the length a million times.
+    * Of several bodies each contact is measured by the partner that carries less, down to a thousandth of what the
+      others carry: a light block is not judged by the heaviest. See `LinearBody.shares`.
+    * A state without tractions, such as that of a loose body which has given way to an overlap, has no length but its
+      displacement: a thousandth of it counts as deformation.
     """
     scales = _scales(problem, state)
     stress = np.minimum(scales.stress, scales.force / problem.body.weights) * scales.share
@@ -298,8 +329,7 @@ def certify(problem: ContactProblem, state: ContactState) -> Certificate:
     slip = state.u_t - problem.slip_origin
     # friction given across the gap is no sign of contact
     shear = np.where(problem.law.acts_across_gap, 0.0, np.abs(state.sigma_t))
-    held = np.maximum(np.abs(state.sigma_n), shear)
-    traction, distance = held / stress, np.abs(clearance) / length
+    traction, distance = np.maximum(np.abs(state.sigma_n), shear) / stress, np.abs(clearance) / length
     bound = problem.friction_bound(state.sigma_n, is_closed=traction > distance)
     against_slip = np.where(slip > 0.0, state.sigma_t + bound, state.sigma_t - bound)
     imbalance = problem.body.imbalance(state)
@@ -322,6 +352,8 @@ def certificate_scales(problem: ContactProblem, state: ContactState) -> tuple[fl
 
 
 class _Scales(NamedTuple):
+    """What `certify` divides by: a stress [Pa], a nodal force [N/m], lengths [m], and the share of each node."""
+
     stress: float
     force: float
     length: float
@@ -331,26 +363,30 @@ class _Scales(NamedTuple):
 
 def _scales(problem: ContactProblem, state: ContactState) -> _Scales:
     weights, modulus = problem.body.weights, problem.modulus
-    furthest = float(np.abs(state.displacement).max())
+    largest_displacement = float(np.abs(state.displacement).max())
+    present, sticking = (np.abs(each.traction).max(axis=1) for each in (state, problem.sticking_state))
     # friction without pressure is a traction to be met as well, however small beside those of the sticking state
-    resisted = problem.cohesion
-    present, sticking = (np.abs(held.traction).max(axis=1) for held in (state, problem.sticking_state))
-    at_hand = np.maximum(present, resisted)
-    if at_hand.max() > _ROUND_OFF * sticking.max() and max(present.max(), sticking.max()) > 0.0:
-        # Holding a nearly incompressible body may take a million times the tractions of the answer, which these must
-        # not excuse.
+    required = np.maximum(present, problem.cohesion)
+    if required.max() > _ROUND_OFF * sticking.max() and max(present.max(), sticking.max()) > 0.0:
+        # Holding a nearly incompressible body may take a million times the tractions of the solution. Measured by
+        # those, errors of the solution would not be seen.
         stress, force = (
-            max(float((by * present).max()), min(float((by * sticking).max()), _HELD * float((by * at_hand).max())))
-            for by in (1.0, weights)
+            max(
+                float((factor * present).max()),
+                min(float((factor * sticking).max()), _LARGEST_STICKING_RATIO * float((factor * required).max())),
+            )
+            for factor in (1.0, weights)
         )
-        least = 1e-6 * furthest
-        share = problem.body.shares(weights * np.maximum(present, np.minimum(sticking, _HELD * at_hand)))
-        return _Scales(stress, force, max(force / modulus, least), least, share)
-    # Contact does nothing here, so the displacement is the only length there is. A body that has not moved is measured
-    # by what would hold it or, if even that is nothing, by the gaps.
+        least_length = 1e-6 * largest_displacement
+        share = problem.body.shares(
+            weights * np.maximum(present, np.minimum(sticking, _LARGEST_STICKING_RATIO * required))
+        )
+        return _Scales(stress, force, max(force / modulus, least_length), least_length, share)
+    # Contact carries nothing, so the displacement is the only length there is. A body that has not moved is measured by
+    # the force that would hold it or, if that is zero, by the gaps.
     gaps = np.abs(problem.gap[np.isfinite(problem.gap)])
     force = float((weights * sticking).max())
-    length = DEFORMED * furthest or force / modulus or float(gaps.max(initial=0.0)) or 1.0
+    length = DEFORMED * largest_displacement or force / modulus or float(gaps.max(initial=0.0)) or 1.0
     return _Scales(float(sticking.max()) or 1.0, force or float(weights.max()), length, length, np.ones(len(weights)))
 
 

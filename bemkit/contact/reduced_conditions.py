@@ -1,4 +1,4 @@
-"""Two linear conditions a node, reduced to the tractions they leave open and the displacements they ask for.
+"""Two linear conditions at each node, reduced to the unknown tractions and one equation for each of them.
 
 Pairs (n, t) are complex numbers here: the tangential component is the real part, the normal one the imaginary part.
 """
@@ -32,13 +32,16 @@ class ReducedConditions:
     Parameters
     ----------
     given : (n_contact,) complex array [Pa]
-        Tractions that such conditions give.
+        Tractions that follow from conditions on tractions alone; zero elsewhere.
     node : (n_unknowns,) int array
         The node of each unknown; those with two unknowns come twice, one after the other.
     direction : (n_unknowns,) complex array
+        Unit traction of each unknown.
     on_displacement, on_traction : (n_unknowns,) complex arrays
-        The equation of each unknown, its factors of displacements of unit size.
+        Factors of the equation of each unknown, scaled so that that of the displacement has unit size; an equation is
+        the real part of ``conj(factor) * number``.
     value : (n_unknowns,) array [m]
+        Right-hand sides.
     """
 
     given: ComplexArray
@@ -50,12 +53,12 @@ class ReducedConditions:
 
     @classmethod
     def of(cls, conditions: LinearConditions) -> ReducedConditions:
-        """Sort the conditions.
+        """Reduce conditions.
 
         Raises
         ------
         SingularResponse
-            If conditions on the tractions of a node contradict each other or say nothing.
+            If two conditions on the traction of a node are dependent, or a condition has no factor at all.
         """
         on_u, on_t = conditions.on_displacement, conditions.on_traction
         is_of_traction = ~(on_u != 0.0).any(axis=2)
@@ -71,7 +74,7 @@ class ReducedConditions:
         if not np.abs(factor).all():
             raise SingularResponse("a condition at a contact node involves neither displacement nor traction")
         given[one] = conditions.value[one, row] * factor / np.abs(factor) ** 2
-        # at right angles to the factor; with a positive normal component where there is one
+        # the unknown is at right angles to the factor, with a normal component that is not negative
         along[one] = 1j * factor / np.abs(factor)
         along[one] *= np.where(along[one].imag < 0.0, -1.0, 1.0)
         node, equation = np.nonzero(~is_of_traction)
@@ -88,11 +91,11 @@ class ReducedConditions:
 
     @property
     def n_unknowns(self) -> int:
-        """Tractions that are left open."""
+        """Number of unknown tractions."""
         return self.node.size
 
     def _summed(self, numbers: ComplexArray) -> ComplexArray:
-        """Add up what the unknowns of each node have, (n_contact,)."""
+        """Return the sums (n_contact,) of numbers of the unknowns of each node."""
         result = np.zeros(self.given.size, complex)
         result[self.node] = numbers
         result[self.node[self._is_second]] += numbers[self._is_second - 1]
@@ -104,7 +107,7 @@ class ReducedConditions:
         return 1 + np.flatnonzero(self.node[1:] == self.node[:-1])
 
     def changes(self, unknowns: FloatArray) -> ComplexArray:
-        """Return the tractions (n_contact,) of the unknowns alone."""
+        """Return the tractions (n_contact,) of the unknowns, without those given."""
         return self._summed(self.direction * unknowns)
 
     def tractions(self, unknowns: FloatArray) -> ComplexArray:
@@ -127,26 +130,26 @@ class ReducedConditions:
         return np.asarray(self.on_traction.conj())
 
     def displacements(self, rows: FloatArray, stiffness: float) -> ComplexArray:
-        """Return about the displacements (n_contact,) of these left-hand sides, as small as they can be.
+        """Return approximate displacements (n_contact,) with the left-hand sides `rows` (n_unknowns,), of least size.
 
-        Of equations that involve tractions, too, those are small: the stiffness [Pa/m] is that of a node.
+        An equation that involves tractions shares its left-hand side between both, by the stiffness [Pa/m] of a node.
         """
         return self._summed(self.on_displacement * rows / (1.0 + self._softness * stiffness))
 
     def unknowns(self, traction: ComplexArray, rows: FloatArray, stiffness: float) -> FloatArray:
         """Return the unknowns (n_unknowns,) in tractions that hold displacements with the left-hand sides `rows`.
 
-        Equations that involve tractions, too, are softer, each for itself, at the stiffness [Pa/m] of a node.
+        An equation that involves tractions is solved by itself instead, with the stiffness [Pa/m] of a node.
         """
-        own = (self._along * traction[self.node]).real
+        components = (self._along * traction[self.node]).real
         if not self._traction_factor.any():
-            return np.asarray(own)
+            return np.asarray(components)
         softness = self._softness
-        return np.asarray(np.where(softness == 0.0, own, rows * stiffness / (1.0 + softness * stiffness)))
+        return np.asarray(np.where(softness == 0.0, components, rows * stiffness / (1.0 + softness * stiffness)))
 
     @cached_property
     def _softness(self) -> FloatArray:
-        """(n_unknowns,) array [m/Pa]: how much an equation gives way to its own unknown."""
+        """(n_unknowns,) array [m/Pa]: size of the factor of each unknown traction in its equation."""
         return np.asarray(np.abs((self._traction_factor * self.direction).real))
 
     @cached_property

@@ -12,17 +12,17 @@ from bemkit.formulas import ScalarField, check_field, evaluate_field
 from bemkit.geometry.vectors import turned_left
 
 _STEPS = 4.0 ** -np.arange(2.5, 9.0)
-"""Steps of differences, in sizes of what is measured: whatever the curvature, one of them suits."""
+"""Steps of differences, relative to the size of the points; one of them suits any curvature."""
 _ONE_STEP = _STEPS[3:4]
-"""One that suits well enough where slopes only guide the way."""
+"""The step where slopes need few digits."""
 _STENCIL = ((1.0, 0.75), (2.0, -0.15), (3.0, 1.0 / 60.0))
 """Places and weights of the central difference of sixth order."""
 _IS_DISTANCE = 1e-8
-"""How much the slope of a distance may differ from one."""
+"""Difference of the slope from one up to which a function counts as a distance."""
 _ON_LEVEL, _ROUND_OFF = 1e-10, 1e-14
-"""Lengths, in sizes of what is measured, that count as none: of what is looked for, and of what is computed."""
+"""Lengths that count as zero, relative to the size of the points: distances from the surface, and steps on it."""
 _FARTHEST_POINT = -1e-3
-"""Second derivative of half the squared distance along the surface below which a point is no nearest one."""
+"""Second derivative of half the squared distance along the surface below which a point is not the nearest one."""
 _MOST_STEPS, _MOST_HALVINGS = 100, 20
 
 
@@ -33,9 +33,9 @@ class SignedDistance:
     Parameters
     ----------
     distance : Expression or callable (x, y) -> (n,) array
-        Best the distance from the obstacle itself [m]. Any other smooth function that grows away from the obstacle and
-        vanishes on its surface will do, such as ``x**2 + 4 * y**2 - 1``: the nearest point of the surface is then
-        looked for.
+        Preferably the distance from the obstacle [m]. Any other smooth function that vanishes on the surface and grows
+        away from the obstacle may be given, such as ``x**2 + 4 * y**2 - 1``: the nearest point of the surface is then
+        found by iteration.
 
     Raises
     ------
@@ -45,10 +45,10 @@ class SignedDistance:
 
     Notes
     -----
-    Slopes are differences of sixth order, of the step that agrees best with one four times as long: 1e-11 and better
-    where the function is smooth. Where f is a distance the nearest point of p is ``p - f grad f``; else it is looked
-    for along the surface by Newton's method, with steps that come nearer. Deep inside, where several points are about
-    as near, any of them may be found.
+    Slopes are differences of sixth order, with the step that agrees best with one four times as long: 1e-11 and better
+    where the function is smooth. Where f is a distance the nearest point to p is ``p - f grad f``; otherwise it is
+    found along the surface by Newton's method, with steps that reduce the distance. Deep inside several points may be
+    about as near; any of them may be found.
     """
 
     distance: ScalarField
@@ -90,22 +90,23 @@ class SignedDistance:
             slope = self._slope(foot, size)
             steepness = np.sqrt(_squares(slope, foot))
             normal = slope / steepness[:, None]
-            along = turned_left(normal)
-            away = foot - points
-            rise = np.sum(away * along, axis=1)  # of half the squared distance along the surface
-            curvature = np.einsum("ni,nik,nk->n", along, self._second_derivatives(foot, size), along) / steepness
-            bend = 1.0 - curvature * np.sum(away * normal, axis=1)
-            if np.all((np.abs(rise) <= _ON_LEVEL * size) & (bend > _FARTHEST_POINT)):
+            tangent = turned_left(normal)
+            offset = foot - points
+            # first and second derivative of half the squared distance along the surface
+            first = np.sum(offset * tangent, axis=1)
+            curvature = np.einsum("ni,nik,nk->n", tangent, self._second_derivatives(foot, size), tangent) / steepness
+            second = 1.0 - curvature * np.sum(offset * normal, axis=1)
+            if np.all((np.abs(first) <= _ON_LEVEL * size) & (second > _FARTHEST_POINT)):
                 return foot
-            farthest = 0.5 / np.maximum(np.abs(curvature), 1.0 / size)
-            downhill = np.where(rise > 0.0, -farthest, farthest)
-            step = np.where(bend > 0.0, -rise / np.where(bend > 0.0, bend, 1.0), downhill)
-            foot = self._descended(points, foot, np.clip(step, -farthest, farthest)[:, None] * along, size)
-        worst = int(np.argmax(np.abs(rise)))
+            longest = 0.5 / np.maximum(np.abs(curvature), 1.0 / size)
+            downhill = np.where(first > 0.0, -longest, longest)
+            step = np.where(second > 0.0, -first / np.where(second > 0.0, second, 1.0), downhill)
+            foot = self._descended(points, foot, np.clip(step, -longest, longest)[:, None] * tangent, size)
+        worst = int(np.argmax(np.abs(first)))
         raise InputError(self._nothing_near(points[worst]))
 
     def _descended(self, points: FloatArray, foot: FloatArray, step: FloatArray, size: float) -> FloatArray:
-        """Return points of the surface that are nearer to points than feet are, after steps or parts of them."""
+        """Return points of the surface after steps from feet, halved until they are not farther from the points."""
         distance = np.hypot(*(points - foot).T)
         for _ in range(_MOST_HALVINGS):
             trial = self._on_surface(foot + step, size)
@@ -116,7 +117,7 @@ class SignedDistance:
         return trial
 
     def _on_surface(self, points: FloatArray, size: float) -> FloatArray:
-        """Return points (n, 2) of the surface, straight along the slopes from points (n, 2)."""
+        """Return points (n, 2) of the surface, by Newton's method along the slopes from points (n, 2)."""
         foot = points
         for _ in range(_MOST_STEPS):
             slope = self._slope(foot, size, _ONE_STEP)
@@ -150,7 +151,7 @@ class SignedDistance:
         return np.asarray(trials[best, np.arange(len(points))])
 
     def _second_derivatives(self, points: FloatArray, size: float) -> FloatArray:
-        """Return (n, 2, 2) arrays good to six digits: they only guide the way."""
+        """Return second derivatives (n, 2, 2) to about six digits, which is enough for the steps of Newton's method."""
         step = 1e-3 * size
         x, y = step * np.eye(2)
         at = {(i, k): evaluate_field(self.distance, points + i * x + k * y) for i in (-1, 0, 1) for k in (-1, 0, 1)}

@@ -1,4 +1,4 @@
-"""Whether contact can hold the load at all, and how much of a growing one it can hold at most."""
+"""Whether contact tractions can balance the load, and the largest multiple of a load that they can balance."""
 
 from __future__ import annotations
 
@@ -16,30 +16,28 @@ if TYPE_CHECKING:
 
 
 _RELATIVE_WORK = 1e-6
-"""Work below this share of the largest force at hand counts as zero: the load is then on the edge of being held, which
-linear programming (tolerance 1e-7) cannot decide and the drivers can."""
+"""Work below this share of the largest force counts as zero. Linear programming (tolerance 1e-7) cannot decide whether
+contact holds such a load; the drivers can."""
 
 _PLAIN = 1e-3
-"""Work by the forces of the sticking state that no inaccuracy of supports or integrals can leave; and these forces by
-those of a body that is strained by as much as it is carried."""
+"""Work, relative to the forces of the sticking state, that errors of supports and integrals cannot cause; and size of
+these forces, relative to those of a body strained by as much as it moves, below which they may be round-off."""
 
 _FARTHEST = 1e7
 """Travel to an obstacle, in deformations of the body, up to which displacements hold nine digits of the deformation."""
 
-
 _MANY_MOTIONS = 60
-"""Of more motions than that the sum of all rests of the load is made small instead of the largest one, which would take
-a condition for each."""
-
+"""Largest number of motions for which the largest residual of the balance is minimised, with a condition for each. Of
+more motions the sum of all residuals is."""
 
 _PRESSES = 1e-9
-"""Speed into an obstacle, relative to the largest of the only motion there is, that is no round-off."""
+"""Speed into an obstacle, relative to the largest speed of the motion, above which it is no round-off."""
 
 _MEETS = 1e-7
-"""Speed into an obstacle, relative to the largest of a motion, from which on a node meets it: what linear programming
-leaves."""
+"""The same for motions that are found by linear programming, whose tolerance is larger."""
+
 _WITHOUT_BOUND = 1e6
-"""Multiple of all other forces from which on a growing load counts as one that contact holds however large it is."""
+"""Multiple of all other forces above which the load that contact holds counts as unbounded."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,7 +54,7 @@ class UnsolvableLoad:
     work : float [N]
         Work of the load on this motion, less what friction takes up; positive.
     who, where : str
-        What it moves, and what that touches, in words.
+        The body that moves, and the one that it touches, in words for messages.
     """
 
     motion: FloatArray
@@ -88,20 +86,25 @@ class UnsolvableLoad:
 def find_unsolvable_load(problem: ContactProblem) -> UnsolvableLoad | None:
     """Return a rigid motion on which the load cannot be balanced, or None if contact tractions may balance it.
 
+    Raises
+    ------
+    LawError
+        If the friction law fails.
+
     Notes
     -----
     A motion v escapes if it nowhere presses into the obstacle harder than friction can wedge, ``v_n + s |v_t| <= 0``,
     and the load does more work on it than friction present without pressure takes up, ``L(v) > sum w c |v_t|``. By
     linear duality no escape exists exactly if tractions with ``sigma_n <= 0`` and ``|sigma_t| <= c + s |sigma_n|``
     balance the load. c and s envelop the law from above, and a cap is tried as a second pair (c = cap, s = 0), so the
-    test never condemns a load that can be held; what it misses the driver's status still reports.
+    test never refuses a load that can be held. A load that it misses is left to the status of the driver.
     """
     motions = as_rows(problem.body.rigid_motions())
     if not motions.shape[0]:
         return None
     unit = largest_components(motions)
     load, force_scale = _rigid_load(problem, unit)
-    motions = motions / unit[:, None] if isinstance(motions, np.ndarray) else (motions.T / unit).T.tocsr()
+    motions = _scaled(motions, unit)
     if force_scale == 0.0:
         return None
     touches = np.isfinite(problem.gap)
@@ -124,21 +127,26 @@ def find_unsolvable_load(problem: ContactProblem) -> UnsolvableLoad | None:
     return best
 
 
+def _scaled(motions: RigidMotions, unit: FloatArray) -> RigidMotions:
+    """Return motions (a row each) divided by their sizes (n_motions,)."""
+    return motions / unit[:, None] if isinstance(motions, np.ndarray) else (motions.T / unit).T.tocsr()
+
+
 def _presses(motion: FloatArray, load: FloatArray, touches: BoolArray) -> bool:
     """Whether the only motion (1, 2 n_contact) presses into the obstacle where it follows the load (1,)."""
     return bool(np.any(np.sign(load) * motion[0, 0::2][touches] > _PRESSES))
 
 
 def needs_contact(problem: ContactProblem) -> bool:
-    """Whether the load plainly moves the body away if nothing touches it: far more than round-off could.
+    """Whether the load does work on a rigid motion, far more than round-off could: then the body needs contact.
 
-    That takes no further response; False does not say that the load is balanced.
+    No response is computed for it. False does not say that the load is balanced.
     """
     motions = as_rows(problem.body.rigid_motions())
     if not motions.shape[0]:
         return False
     load, force_scale = _rigid_load(problem, largest_components(motions))
-    # of which forces may be round-off
+    # forces of a body strained by as much as it moves
     carried = problem.modulus * float(np.abs(problem.sticking_state.displacement).max())
     return bool(np.abs(load).max() > _PLAIN * max(force_scale, _PLAIN * carried))
 
@@ -151,7 +159,7 @@ def _rigid_load(problem: ContactProblem, unit: FloatArray) -> tuple[FloatArray, 
 
 
 def find_long_travel(problem: ContactProblem) -> float | None:
-    """Return how far the load carries the body before any obstacle can hold it, if that hides how the body deforms.
+    """Return how far the load moves the body before an obstacle can hold it, if that is too far to tell deformation.
 
     Parameters
     ----------
@@ -161,8 +169,8 @@ def find_long_travel(problem: ContactProblem) -> float | None:
     Returns
     -------
     float or None
-        Smallest gap that must close, in displacements that the load of the tied body causes at one node; None if it
-        is small enough for displacements to hold both the travel and the deformation.
+        Smallest gap that must close, relative to the displacement that the tractions of the sticking state cause at one
+        node; None if displacements hold enough digits for both the travel and the deformation.
     """
     deformation = float(np.abs(problem.sticking_state.traction).max()) / problem.body.stiffness_scale
     is_far = problem.gap > _FARTHEST * deformation
@@ -188,17 +196,17 @@ def friction_envelopes(problem: ContactProblem) -> list[tuple[FloatArray, FloatA
 def _largest_escape(motions: RigidMotions, load: FloatArray, resistance: FloatArray, slope: FloatArray) -> FloatArray:
     """Return (n_motions,) coefficients of the escape on which the load does most work, zeros if none.
 
-    Their absolute values add up to one at most, which favours escapes along a single motion: among several, the
-    simplest to name. `slope` is nan at nodes that never touch.
+    Their absolute values add up to one at most, which favours escapes along a single motion: those are the simplest to
+    name. `slope` is nan at nodes that never touch.
 
     Notes
     -----
-    In its static form: of all contact forces that friction allows, those are sought that leave the least rest of the
-    load, ``r = M p + load`` with the motions M. The multipliers of these equations are the escape: with the largest
-    rest as the measure their absolute values add up to one; of many motions the sum of all rests is the measure, so
-    that none of the multipliers exceeds one. Forces are sums of the two on the edges of the cone of friction and of
-    what friction holds without pressure, so that all conditions are bounds, and M stays sparse. Where two bodies meet
-    the outermost nodes can nearly always do what those between them could: these join if they meet the escape.
+    The dual problem is solved: of all contact forces p that friction allows, find those with the smallest residual
+    ``r = M p + load``, M the work of unit forces on the motions. The multipliers of these equations are the escape. The
+    size of r is its largest component, so that absolute values of the multipliers add up to one; of many motions it is
+    the sum of all components, so that no multiplier exceeds one. Forces are sums of those on both edges of the cone of
+    friction and of tangential ones that need no pressure. So all conditions on p are bounds, and M is sparse. Where two
+    bodies meet, the outermost nodes nearly always suffice; a node between them joins if the escape presses it.
     """
     touches = np.isfinite(slope)
     if motions.shape[0] == 1 and isinstance(motions, np.ndarray):
@@ -329,7 +337,7 @@ def largest_factor(problem: ContactProblem, growing: FloatArray) -> float | None
     if not motions.shape[0]:
         return np.inf
     unit = largest_components(motions)
-    motions = motions / unit[:, None] if isinstance(motions, np.ndarray) else (motions.T / unit).T.tocsr()
+    motions = _scaled(motions, unit)
     constant, growing = problem.body.rigid_load() / unit, growing / unit
     size = float(np.abs(growing).max())
     if size == 0.0:

@@ -41,8 +41,8 @@ class SplineObstacle:
 
     Notes
     -----
-    A cubic spline with continuous curvature, by the length of chords; a curve of bounded fourth derivative is met to
-    the fourth power of the distance of its points.
+    A cubic spline with continuous curvature, parametrised by the length of chords. A curve of bounded fourth derivative
+    is approximated to the fourth power of the distance of its points.
     """
 
     points: tuple[tuple[float, float], ...]
@@ -66,7 +66,7 @@ class SplineObstacle:
         return -self._nearest(points)[1]
 
     def curve(self, n_samples: int = _SAMPLES) -> FloatArray:
-        """Return points (n, 2) [m] of the curve, so many for each span."""
+        """Return points (n, 2) [m] of the curve, `n_samples` on each span and the end."""
         return np.asarray(self._spline(self._samples(n_samples)))
 
     @cached_property
@@ -90,21 +90,21 @@ class SplineObstacle:
 
         spline, samples = self._spline, self._samples(_SAMPLES)
         slope = spline.derivative()
-        first = KDTree(spline(samples)).query(points)[1]
-        last = len(samples) - 1
+        nearest_sample = KDTree(spline(samples)).query(points)[1]
+        s, last = samples[nearest_sample], len(samples) - 1
         if self.is_closed:  # a periodic spline may be asked beyond its ends
             step = np.diff(samples)
-            low, high = samples[first] - step[first - 1], samples[first] + step[first % last]
+            low, high = s - step[nearest_sample - 1], s + step[nearest_sample % last]
         else:
-            low, high = samples[np.maximum(first - 1, 0)], samples[np.minimum(first + 1, last)]
-        s = samples[first]
+            low, high = samples[np.maximum(nearest_sample - 1, 0)], samples[np.minimum(nearest_sample + 1, last)]
         for _ in range(_MOST_STEPS):
-            away, along = spline(s) - points, slope(s)
-            rise = np.sum(away * along, axis=1)  # half the derivative of the squared distance
-            low, high = np.where(rise < 0.0, s, low), np.where(rise > 0.0, s, high)
-            bend = np.sum(along**2, axis=1) + np.sum(away * slope(s, 1), axis=1)
-            following = s - rise / np.where(bend > 0.0, bend, np.inf)
-            is_inside = (following >= low) & (following <= high) & (bend > 0.0)
+            # Newton's method, with bisection outside the bracket, on half the derivative of the squared distance
+            offset, along = spline(s) - points, slope(s)
+            first = np.sum(offset * along, axis=1)
+            low, high = np.where(first < 0.0, s, low), np.where(first > 0.0, s, high)
+            second = np.sum(along**2, axis=1) + np.sum(offset * slope(s, 1), axis=1)
+            following = s - first / np.where(second > 0.0, second, np.inf)
+            is_inside = (following >= low) & (following <= high) & (second > 0.0)
             following = np.where(is_inside, following, 0.5 * (low + high))
             if np.array_equal(following, s):
                 break

@@ -1,8 +1,8 @@
 """Functions of a space element by element, also where the degrees of elements differ.
 
-On every element a function is written by its values at `BoundarySpace.local_nodes`, in the basis of the space. Where an
-element has a lower degree p than others these values follow from its own p + 1 dofs, and integrals against the basis
-are summed up to those of its own.
+On every element a function is written in the basis of the space, by its values at `BoundarySpace.local_nodes`. On an
+element of lower degree p these values follow from its p + 1 dofs, and integrals against the basis of the space are
+combined to those against its own p + 1 basis functions.
 """
 
 from __future__ import annotations
@@ -18,14 +18,20 @@ from bemkit.geometry.spaces import BoundarySpace, LagrangeSpace
 
 def element_degrees(space: BoundarySpace) -> IntArray:
     """Return the polynomial degree (n_elements,) of each element."""
-    own = space.element_degrees if isinstance(space, LagrangeSpace) else None
-    return np.full(space.mesh.n_elements, space.degree) if own is None else own
+    if isinstance(space, LagrangeSpace) and space.element_degrees is not None:
+        return space.element_degrees
+    return np.full(space.mesh.n_elements, space.degree)
 
 
 def values_on_elements(space: BoundarySpace, dofs: FloatArray, elements: IntArray | None = None) -> FloatArray:
-    """Return the values (m, n_local, ...) at the local nodes of some elements, of all unless given.
+    """Return the values (m, n_local, ...) of a function at the local nodes of some elements; by default of all.
 
-    Those of the function with the values (n_scalar, ...) at the dofs.
+    Parameters
+    ----------
+    space : BoundarySpace
+    dofs : (n_scalar, ...) array
+        Values of the function at the dofs.
+    elements : (m,) int array, optional
     """
     chosen = slice(None) if elements is None else elements
     return from_own_nodes(space, dofs[space.element_dofs[chosen]], elements)
@@ -40,7 +46,7 @@ def from_own_nodes(space: BoundarySpace, at_dofs: FloatArray, elements: IntArray
 
 
 def summed_at_dofs(space: BoundarySpace, integrals: FloatArray, elements: IntArray) -> FloatArray:
-    """Sum up integrals (m, n_local, ...) against the local basis of elements to those (n_scalar, ...) of the dofs."""
+    """Return integrals (n_scalar, ...) against the global basis from those (m, n_local, ...) against the local one."""
     lifting = _lifting(space)
     if lifting is not None:
         integrals = np.einsum("elk,el...->ek...", lifting[elements], integrals)
@@ -74,17 +80,17 @@ def dof_weights(space: BoundarySpace, elements: IntArray) -> FloatArray:
 def of_one_degree(
     spaces: Sequence[BoundarySpace], elements: IntArray
 ) -> Iterator[tuple[IntArray, tuple[BoundarySpace, ...]]]:
-    """Yield those of some elements that have one degree in each of several spaces, and the spaces as they see them."""
+    """Yield elements grouped by their degrees in several spaces, each with the spaces restricted to these degrees."""
     if not any(isinstance(space, LagrangeSpace) and space.element_degrees is not None for space in spaces):
         yield elements, tuple(spaces)
         return
     kinds, group = np.unique([element_degrees(space)[elements] for space in spaces], axis=1, return_inverse=True)
     for number, degrees in enumerate(kinds.T.tolist()):
-        seen = zip(spaces, degrees, strict=True)
-        yield elements[group.ravel() == number], tuple(_as_seen(space, degree) for space, degree in seen)
+        pairs = zip(spaces, degrees, strict=True)
+        yield elements[group.ravel() == number], tuple(_with_degree(space, degree) for space, degree in pairs)
 
 
-def _as_seen(space: BoundarySpace, degree: int) -> BoundarySpace:
+def _with_degree(space: BoundarySpace, degree: int) -> BoundarySpace:
     if isinstance(space, LagrangeSpace) and space.element_degrees is not None:
         return space.of_degree(degree)
     return space

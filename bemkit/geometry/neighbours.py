@@ -55,9 +55,17 @@ def break_nodes(mesh: BoundaryMesh) -> BoolArray:
 
 
 def corner_nodes(mesh: BoundaryMesh, angle: float = 1e-6) -> BoolArray:
-    """Return the (n_nodes,) mask of nodes where the tangent turns by more than `angle` [rad].
+    """Return which nodes are corners.
 
-    The direction of a short element is known only as well as its coordinates are; that round-off is added to `angle`.
+    Parameters
+    ----------
+    mesh : BoundaryMesh
+    angle : float [rad]
+        Turn of the tangent above which a node is a corner. The round-off of the direction of short elements is added.
+
+    Returns
+    -------
+    (n_nodes,) bool array
     """
     if mesh.symmetry is not None:
         return corner_nodes(mesh.whole, angle)[: mesh.n_nodes]

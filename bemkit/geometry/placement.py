@@ -1,4 +1,4 @@
-"""Where a body stands: turned about the origin of its own coordinates, then shifted."""
+"""Placements of bodies: a rotation about the origin of the shape's coordinates, then a shift."""
 
 from __future__ import annotations
 
@@ -40,8 +40,8 @@ class Placement:
     @property
     def rotation(self) -> FloatArray:
         """(2, 2) array: R, exact for multiples of 90 degrees."""
-        quarters, rest = divmod(self.turn, 90.0)
-        angle = math.radians(rest)
+        quarters, remainder = divmod(self.turn, 90.0)
+        angle = math.radians(remainder)
         cosine, sine = math.cos(angle), math.sin(angle)
         for _ in range(int(quarters) % 4):
             cosine, sine = -sine, cosine
@@ -49,32 +49,32 @@ class Placement:
 
     @property
     def is_shift(self) -> bool:
-        """Whether nothing turns."""
+        """Whether the rotation is zero."""
         return self.turn % 360.0 == 0.0
 
     def forward(self, points: FloatArray) -> FloatArray:
-        """Move points (..., 2) [m]."""
+        """Return points (..., 2) [m] of the shape in the coordinates of the scene."""
         return np.asarray(self.turned(points) + np.array(self.shift))
 
     def back(self, points: FloatArray) -> FloatArray:
-        """Move points (..., 2) [m] back into the coordinates of the shape."""
+        """Return points (..., 2) [m] of the scene in the coordinates of the shape."""
         return self.turned_back(np.asarray(points - np.array(self.shift)))
 
     def turned(self, vectors: FloatArray) -> FloatArray:
-        """Turn vectors (..., 2)."""
+        """Return vectors (..., 2) of the shape in the axes of the scene."""
         return vectors if self.is_shift else np.asarray(vectors @ self.rotation.T)
 
     def turned_back(self, vectors: FloatArray) -> FloatArray:
-        """Turn vectors (..., 2) back into the coordinates of the shape."""
+        """Return vectors (..., 2) of the scene in the axes of the shape."""
         return vectors if self.is_shift else np.asarray(vectors @ self.rotation)
 
     def after(self, first: Placement) -> Placement:
-        """Return the motion that comes of another one and then this one."""
+        """Return the motion `first`, followed by this one."""
         x, y = self.forward(np.array(first.shift)).tolist()
         return Placement((x, y), self.turn + first.turn)
 
     def mesh(self, mesh: BoundaryMesh) -> BoundaryMesh:
-        """Return the mesh of the body in its place; what was found valid is not checked again.
+        """Return the mesh of the placed body, without checking it again.
 
         Parameters
         ----------
@@ -109,5 +109,5 @@ class PlacedCurve:
 
     @property
     def magnitude(self) -> float:
-        """Largest length that its evaluation meets [m]; see `bemkit.geometry.curves.magnitude`."""
+        """Largest coordinate in its evaluation [m]; see `bemkit.geometry.curves.magnitude`."""
         return magnitude(self.curve) + float(np.abs(self.placement.shift).max())

@@ -275,7 +275,7 @@ class ExteriorOf(CheckedShape):
 class HalfPlaneBody(CheckedShape):
     """The elastic half-plane y < 0; its only side, surface, is the strip of y = 0 that may carry tractions.
 
-    The rest of its surface is free. The shorter the strip, the more of the elements lie where something happens.
+    The rest of its surface is free of traction. A strip that is no longer than needed makes the best use of elements.
 
     Parameters
     ----------
@@ -284,8 +284,8 @@ class HalfPlaneBody(CheckedShape):
 
     Notes
     -----
-    In the plane a force displaces the surface like the logarithm of the distance, without a limit. What is at rest here
-    is the surface at the distance ``right - left`` from a force: any other place differs by a rigid motion.
+    A force displaces the surface by the logarithm of the distance, which has no limit far away. Here the surface is at
+    rest at the distance ``right - left`` from the force; any other choice differs by a rigid motion.
     """
 
     left: float
@@ -304,7 +304,7 @@ class HalfPlaneBody(CheckedShape):
 
 @dataclass(frozen=True)
 class PeriodicHalfPlaneBody(CheckedShape):
-    """The elastic half-plane y < 0 under what repeats with a period; its only side, surface, is one period of y = 0.
+    """The elastic half-plane y < 0 under periodic tractions; its only side, surface, is one period of y = 0.
 
     Parameters
     ----------
@@ -314,8 +314,8 @@ class PeriodicHalfPlaneBody(CheckedShape):
 
     Notes
     -----
-    Under a resultant force the body gives way without a limit. What is at rest here is the mean of the surface less
-    ``period T / (pi E')``, T the mean traction, as if that were a wave as long as the period.
+    A resultant force displaces the surface without limit relative to points far below. Displacements are such that a
+    mean traction T moves the surface by ``period T / (pi E')`` in the mean, as a wave as long as the period would.
     """
 
     period: float

@@ -86,7 +86,7 @@ def dof_points(space: BoundarySpace, mesh: BoundaryMesh | None = None) -> FloatA
     ----------
     space : BoundarySpace
     mesh : BoundaryMesh, optional
-        The same mesh in other units, to find the points there to the last digit; that of the space if left out.
+        The same mesh in other units, for points that are exact to the last digit there; by default that of the space.
 
     Returns
     -------
@@ -140,7 +140,7 @@ class ConstantSpace:
 
 @dataclass(frozen=True, eq=False)
 class ElementwiseSpace:
-    """The functions of another space with dofs of their own on each element, so that all of them may jump."""
+    """The functions of another space with separate dofs on each element, so that they may jump at all nodes."""
 
     space: BoundarySpace
 
@@ -171,7 +171,7 @@ class ElementwiseSpace:
 
     @property
     def local_nodes(self) -> FloatArray:
-        """Those of the other space."""
+        """(n_local,) array: as of the other space."""
         return self.space.local_nodes
 
     def basis(self, xi: FloatArray) -> FloatArray:
@@ -200,9 +200,9 @@ class LagrangeSpace:
 
     Notes
     -----
-    Where degrees differ, `local_nodes` and `basis` are those of the largest one, in which any element can be written
-    (see `bemkit.geometry.local_values`), and the rows of `element_dofs` repeat the dof at the end of an element that
-    has fewer.
+    Where degrees differ, `local_nodes` and `basis` are those of the largest degree, which contains the functions of all
+    elements (see `bemkit.geometry.local_values`). Rows of `element_dofs` of lower degree are filled up with the dof at
+    the end of the element.
     """
 
     mesh: BoundaryMesh
@@ -254,15 +254,15 @@ class LagrangeSpace:
 
     @cached_property
     def _end_dofs(self) -> IntArray:
-        """Dofs of the start and the end of each element; the element that ends at a broken node has one of its own."""
+        """(n_elements, 2): dofs of start and end; at a broken node the element that ends there has a second dof."""
         dofs = self.mesh.elements.copy()
         if self.broken is not None:
-            # on a symmetry line there is no second element
+            # a node on a symmetry line has one element only
             is_shared = self.broken & ~self.mesh.on_symmetry_lines.any(axis=1)
-            own = np.full(self.mesh.n_nodes, -1)
-            own[is_shared] = self.mesh.n_nodes + np.arange(int(is_shared.sum()))
+            second_dof = np.full(self.mesh.n_nodes, -1)
+            second_dof[is_shared] = self.mesh.n_nodes + np.arange(int(is_shared.sum()))
             end = self.mesh.elements[:, 1]
-            dofs[:, 1] = np.where(is_shared[end], own[end], end)
+            dofs[:, 1] = np.where(is_shared[end], second_dof[end], end)
         return dofs
 
     def basis(self, xi: FloatArray) -> FloatArray:
@@ -278,35 +278,35 @@ class LagrangeSpace:
         for degree in np.unique(self.element_degrees).tolist():
             columns = np.array([*range(degree), self.degree])
             values = lagrange_polynomials(gauss_lobatto(degree), self.local_nodes)
-            own = np.flatnonzero(self.element_degrees == degree)
-            matrices[own[:, None], :, columns] = values[None]
+            elements = np.flatnonzero(self.element_degrees == degree)
+            matrices[elements[:, None], :, columns] = values[None]
         return matrices
 
     def of_degree(self, degree: int) -> _OneDegree:
-        """Return the space as its elements of one degree see it."""
+        """Return the space with the basis and the dofs of its elements of one degree."""
         return _OneDegree(self, degree)
 
 
 @dataclass(frozen=True, eq=False)
 class _OneDegree:
-    """A space whose elements have several degrees, as those of one degree see it; only their rows mean something."""
+    """A space of several degrees with the local basis of one of them; rows of other elements are meaningless."""
 
     space: LagrangeSpace
     degree: int
 
     @property
     def mesh(self) -> BoundaryMesh:
-        """That of the space."""
+        """The mesh of the whole space."""
         return self.space.mesh
 
     @property
     def broken(self) -> BoolArray | None:
-        """Those of the space."""
+        """As of the whole space."""
         return self.space.broken
 
     @property
     def is_continuous(self) -> bool:
-        """As the space."""
+        """As of the whole space."""
         return self.space.is_continuous
 
     @property
@@ -331,9 +331,9 @@ class _OneDegree:
 
 def lagrange_polynomials(nodes: FloatArray, xi: FloatArray) -> FloatArray:
     """Return the (n_nodes, n_points) values of the polynomials that are 1 at one of the nodes and 0 at the others."""
-    apart = nodes[:, None] - nodes
-    np.fill_diagonal(apart, 1.0)
-    factors = (xi - nodes[:, None]) / apart[:, :, None]
+    distances = nodes[:, None] - nodes
+    np.fill_diagonal(distances, 1.0)
+    factors = (xi - nodes[:, None]) / distances[:, :, None]
     factors[np.diag_indices(nodes.size)] = 1.0
     return np.asarray(factors.prod(axis=1))
 
@@ -353,7 +353,7 @@ class QuadraticSpace(LagrangeSpace):
 
 
 def check_degree(degree: int) -> None:
-    """Refuse a degree that no space has."""
+    """Raise GeometryError unless a degree is a whole number from 1 to `LARGEST_DEGREE`."""
     if isinstance(degree, bool) or not isinstance(degree, int) or not 1 <= degree <= LARGEST_DEGREE:
         raise GeometryError(f"degree is {degree!r}: give a whole number from 1 to {LARGEST_DEGREE}")
 

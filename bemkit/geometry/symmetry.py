@@ -68,7 +68,7 @@ class Symmetry:
 
     @property
     def n_images(self) -> int:
-        """2 or 4, the body itself counted."""
+        """Number of images, the body itself included: 2 or 4."""
         return len(self.images)
 
     @property
@@ -82,29 +82,29 @@ class Symmetry:
         return np.where(image < 0.0, 2.0 * self._places - points, points)
 
     def meets(self, points: FloatArray) -> BoolArray:
-        """Tell which points (n, 2) lie on the lines x = a and y = b, (n, 2), as far as their digits tell."""
+        """Return (n, 2) bool: which points (n, 2) lie on the lines x = a and y = b, to the round-off of coordinates."""
         with np.errstate(invalid="ignore"):
             on_line = np.abs(points - self._places) <= _ON_LINE * np.abs(points).max()
         return np.asarray(on_line)
 
     @property
     def lines(self) -> tuple["Symmetry", ...]:
-        """Each line alone."""
+        """The lines one by one, each as a `Symmetry`."""
         x, y = self.x, self.y
         return (*([] if x is None else [Symmetry(x=x)]), *([] if y is None else [Symmetry(y=y)]))
 
     def is_beyond_at(self, x: FloatArray, y: FloatArray) -> BoolArray:
-        """Tell the same as `is_beyond` of coordinates (n,)."""
+        """As `is_beyond`, for coordinates (n,)."""
         return self.is_beyond(np.stack([x, y], axis=-1))
 
     def is_beyond(self, points: FloatArray) -> BoolArray:
-        """Tell which points (n, 2) lie on the other side of a line, where only images are: x > a or y > b."""
+        """Return (n,) bool: which points (n, 2) lie on the side of images, x > a or y > b."""
         with np.errstate(invalid="ignore"):
             beyond = (points > self._places).any(axis=-1)
         return np.asarray(beyond)
 
     def snapped(self, points: FloatArray) -> FloatArray:
-        """Return points with those that lie on a line put there to the last digit."""
+        """Return points (n, 2), those on a line moved there to the last digit."""
         return np.where(self.meets(points), self._places, points)
 
     def transformed(self, shift: tuple[float, float], factor: float) -> "Symmetry":
@@ -168,7 +168,8 @@ def unfold(symmetry: Symmetry, half: Elements) -> Elements:
     n_elements, n_curves = len(half.elements), len(half.curves)
     number, nodes = _unfolded_nodes(symmetry, half.nodes)
     elements = [
-        own[half.elements][:, :: -1 if is_reversing(image) else 1] for own, image in zip(number, images, strict=True)
+        nodes_of_image[half.elements][:, :: -1 if is_reversing(image) else 1]
+        for nodes_of_image, image in zip(number, images, strict=True)
     ]
     parts = {
         name: np.concatenate([members + g * n_elements for g in range(len(images))])
@@ -190,8 +191,8 @@ def _unfolded_nodes(symmetry: Symmetry, nodes: FloatArray) -> tuple[IntArray, Fl
     """Return the number (n_images, n_nodes) of each image of each node, and all nodes; those on a line are shared."""
     on_line = symmetry.meets(nodes)
     number = np.empty((symmetry.n_images, len(nodes)), dtype=np.intp)
-    found: list[FloatArray] = []
-    n_found = 0
+    new_nodes: list[FloatArray] = []
+    n_nodes = 0
     images = symmetry.images
     for g, image in enumerate(images):
         is_new = np.ones(len(nodes), dtype=bool)
@@ -200,7 +201,7 @@ def _unfolded_nodes(symmetry: Symmetry, nodes: FloatArray) -> tuple[IntArray, Fl
             other = int(np.flatnonzero((images == np.where(np.arange(2) == component, 1.0, image)).all(axis=1))[0])
             number[g] = np.where(is_new & on_line[:, component], number[other], number[g])
             is_new &= ~on_line[:, component]
-        number[g, is_new] = n_found + np.arange(int(is_new.sum()))
-        found.append(symmetry.reflected(nodes[is_new], image))
-        n_found += int(is_new.sum())
-    return number, np.concatenate(found)
+        number[g, is_new] = n_nodes + np.arange(int(is_new.sum()))
+        new_nodes.append(symmetry.reflected(nodes[is_new], image))
+        n_nodes += int(is_new.sum())
+    return number, np.concatenate(new_nodes)

@@ -1,4 +1,4 @@
-"""The nodes on the contact parts of a scene: which obstacle each may touch, how far away and in which direction."""
+"""The nodes on the contact parts of a scene: the obstacle of each, its gap and the direction of contact."""
 
 from __future__ import annotations
 
@@ -18,14 +18,15 @@ from bemkit.scene.conditions import Contact
 from bemkit.scene.scene import Scene
 
 SMOOTH_SIDE_COSINE = 0.866
-"""Cosine of 30 degrees: directions of contact at one node that differ by less belong to one smooth side."""
+"""Cosine of 30 degrees. Directions of contact at one node that differ by less belong to one smooth side."""
 GAP_TOLERANCE = 1e-9
-"""Difference of two gaps at one node, relative to the size of the body, that does not make one obstacle nearer."""
+"""Difference of the gaps of two obstacles at one node, relative to the diameter of the body, up to which both are
+equally near."""
 
 
 @dataclass(frozen=True, eq=False)
 class ContactData:
-    """What a scene says of each node that may touch an obstacle, in order along each contact part.
+    """The contact nodes of a scene with their parts, gaps and places, in order along each contact part.
 
     Parameters
     ----------
@@ -53,21 +54,22 @@ class ContactData:
 
     def of(self, nodes: ContactNodes) -> ContactData:
         """Return the rows of some of the nodes, in the order they have here."""
-        own, others = (2 * each.nodes + each.is_second for each in (self.nodes, nodes))
-        rows = np.isin(own, others)
+        # a node in a corner between two obstacles has two rows, and two numbers here
+        numbers, kept_numbers = (2 * some.nodes + some.is_second for some in (self.nodes, nodes))
+        rows = np.isin(numbers, kept_numbers)
         parts = tuple(part for part, is_kept in zip(self.parts, rows.tolist(), strict=True) if is_kept)
         columns = (column[rows] for column in (self.arc_length, self.gap, self.facing, self.points))
         return ContactData(self.nodes.take(rows), parts, *columns)
 
     def has_same_directions(self, other: ContactData) -> bool:
         """Whether the same nodes touch in the same directions."""
-        own, others = self.nodes, other.nodes
-        return np.array_equal(own.nodes, others.nodes) and np.allclose(own.frame, others.frame, rtol=0.0, atol=1e-12)
+        ours, theirs = self.nodes, other.nodes
+        return np.array_equal(ours.nodes, theirs.nodes) and np.allclose(ours.frame, theirs.frame, rtol=0.0, atol=1e-12)
 
 
 @dataclass(frozen=True)
 class FacingPart:
-    """A part of the boundary and an obstacle that it may touch; a part that may touch several is listed with each.
+    """A part of the boundary and an obstacle that it may touch. A part with several obstacles is listed with each.
 
     Parameters
     ----------
@@ -97,7 +99,7 @@ def find_contact(
     space : BoundarySpace
         The displacement space, on the dimensionless mesh.
     further : sequence of FacingPart, optional
-        Obstacles that the scene does not know of.
+        Obstacles that are not in the scene, such as other bodies.
 
     Notes
     -----
@@ -123,8 +125,8 @@ def find_contact(
     owner = _owners(sides, space.n_dofs // 2, GAP_TOLERANCE * mesh.diameter)
     directions = np.zeros((owner.size, 2))
     for number, side in enumerate(sides):
-        own = owner[side.nodes] == number
-        directions[side.nodes[own]] = side.directions[own]
+        is_owned = owner[side.nodes] == number
+        directions[side.nodes[is_owned]] = side.directions[is_owned]
     is_smooth = np.array([one.is_frictionless for one in parts])
     seconds = [
         is_smooth[number] & is_smooth[owner[side.nodes]] & side.crosses(directions) & (owner[side.nodes] != number)
@@ -189,15 +191,15 @@ class _Side:
 
 
 def _nearest_of_each_part(parts: Sequence[FacingPart], sides: Sequence[_Side]) -> tuple[list[FacingPart], list[_Side]]:
-    """Leave each node of a part that may touch several obstacles to the nearest of them."""
-    found = []
+    """Keep of each node of a part with several obstacles only the row of the nearest."""
+    kept = []
     for one, side in zip(parts, sides, strict=True):
         rivals = [number for number, other in enumerate(parts) if other.part == one.part]
         nearest = np.argmin([sides[number].gap for number in rivals], axis=0)
-        own = side.take(np.array([parts[rivals[k]] is one for k in nearest.tolist()]))
-        if own.nodes.size:
-            found.append((one, own))
-    return [one for one, _ in found], [side for _, side in found]
+        owned = side.take(np.array([parts[rivals[k]] is one for k in nearest.tolist()]))
+        if owned.nodes.size:
+            kept.append((one, owned))
+    return [one for one, _ in kept], [side for _, side in kept]
 
 
 def _owners(sides: Sequence[_Side], n_nodes: int, same: float) -> IntArray:
@@ -215,5 +217,5 @@ def _joined(parts: Sequence[FacingPart], sides: Sequence[_Side], space: Boundary
     nodes, directions, weights, arc_length, gap, facing, points = columns
     of_node = [part for part, side in zip(parts, sides, strict=True) for _ in range(side.nodes.size)]
     is_frictionless = np.array([part.is_frictionless for part in of_node], bool)
-    found = ContactNodes(nodes, dof_points(space)[nodes], contact_frame(directions), weights, is_frictionless)
-    return ContactData(found, tuple(part.name for part in of_node), arc_length, gap, facing, points)
+    contact_nodes = ContactNodes(nodes, dof_points(space)[nodes], contact_frame(directions), weights, is_frictionless)
+    return ContactData(contact_nodes, tuple(part.name for part in of_node), arc_length, gap, facing, points)

@@ -44,12 +44,13 @@ if TYPE_CHECKING:
 
 _MORE_POINTS = 4
 """Gauss points of an element at which given loads are evaluated, beyond the degree of the tractions."""
+
 ContactBody: TypeAlias = "CondensedBody | HierarchicalBody | PeriodicBody | UntouchedBody"
 
 
 @dataclass(frozen=True, eq=False)
 class Model:
-    """A scene made ready to solve.
+    """A prepared scene with its elastic map, its condensed body and its contact problem.
 
     Parameters
     ----------
@@ -89,7 +90,7 @@ class Model:
 
     @property
     def contact(self) -> ContactData:
-        """What the scene says of the contact nodes of the body."""
+        """The contact nodes with their parts, gaps and places."""
         return self.prepared.contact
 
     @property
@@ -100,26 +101,26 @@ class Model:
     def under(self, prepared: Prepared) -> Model:
         """Return the same body under the loads, obstacles and law of another scene; nothing is factored again.
 
-        Only a law with friction where this model's has none, other directions of contact, or another drive of a
-        half-plane make it condense the body anew.
+        The body is condensed again only if the law has friction where it had none, if directions of contact change, or
+        if the drive of a half-plane does.
 
         Parameters
         ----------
         prepared : Prepared
             From `Prepared.under` of this model's.
         """
-        stays = prepared.candidates.of(self.nodes)
-        is_new_friction = self.nodes.is_frictionless & ~stays.nodes.is_frictionless
+        contact = prepared.candidates.of(self.nodes)
+        is_new_friction = self.nodes.is_frictionless & ~contact.nodes.is_frictionless
         elastic = self.elastic
         if isinstance(elastic, HeavyElasticity) and prepared.inside is not None:
             elastic = replace(elastic, inside=prepared.inside)
         is_driven_alike = prepared.drive == self.prepared.drive
         if not is_driven_alike:
             elastic = _driven_by(elastic, prepared.drive)
-        if is_driven_alike and stays.has_same_directions(self.contact) and not is_new_friction.any():
+        if is_driven_alike and contact.has_same_directions(self.contact) and not is_new_friction.any():
             body = self.body.under(prepared.conditions.displacement, prepared.force, prepared.inside)
-            # a node that has lost its friction stays what it is in the condensed body
-            prepared = replace(prepared, conditions=body.conditions, contact=replace(stays, nodes=self.nodes))
+            # the condensed body keeps the tangent of a node that has lost its friction
+            prepared = replace(prepared, conditions=body.conditions, contact=replace(contact, nodes=self.nodes))
         else:
             body = contact_body(elastic, prepared)
         return Model(prepared, elastic, body, _problem(prepared, body))
@@ -178,7 +179,7 @@ class Model:
 
     @property
     def work(self) -> OperationCounts:
-        """What it took to come here, from the operators on."""
+        """Operations counted so far: integrals, factorisations and solves."""
         return self.body.work
 
     @property
@@ -226,17 +227,17 @@ class Model:
         In a corner that is the row of the part's own obstacle. Where the node there belongs to another part alone, the
         next node stands for it.
         """
-        own, directions = np.equal(self.contact.parts, part), self.nodes.directions
-        row = np.full(self.prepared.space.n_dofs // 2, -1)
-        for rows in (np.flatnonzero(~own), np.flatnonzero(own)):
-            row[self.nodes.nodes[rows]] = rows
-        found = row[self.prepared.space.element_dofs[elements]]
-        everywhere, last = np.arange(elements.size), element_degrees(self.prepared.space)[elements] - 1
-        for end, following in ((0, 1), (-1, last)) if self.prepared.space.degree else ():
-            there, beside = found[:, end], found[everywhere, following]
-            turns = np.sum(directions[there] * directions[beside], axis=1) <= SMOOTH_SIDE_COSINE
-            found[:, end] = np.where((there >= 0) & ~own[there] & turns, beside, there)
-        return found
+        is_of_part, directions = np.equal(self.contact.parts, part), self.nodes.directions
+        row_of_dof = np.full(self.prepared.space.n_dofs // 2, -1)
+        for rows in (np.flatnonzero(~is_of_part), np.flatnonzero(is_of_part)):  # rows of the part come last, and win
+            row_of_dof[self.nodes.nodes[rows]] = rows
+        result = row_of_dof[self.prepared.space.element_dofs[elements]]
+        all_elements, last = np.arange(elements.size), element_degrees(self.prepared.space)[elements] - 1
+        for end, next_node in ((0, 1), (-1, last)) if self.prepared.space.degree else ():
+            at_end, beside = result[:, end], result[all_elements, next_node]
+            turns = np.sum(directions[at_end] * directions[beside], axis=1) <= SMOOTH_SIDE_COSINE
+            result[:, end] = np.where((at_end >= 0) & ~is_of_part[at_end] & turns, beside, at_end)
+        return result
 
 
 def map_fields(elastic: SteklovPoincare, displacement: FloatArray, force: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -289,15 +290,15 @@ def contact_body(elastic: SteklovPoincare, prepared: Prepared) -> ContactBody:
         assert isinstance(elastic, PeriodicElasticity)
         return PeriodicBody(elastic, prepared.conditions, prepared.contact.nodes, prepared.force)
     if prepared.scene.contact_parts:
-        given = prepared.conditions, prepared.contact.nodes, prepared.force
+        data = prepared.conditions, prepared.contact.nodes, prepared.force
         if prepared.linear_solver.hierarchical is not None and not prepared.is_condensed:
             from bemkit.contact.condensation.hierarchical_body import hierarchical_body
             from bemkit.operators.steklov_poincare.hierarchical import HierarchicalMap
 
             weightless = elastic.weightless if isinstance(elastic, HeavyElasticity) else elastic
             assert isinstance(weightless, HierarchicalMap)
-            return hierarchical_body(weightless, *given, prepared.inside)
-        return condensed_body(elastic, *given, prepared.free_modes)
+            return hierarchical_body(weightless, *data, prepared.inside)
+        return condensed_body(elastic, *data, prepared.free_modes)
     from bemkit.model.free_motion import check_held
     from bemkit.model.untouched_body import UntouchedBody
 

@@ -96,7 +96,7 @@ def dimensionless_load(load: Traction | Pressure, units: Units) -> TractionField
 
 
 def far_drive(scene: Scene, units: Units) -> FarDrive:
-    """Return how a half-plane moves far away, in the units given; at rest if the scene says nothing of it."""
+    """Return how a half-plane moves far away, in the units given; at rest by default."""
     far = scene.far
     if far is None:
         return FarDrive()
@@ -104,12 +104,12 @@ def far_drive(scene: Scene, units: Units) -> FarDrive:
     load = far.load / (units.stress * units.length * np.array([1.0, 1.0, units.length]))
     centre = (np.array(far.centre) - units.centre) / units.length
     driven = tuple(np.flatnonzero(far.is_driven).tolist())
-    return FarDrive(driven, *(tuple(each.tolist()) for each in (motion, load, centre)))
+    return FarDrive(driven, *(tuple(array.tolist()) for array in (motion, load, centre)))
 
 
 @dataclass(frozen=True, eq=False)
 class Prepared:
-    """What a scene says on a mesh, dimensionless but for the mesh and the columns of the contact data.
+    """A scene on a mesh, dimensionless except for the mesh and the columns of the contact data.
 
     Parameters
     ----------
@@ -129,7 +129,7 @@ class Prepared:
     force : (n_nodes, 2) array [-]
         Given nodal forces.
     inside : ForcesInside or None
-        What acts inside the body; None if nothing does.
+        Body forces; None without any.
     drive : FarDrive
         How a half-plane moves far away.
     """
@@ -162,7 +162,7 @@ class Prepared:
 
     @cached_property
     def linear_solver(self) -> ChosenLinearSolver:
-        """The linear solver that the map follows, and why it is taken."""
+        """The linear solver of the map, and why it was chosen."""
         case = BodyCase(
             self.space.mesh, self.material, self.conditions, (self.map_data,), is_condensed=self.is_condensed
         )
@@ -179,8 +179,8 @@ class Prepared:
     def is_condensed(self) -> bool:
         """Whether contact sees the stiffness of the body even if its equations are compressed over a tree.
 
-        Only a stiffness tells whether the energy of elements that are too long can be negative, and what displacements
-        without slopes make of a rotation that no support holds; and nodes between two obstacles stand in two rows.
+        The stiffness is needed to tell whether the energy of elements that are too long can be negative, for rotations
+        that no support holds and displacements do not contain, and for nodes between two obstacles (two rows each).
         """
         if self.contact.nodes.is_shared.any():
             return True
@@ -217,7 +217,7 @@ def given_data(conditions: NodalConditions, force: FloatArray, inside: ForcesIns
 
 
 def prepare(scene: Scene, mesh: BoundaryMesh, units: Units | None = None) -> Prepared:
-    """Work out what a scene says on a mesh.
+    """Prepare a scene on a mesh: conditions at nodes, contact nodes and forces.
 
     Parameters
     ----------
@@ -245,12 +245,12 @@ def prepare(scene: Scene, mesh: BoundaryMesh, units: Units | None = None) -> Pre
 
 
 def prepare_steps(steps: Sequence[Scene], mesh: BoundaryMesh) -> tuple[Prepared, ...]:
-    """Work out what scenes that follow each other in time say on a mesh, in the units of the largest load."""
+    """Prepare scenes that follow each other in time, on one mesh and in the units of the largest load."""
     units = max((find_units(step, mesh) for step in steps), key=lambda units: units.stress)
     first = prepare(steps[0], mesh, units)
     later = tuple(first.under(step) for step in steps[1:])
     if later:
-        first = replace(first, conditions=replace(first.conditions, later=tuple(each.map_data for each in later)))
+        first = replace(first, conditions=replace(first.conditions, later=tuple(step.map_data for step in later)))
     return (first, *later)
 
 
@@ -276,7 +276,7 @@ def _prepared(scene: Scene, mesh: BoundaryMesh, units: Units, space: BoundarySpa
 
 
 def check_same_body(scene: Scene, other: Scene) -> None:
-    """Refuse another scene whose matrices would be others on the same mesh.
+    """Check that another scene has the same matrices on the same mesh.
 
     Raises
     ------

@@ -37,14 +37,14 @@ else:
 
 
 class BoundaryOperator(_LinearOperator, ABC):
-    """A weak form <A trial, test> on two boundary spaces; an operator of one's own says how its matrix is built.
+    """A weak form <A trial, test> on two boundary spaces; an operator of your own writes `_build`.
 
     Parameters
     ----------
     trial, test : BoundarySpace
         The space of the argument, and the one that the result is tested with.
     tags : frozenset of Tag
-        What is promised of the matrix.
+        Properties of the matrix; `bemkit.testing.check_operator` checks them.
     """
 
     def __init__(self, trial: BoundarySpace, test: BoundarySpace, tags: frozenset[Tag]) -> None:
@@ -68,7 +68,7 @@ class BoundaryOperator(_LinearOperator, ABC):
         return self._matrix
 
     def keep(self, matrix: Matrix) -> None:
-        """Take over a finished matrix."""
+        """Take a finished matrix as that of the operator; it becomes read-only."""
         read_only(matrix if isinstance(matrix, np.ndarray) else matrix.data)
         self._matrix = matrix
 
@@ -103,7 +103,7 @@ class BoundaryOperator(_LinearOperator, ABC):
         )
 
     def _build_block(self, rows: IntArray, columns: IntArray) -> FloatArray:
-        """Compute a block alone; by the whole matrix unless an operator knows better."""
+        """Compute a block; by default from the whole matrix."""
         self.matrix()
         return self.block(rows, columns)
 
@@ -195,12 +195,12 @@ class Mass(BoundaryOperator):
 
 
 def single_layer(trial: BoundarySpace, test: BoundarySpace, material: Material) -> SingleLayer:
-    """Return V, the single layer operator ([Paper], eq. 27).
+    """Return V, the single layer operator: <V t, q> ([Paper], eq. 27).
 
     Parameters
     ----------
     trial, test : BoundarySpace
-        Traction spaces.
+        Traction spaces on one mesh.
     material : Material
 
     Returns
@@ -211,31 +211,93 @@ def single_layer(trial: BoundarySpace, test: BoundarySpace, material: Material) 
     Notes
     -----
     The logarithm is log(|r| / r0) with r0 the diameter of the mesh, which makes V positive definite at every size of
-    the body; the constant matters nowhere where the tractions are in equilibrium.
+    the body. For tractions in equilibrium r0 changes V t by a translation only.
     """
     return SingleLayer(SingleLayerForm(trial, test, material))
 
 
 def double_layer(trial: BoundarySpace, test: BoundarySpace, material: Material) -> DoubleLayer:
-    """Return K, the double layer operator ([Paper], eq. 27); the trial space must be continuous.
+    """Return K, the double layer operator: <K u, q> ([Paper], eq. 27).
 
+    Parameters
+    ----------
+    trial : BoundarySpace
+        Of the displacements u; it must be continuous.
+    test : BoundarySpace
+        Of the tractions q, on the same mesh.
+    material : Material
+
+    Returns
+    -------
+    DoubleLayer
+        Matrix entries [m]: displacement dofs [m] to tested displacements [m^2].
+
+    Raises
+    ------
+    GeometryError
+        If the trial space is not continuous.
+
+    Notes
+    -----
     On the boundary of a body (1/2 M + K) r = 0 for its rigid motions r, on that of an exterior (1/2 M + K) r = M r.
     """
     return DoubleLayer(DoubleLayerForm(trial, test, material))
 
 
 def adjoint_double_layer(trial: BoundarySpace, test: BoundarySpace, material: Material) -> AdjointDoubleLayer:
-    """Return K' ([Paper], eq. 27), the transpose of `double_layer(test, trial, material)`."""
+    """Return K', the adjoint double layer operator: <K' t, v> ([Paper], eq. 27).
+
+    Parameters
+    ----------
+    trial : BoundarySpace
+        Of the tractions t.
+    test : BoundarySpace
+        Of the displacements v, on the same mesh; it must be continuous.
+    material : Material
+
+    Returns
+    -------
+    AdjointDoubleLayer
+        The transpose of ``double_layer(test, trial, material)``.
+
+    Raises
+    ------
+    GeometryError
+        If the test space is not continuous.
+    """
     return AdjointDoubleLayer(double_layer(test, trial, material))
 
 
 def hypersingular(trial: BoundarySpace, test: BoundarySpace, material: Material) -> Hypersingular:
-    """Return W, the hypersingular operator ([Paper], eq. 27), integrated by parts; both spaces must be continuous."""
+    """Return W, the hypersingular operator: <W u, v> ([Paper], eq. 27), integrated by parts.
+
+    Parameters
+    ----------
+    trial, test : BoundarySpace
+        Displacement spaces on one mesh; both must be continuous.
+    material : Material
+
+    Returns
+    -------
+    Hypersingular
+        Matrix entries [Pa]: displacement dofs [m] to nodal forces [N/m].
+
+    Raises
+    ------
+    GeometryError
+        If a space is not continuous.
+    """
     return Hypersingular(HypersingularForm(trial, test, material))
 
 
 def mass(trial: BoundarySpace, test: BoundarySpace) -> Mass:
-    """Return the identity in weak form, <u, q>."""
+    """Return M, the identity in weak form: <u, q>, with a sparse matrix [m].
+
+    Parameters
+    ----------
+    trial, test : BoundarySpace
+        On one mesh.
+    """
     return Mass(trial, test)
 
 
@@ -245,12 +307,12 @@ def assemble(*operators: PairOperator) -> int:
     Parameters
     ----------
     *operators : PairOperator
-        On the same mesh; those that are assembled already are left alone.
+        On the same mesh; those that are assembled already are skipped.
 
     Returns
     -------
     int
-        Element pairs whose integrals were evaluated.
+        Number of element pairs whose integrals were evaluated.
     """
     waiting = [operator for operator in operators if not operator.is_assembled]
     if not waiting:

@@ -257,7 +257,7 @@ class Plan(ShownInNotebooks):
 
 
 def make_plan(scene: Scene, mesh: BoundaryMesh, *, proposal: Symmetry | None = None) -> Plan:
-    """Say what a scene needs on a mesh and what it leaves out, before anything expensive happens.
+    """Return what a scene needs on a mesh and what it leaves out, before anything expensive happens.
 
     Parameters
     ----------

@@ -28,13 +28,17 @@ from bemkit.solvers.ssn import SemismoothNewton
 
 
 def find_reference(scene: Scene) -> Reference | None:
-    """Return the reference of a scene, None if there is none.
+    """Return the reference solution of a scene, None if there is none.
 
     Parameters
     ----------
     scene : Scene
-        Has one if it poses the problem of a shipped scene that has one, whatever its mesh, its discretisation and its
-        solver are. A number that differs makes another problem.
+        Its problem must be that of a shipped scene with a reference, to the last number; mesh, discretisation and
+        solver may differ.
+
+    Returns
+    -------
+    Reference or None
     """
     for name, make in _REFERENCES.items():
         if _problem(scene) == _problem(load_single_body(name)):

@@ -62,11 +62,11 @@ class BodyResult(SolvedBody):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class AssemblySolution(SolvedProblem):
-    """What `bemkit.run` returns of an assembly.
+    """The solution of an assembly, as `bemkit.run` returns it and result files hold it.
 
-    How it was solved is said by the entries of `SolvedProblem`. The contact table has one row for each multiplier node;
-    `part` is the name of the contact, displacements are relative ones: those of the body with the node less those of
-    its partner.
+    Status, certificate, contact table and history are entries of `SolvedProblem`. The contact table has a row for each
+    multiplier node; `part` is the name of the contact, and displacements are those of the body with the node less those
+    of its partner.
 
     Parameters
     ----------
@@ -99,7 +99,7 @@ class AssemblySolution(SolvedProblem):
 
     @property
     def stated(self) -> Assembly:
-        """What was asked: the assembly, with all its load steps."""
+        """The assembly that was solved, with all its load steps."""
         return self.assembly if self.loading is None else cast(Assembly, self.loading.asked)
 
     @property
@@ -113,8 +113,8 @@ class AssemblySolution(SolvedProblem):
 
     def part_length(self, contact: str) -> float:
         """Return the length of boundary that can touch in a contact [m]."""
-        own = self.contact.rows(contact)
-        return float(self.contact.weight[own].sum()) + max(float(self.contact.s[own][0]), 0.0)
+        rows = self.contact.rows(contact)
+        return float(self.contact.weight[rows].sum()) + max(float(self.contact.s[rows][0]), 0.0)
 
     @property
     def energy(self) -> float:
@@ -133,7 +133,7 @@ class AssemblySolution(SolvedProblem):
 
     @property
     def error_unit(self) -> float:
-        """What squared errors in the energy norm are measured by [J/m]; see `SolvedBody.error_unit`."""
+        """Energy [J/m] to which squared errors in the energy norm are relative; see `SolvedBody.error_unit`."""
         return sum(body.error_unit for body in self.bodies.values())
 
     def _measured_between(self, motion: SlipHistory | None) -> dict[str, BetweenNodes]:
@@ -147,14 +147,14 @@ class AssemblySolution(SolvedProblem):
         Without those at edges that press into another side, and from degree 3 on those at `singular_corners`:
         tractions there have no bound.
         """
-        own = self.bodies[body]
-        parts = dict.fromkeys([*self.assembly.listed_parts(body), *(part.name for part in own.scene.contact_parts)])
+        result = self.bodies[body]
+        parts = dict.fromkeys([*self.assembly.listed_parts(body), *(part.name for part in result.scene.contact_parts)])
         at_edges = [
             side.elements_at(point) for one, two, point, _ in self._edges for side in (one, two) if side.body == body
         ]
-        elements = np.concatenate([np.zeros(0, np.intp), *(own.mesh.part(part) for part in parts)])
-        if own.coefficient_errors is not None:
+        if result.coefficient_errors is not None:
             at_edges += [np.array(corner.elements) for corner in self.singular_corners[body]]
+        elements = np.concatenate([np.zeros(0, np.intp), *(result.mesh.part(part) for part in parts)])
         return np.setdiff1d(elements, np.concatenate([np.zeros(0, np.intp), *at_edges]))
 
     @cached_property
@@ -179,7 +179,7 @@ class AssemblySolution(SolvedProblem):
         return next(self.singular_corners[name] for name, own in self.bodies.items() if own is body)
 
     def _sides_of(self, contact: str) -> list[Side]:
-        """Return the sides of a contact of the table, of an obstacle the one that there is."""
+        """Return the sides of elastic bodies in a contact of the table: two, or one at an obstacle."""
         pair = self._listed.get(contact)
         names = [body_and_part(contact)] if pair is None else pair.elastic_parts
         return [Side(body, self.bodies[body].mesh, part) for body, part in names]
@@ -206,29 +206,29 @@ class AssemblySolution(SolvedProblem):
         """Two sides, the point where the second ends inside the first, and where that is on the first."""
         pairs = [self._sides_of(pair.name) for pair in self.assembly.elastic_contacts]
         ordered = [order for one, two in pairs for order in ((one, two), (two, one))]
-        return [(own, other, *edge) for own, other in ordered for edge in own.edges(other)]
+        return [(side, other, *edge) for side, other in ordered for edge in side.edges(other)]
 
     @property
     def facing_ends(self) -> tuple[ZoneEnd, ...]:
-        """Where a side ends inside another one that it lies on: its edge presses into that."""
+        """Where the end of a side lies inside the side that it faces, so that its edge presses into that."""
         return tuple(place for _, _, _, place in self._edges)
 
     @cached_property
     def estimated_traction_error(self) -> float | None:
-        """Estimated error of the contact tractions of all bodies in L2, relative to them.
+        """Estimated error of the contact tractions of all bodies in L2, relative to their norm.
 
-        From degree 3 on; None of other elements, and without such tractions. Elements at edges that press into another
-        side, and at singular corners, are left out; see `contact_elements`.
+        From degree 3 on; None for other elements, and if there are no such tractions. Elements at edges that press into
+        another side, and at singular corners, are left out; see `contact_elements`.
         """
-        size, known = self.contact_traction_size, [body.coefficient_errors for body in self.solved_bodies]
-        if size == 0.0 or any(each is None for each in known):
+        size, errors_of_bodies = self.contact_traction_size, [body.coefficient_errors for body in self.solved_bodies]
+        if size == 0.0 or any(errors is None for errors in errors_of_bodies):
             return None
         from bemkit.results.error_indicators import place_error
 
         elements = {name: self.contact_elements(name) for name in self.bodies}
         squared = sum(
             float(errors.traction[elements[name]].sum())
-            for name, errors in zip(self.bodies, known, strict=True)
+            for name, errors in zip(self.bodies, errors_of_bodies, strict=True)
             if errors is not None
         )
         for transition in self.transitions:

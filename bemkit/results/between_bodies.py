@@ -73,10 +73,10 @@ def violations_between_bodies(
 
     Notes
     -----
-    Points of the pieces on which the functions of both sides are smooth, where they face each other along the mean of
-    both normals: tractions of both sides against the one clearance. Each contact is measured by the one of its bodies
-    that carries less, and lengths by the softer of them, so that a light block is not judged by the heaviest. Without
-    any contact force lengths are measured by the larger displacement of the two.
+    Points lie on the pieces on which the functions of both sides are smooth, and face each other along the mean of both
+    normals. Tractions of both sides are measured, with one clearance. They are relative to those on the body of the
+    contact that carries less, and lengths to the displacement of the softer one, so that a light block is not judged by
+    the heaviest. Without any contact force lengths are relative to the larger displacement of the two.
     """
     with np.errstate(all="ignore"):  # results that are not finite are measured by nan
         stated = [*_at_obstacles(assembly, bodies, rigid), *_at_bodies(assembly, bodies)]
@@ -88,7 +88,7 @@ def violations_between_bodies(
         for body in partners:
             forces[body] += float(contact.weight[rows] @ size[rows])
             stresses[body] = max(stresses[body], float(size[rows].max(initial=0.0)))
-    found: dict[str, BetweenNodes] = {}
+    violations: dict[str, BetweenNodes] = {}
     moved = {name: float(np.abs(body.boundary.displacement).max()) for name, body in bodies.items()}
     for name, partners, law, values in stated:
         modulus = min(bodies[body].scene.material.plane_modulus for body in partners)
@@ -96,13 +96,13 @@ def violations_between_bodies(
             max(min(of[body] for body in partners), _LIGHTEST * max(of.values())) for of in (forces, stresses)
         )
         with np.errstate(all="ignore"):  # results that are not finite are measured by nan
-            found[name] = violations_at(
+            violations[name] = violations_at(
                 values,
                 law_between(law, values, contact, name, motion),
                 stress or 1.0,
                 force / modulus or max(moved[body] for body in partners) or max(moved.values()) or 1.0,
             )
-    return found
+    return violations
 
 
 def _at_obstacles(
@@ -131,9 +131,9 @@ def _at_obstacles(
             values = values._replace(clearance=clearance)
             facing.setdefault(part_name, []).append(_Measured(pair.name, (owner,), assembly.law_of(pair), values))
         for rivals in facing.values():
-            nearest = np.argmin([each.values.clearance for each in rivals], axis=0)
-            for k, each in enumerate(rivals):
-                yield each._replace(values=each.values.take(nearest == k))
+            nearest = np.argmin([rival.values.clearance for rival in rivals], axis=0)
+            for k, rival in enumerate(rivals):
+                yield rival._replace(values=rival.values.take(nearest == k))
 
 
 def _at_bodies(assembly: Assembly, solved: Mapping[str, SolvedBody]) -> Iterator[_Measured]:
@@ -154,19 +154,19 @@ def _at_bodies(assembly: Assembly, solved: Mapping[str, SolvedBody]) -> Iterator
 
 @dataclass(frozen=True, eq=False)
 class _Facing:
-    """Points of two sides that face each other, for all pairs of bodies that stand alike.
+    """Points of two sides that face each other, for all pairs of bodies in the same relative position.
 
     Parameters
     ----------
     placement : Placement
-        Of the body named first, where the places and vectors are those of.
+        Of the body named first when points and vectors were computed.
     is_swapped : bool
         Whether the body named second has the multipliers.
     sides : two Interpolation
         Of the body with the multipliers, and of the other one.
     s : (n,) array [m]
     points, directions, gap : (n, 2) arrays
-        The gap is the way from the one side to the other.
+        The gap is the vector from one side to the other.
     """
 
     placement: Placement
@@ -213,18 +213,20 @@ class _Facing:
         )
 
     def values(self, bodies: tuple[SolvedBody, SolvedBody], placement: Placement, gap: float) -> PointsBetween:
-        """Return what is known at the points, with the tractions of the first side and then those of the second."""
+        """Return clearance and tractions at the points, first with those of one side, then of the other."""
         first, second = bodies[::-1] if self.is_swapped else bodies
         points = placement.forward(self.placement.back(self.points))
-        along, apart = (placement.turned(self.placement.turned_back(each)) for each in (self.directions, self.gap))
+        directions, gaps = (
+            placement.turned(self.placement.turned_back(vectors)) for vectors in (self.directions, self.gap)
+        )
         one, two = self.sides
-        apart = apart - one.displacement(first).reshape(-1, 2) + two.displacement(second).reshape(-1, 2)
+        gaps = gaps - one.displacement(first).reshape(-1, 2) + two.displacement(second).reshape(-1, 2)
         traction = np.concatenate([one.traction(first), -two.traction(second)]).reshape(-1, 2)
-        both = np.tile(along, (2, 1))
+        both = np.tile(directions, (2, 1))
         return PointsBetween(
             np.tile(points, (2, 1)),
             np.tile(self.s, 2),
             both,
-            np.tile(gap + np.sum(apart * along, axis=1), 2),
+            np.tile(gap + np.sum(gaps * directions, axis=1), 2),
             *np.einsum("nkc,nc->kn", contact_frame(both), traction),
         )

@@ -1,4 +1,4 @@
-"""How far displacements and tractions violate the contact conditions between the nodes, where nobody asks for them."""
+"""Violations of the contact conditions between the nodes, where no equation enforces them."""
 
 from __future__ import annotations
 
@@ -21,18 +21,18 @@ from bemkit.results.solved_body import SolvedBody
 from bemkit.scene.conditions import Contact
 
 _POINTS_PER_NODE = 4
-"""Points of an element for each of its nodes: between them a polynomial grows by a few per cent more at most."""
+"""Points on an element for each of its nodes: a polynomial is larger between them by a few per cent at most."""
 _ROUND_OFF = 64.0 * float(np.finfo(float).eps)
-"""Of clearances, which are differences of coordinates, relative to the largest of these."""
+"""Round-off of clearances, which are differences of coordinates, relative to the largest coordinate."""
 
 
 @dataclass(frozen=True)
 class BetweenNodes:
     """Largest violation of each contact condition at points between the nodes; zero is perfect.
 
-    Names and signs are those of `bemkit.contact.problem.Certificate`, which speaks of the nodes. These violations
-    are errors of the discretisation: they are not round-off, and fall when elements become smaller or their degree
-    higher. The opposition of slip is left to the nodes.
+    Names and signs are those of `bemkit.contact.problem.Certificate`, which is about the nodes. These violations are
+    errors of the discretisation: they fall as elements become smaller or their degree higher. The opposition of slip is
+    measured at nodes only.
 
     Parameters
     ----------
@@ -70,8 +70,8 @@ class BetweenNodes:
 
     @classmethod
     def largest(cls, measured: Iterable[BetweenNodes]) -> BetweenNodes | None:
-        """Return the largest of each; None of none."""
-        rows = [list(each.as_dict().values()) for each in measured]
+        """Return the largest of each violation; None if `measured` is empty."""
+        rows = [list(violations.as_dict().values()) for violations in measured]
         return cls(*np.max(rows, axis=0).tolist()) if rows else None
 
 
@@ -94,8 +94,8 @@ def violations_between_nodes(
 
     Notes
     -----
-    The gap is that of the obstacle at each point, so that the shape of both bodies between nodes counts too. Constant
-    elements are measured as the steps they are. Without any contact force displacements are measured by the largest.
+    The gap is measured at each point, so that the shape of both bodies between nodes counts too. Fields of constant
+    elements are steps. Without any contact force lengths are relative to the largest displacement.
     """
     if not contact.n_contact:
         return {}
@@ -103,18 +103,18 @@ def violations_between_nodes(
     stress = float(np.maximum(np.abs(contact.sigma_n), np.abs(contact.sigma_t)).max()) or 1.0
     force = float(np.sum(contact.weight * np.hypot(contact.sigma_n, contact.sigma_t)))
     length = force / scene.material.plane_modulus or float(np.abs(body.boundary.displacement).max()) or 1.0
-    found = {}
+    violations = {}
     for part in scene.parts:
         if isinstance(part.condition, Contact) and (elements := mesh.part(part.name)).size:  # none beyond a symmetry
             with np.errstate(all="ignore"):  # results that are not finite are measured by nan
                 points = points_at_obstacle(body, part.condition.obstacle, elements)
                 law = law_between(scene.laws[part.name], points, contact, part.name, motion)
-                found[part.name] = violations_at(points, law, stress, length)
-    return found
+                violations[part.name] = violations_at(points, law, stress, length)
+    return violations
 
 
 class PointsBetween(NamedTuple):
-    """What is known at points of a contact; displacements and tractions in (n, t) components.
+    """Clearance and tractions at points of a contact, in (n, t) components.
 
     Parameters
     ----------
@@ -140,7 +140,7 @@ class PointsBetween(NamedTuple):
 
 
 def points_at_obstacle(body: SolvedBody, obstacle: Obstacle, elements: IntArray) -> PointsBetween:
-    """Return what is known at points of elements (m,) that face a rigid obstacle where it stands before it moves."""
+    """Return clearance and tractions at points of elements (m,) that face a rigid obstacle, before it moves."""
     mesh = body.mesh
     elements = along_boundary(mesh, elements)
     xi = points_between(body.scene.discretisation.displacement_space(mesh).degree)
@@ -157,7 +157,7 @@ def points_at_obstacle(body: SolvedBody, obstacle: Obstacle, elements: IntArray)
 
 @dataclass(frozen=True, eq=False)
 class Interpolation:
-    """How the fields of a body, and of its copies, are interpolated at points (m, q) of elements (m,).
+    """Interpolation of the fields of a body, and of its copies, at points (m, q) of elements (m,).
 
     Parameters
     ----------
@@ -174,14 +174,13 @@ class Interpolation:
 
     @classmethod
     def at(cls, body: SolvedBody, elements: IntArray, xi: FloatArray) -> Interpolation:
-        """Prepare places xi (m, q) of elements (m,) of a body."""
-        moved, loaded = (
-            each(body.mesh)
-            for each in (body.scene.discretisation.displacement_space, body.scene.discretisation.traction_space)
-        )
-        dofs = moved.element_dofs[elements]
-        lifted = from_own_nodes(moved, np.broadcast_to(np.eye(dofs.shape[1]), (*dofs.shape, dofs.shape[1])), elements)
-        return cls(elements, dofs, _basis(moved, xi) @ lifted, _basis(loaded, xi))
+        """Return the interpolation at local coordinates xi (m, q) of elements (m,) of a body."""
+        discretisation, mesh = body.scene.discretisation, body.mesh
+        displacements, tractions = discretisation.displacement_space(mesh), discretisation.traction_space(mesh)
+        dofs = displacements.element_dofs[elements]
+        unit = np.broadcast_to(np.eye(dofs.shape[1]), (*dofs.shape, dofs.shape[1]))
+        of_displacement = _basis(displacements, xi) @ from_own_nodes(displacements, unit, elements)
+        return cls(elements, dofs, of_displacement, _basis(tractions, xi))
 
     def displacement(self, body: SolvedBody) -> FloatArray:
         """Return displacements (m, q, 2) [m]."""
@@ -207,7 +206,7 @@ def law_between(
         return law
     rows = np.flatnonzero(contact.rows(name))
     rows = rows[np.argsort(contact.s[rows])]
-    slip, last = (np.interp(values.s, contact.s[rows], each[rows]) for each in (motion.slip, motion.last_slip))
+    slip, last = (np.interp(values.s, contact.s[rows], nodal[rows]) for nodal in (motion.slip, motion.last_slip))
     return law.at_slip(SlipHistory(motion.time, motion.time_step, slip, last))
 
 
@@ -229,7 +228,7 @@ def violations_at(values: PointsBetween, law: FrictionLaw, stress: float, length
 
 
 def points_between(degree: int) -> FloatArray:
-    """Return Chebyshev's points of [-1, 1], which crowd at the ends as the nodes do; ends and middle are among them."""
+    """Return Chebyshev points of [-1, 1], dense at the ends like the nodes; ends and middle are among them."""
     n = _POINTS_PER_NODE * (degree + 1) + 1
     return -np.cos(np.pi * np.arange(n) / (n - 1))
 

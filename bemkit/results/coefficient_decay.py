@@ -1,9 +1,9 @@
-"""How far elements of degree 3 and more are from the exact solution, judged by how their Legendre coefficients decay.
+"""Estimated errors of elements of degree 3 and more, from the decay of their Legendre coefficients [Mavriplis1994].
 
 On an element of degree p the slopes of the displacements and the tractions are polynomials of degree p - 1. Where the
-exact fields are analytic their Legendre coefficients fall geometrically, near a singular point algebraically; either
-way the coefficients that are there tell the size of those that are missing [Mavriplis1994]. No neighbour is needed, so
-that elements at corners, where fields are singular and one-sided, are judged like all others.
+exact fields are analytic their Legendre coefficients fall geometrically, near a singular point algebraically. In both
+cases the last coefficients determine the size of those that are missing. No neighbour is needed, so that elements at
+corners, where fields are singular and one-sided, are estimated like all others.
 """
 
 from __future__ import annotations
@@ -25,9 +25,9 @@ ENERGY_CALIBRATION = 0.08
 """Factor between h^2 a^2 / (E' (p + 1) (2 p + 1)), a the first missing coefficient, and the squared error: on the
 shipped scenes with a reference the square root of the sum then lies between 0.5 and 2 times the error."""
 SLOWEST = 0.95
-"""Ratio of successive coefficients beyond which the sum of all that are missing is not told by the first of them."""
+"""Largest ratio of successive coefficients in the sum of all that are missing."""
 FASTEST = 0.05
-"""Smallest factor that a further degree is trusted to bring."""
+"""Least factor of the error by a further degree."""
 _MORE_POINTS = 2
 
 
@@ -42,7 +42,7 @@ class CoefficientErrors:
     traction : (n_elements,) array [Pa^2 m]
         Squared errors of the tractions in L2.
     energy_decay, traction_decay : (n_elements,) arrays
-        By which factor a degree more would multiply their roots; 1 where the field is singular.
+        Factors of their roots by one degree more; 1 where the field is singular.
     """
 
     energy: FloatArray
@@ -54,18 +54,18 @@ class CoefficientErrors:
     def joined(cls, several: Sequence[CoefficientErrors]) -> CoefficientErrors:
         """Return the errors of all elements, one list after the other."""
         return cls(
-            *(np.concatenate(columns) for columns in zip(*(vars(each).values() for each in several), strict=True))
+            *(np.concatenate(columns) for columns in zip(*(vars(errors).values() for errors in several), strict=True))
         )
 
     @classmethod
     def at_worst(cls, copies: Sequence[CoefficientErrors]) -> CoefficientErrors:
         """Return the largest errors of copies of a body on each element, as often as there are copies."""
-        columns = zip(*(vars(each).values() for each in copies), strict=True)
+        columns = zip(*(vars(errors).values() for errors in copies), strict=True)
         energy, traction, *decays = (np.max(column, axis=0) for column in columns)
         return cls(len(copies) * energy, len(copies) * traction, *decays)
 
     def at_higher_degrees(self, rise: IntArray) -> CoefficientErrors:
-        """Return what the errors would be with so many (n_elements,) degrees more."""
+        """Return the estimated errors with `rise` (n_elements,) degrees more."""
         energy, traction = (
             np.clip(decay, FASTEST, 1.0) ** (2 * rise) for decay in (self.energy_decay, self.traction_decay)
         )
@@ -96,15 +96,15 @@ def coefficient_errors(
     slopes = plane_modulus * _slope_coefficients(displacement_space, values_on_elements(displacement_space, strained))
     tractions = np.einsum("lk,elc->ekc", local_coefficients(traction_space), traction)
     of_slopes, slope_decay, of_tractions, traction_decay = np.empty((4, degree.size))
-    for own in np.unique(degree).tolist():
-        chosen = degree == own
+    for p in np.unique(degree).tolist():
+        chosen = degree == p
         for fields, missing, decay in ((slopes, of_slopes, slope_decay), (tractions, of_tractions, traction_decay)):
-            missing[chosen], decay[chosen] = _missing(np.linalg.norm(fields[chosen, :own], axis=2))
+            missing[chosen], decay[chosen] = _missing(np.linalg.norm(fields[chosen, :p], axis=2))
     scale = ENERGY_CALIBRATION / (plane_modulus * (degree + 1) * (2 * degree + 1))
     return CoefficientErrors(
         energy=scale * mesh.lengths**2 * (of_slopes + of_tractions),
         traction=mesh.lengths / (2 * degree + 1) * of_tractions,
-        # of what has an error: the coefficients of tractions that vanish are round-off, which does not fall
+        # weighted by the errors: coefficients of tractions that vanish are round-off, which does not fall
         energy_decay=np.sqrt(
             (of_slopes * slope_decay**2 + of_tractions * traction_decay**2)
             / np.maximum(of_slopes + of_tractions, np.finfo(float).tiny)
@@ -128,8 +128,8 @@ def _slope_coefficients(space: BoundarySpace, displacement: FloatArray) -> Float
 def _missing(sizes: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return the sum of the squares (n,) of the coefficients that follow, and the ratio (n,) at which they fall.
 
-    The second half of the coefficients is fitted by a geometric sequence, each one taken as large as any after it, as a
-    field that is odd or even has every other one zero.
+    A geometric sequence is fitted to the second half of the coefficients. Each is taken as large as any after it, since
+    every other coefficient of an odd or even field is zero.
     """
     n_known = sizes.shape[1]
     bounds = np.maximum.accumulate(sizes[:, ::-1], axis=1)[:, ::-1]

@@ -1,4 +1,4 @@
-"""What a result says of the contact nodes, and where the contact status changes between them."""
+"""The table of the contact nodes of a result, and where the contact status changes between them."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ STATUS_WORDS: Mapping[NodeStatus, str] = MappingProxyType(
     }
 )
 FLICKER = 1e-8
-"""Share of a side on which all places of change are one: clearances, which grow like d**1.5, are round-off there, and
-statuses change from node to node."""
+"""Changes of status within this share of a side count as one. Clearances grow like d**1.5 with the distance d from the
+edge, so that they are round-off there, and the status may change from node to node."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,12 +37,15 @@ class ContactTable:
     part : tuple of n_contact str
         Name of the part each node belongs to.
     x, y : (n_contact,) arrays [m]
+        Places of the nodes on the undeformed body.
     s : (n_contact,) array [m]
         Arc length from the start of the part.
     u_n, u_t : (n_contact,) arrays [m]
+        Displacement along the direction of contact, positive towards the obstacle, and along the tangent.
     sigma_n, sigma_t : (n_contact,) arrays [Pa]
+        Traction on the body in the same components; pressed nodes have ``sigma_n < 0``.
     gap : (n_contact,) array [m]
-        Initial distance to the obstacle along the normal; infinite where there is none in sight.
+        Initial distance to the obstacle along the direction of contact; infinite where the node cannot touch any.
     clearance : (n_contact,) array [m]
         Distance left, ``gap - u_n``.
     status : (n_contact,) array of `NodeStatus` values
@@ -101,10 +104,9 @@ class ContactTable:
 
     def rows(self, part: str) -> BoolArray:
         """Return (n_contact,) bool: the nodes of one part."""
-        nodes = self._nodes.get(part, ())
-        own = np.zeros(self.n_contact, bool)
-        own[list(nodes)] = True
-        return own
+        is_of_part = np.zeros(self.n_contact, bool)
+        is_of_part[list(self._nodes.get(part, ()))] = True
+        return is_of_part
 
     def renamed(self, names: Mapping[str, str]) -> ContactTable:
         """Return the rows of some parts, by their names, under other names."""
@@ -173,18 +175,19 @@ class Transition:
 
     @classmethod
     def of(cls, row: Mapping[str, Any]) -> Transition:
-        """Return what `as_dict` has written."""
+        """Return the transition from the entries of `as_dict`."""
         return cls(*(row[entry.name.removesuffix("_status")] for entry in fields(cls)))
 
 
 _FIRST_FITTED, _LEAST_FITTED = 4, 8
-"""The node from which on a power law is fitted, as the nodes beside a transition are the least true, and how many nodes
-that takes."""
+"""Number of the first node, counted from a transition, to which a power law is fitted, since nodes beside a transition
+have the largest errors; and the least number of nodes for a fit."""
 _POWER_LAW_RANGE = 0.1
-"""Distance, relative to the size of the zone, up to which that power holds closely."""
+"""Distance from the transition, relative to the size of the zone, up to which nodes are fitted."""
 _POWERS = (1.3, 1.7)
-"""The powers that sliding friction may make of 3/2."""
+"""Range of the power; sliding friction changes it from 3/2."""
 _MOST_STEPS = 20
+"""Newton steps of the fit."""
 _LEAST_ZONE = 0.5
 """Least length of a zone, relative to its length if it ends halfway between its nodes and its neighbours'."""
 
@@ -217,44 +220,43 @@ def find_transitions(contact: ContactTable, slip: FloatArray | None = None) -> t
     slip = contact.u_t if slip is None else slip
     changes = [i for i in np.flatnonzero(contact.is_joined).tolist() if words[i] != words[i + 1]]
     places = np.array([_transition_place(contact, slip, words, i) for i in changes])
-    kept, x, y = _kept_apart(contact, changes, places), np.zeros(len(changes)), np.zeros(len(changes))
+    arc_lengths, x, y = _kept_apart(contact, changes, places), np.zeros(len(changes)), np.zeros(len(changes))
     parts = [contact.part[i] for i in changes]
     for part in dict.fromkeys(parts):
-        own, rows = np.equal(parts, part), contact.rows(part)
-        for place, column in ((x, contact.x), (y, contact.y)):
-            place[own] = np.interp(kept[own], contact.s[rows], column[rows])
-    at = zip(changes, parts, x.tolist(), y.tolist(), kept.tolist(), strict=True)
+        of_part, rows = np.equal(parts, part), contact.rows(part)
+        for coordinate, column in ((x, contact.x), (y, contact.y)):
+            coordinate[of_part] = np.interp(arc_lengths[of_part], contact.s[rows], column[rows])
+    at = zip(changes, parts, x.tolist(), y.tolist(), arc_lengths.tolist(), strict=True)
     return tuple(Transition(part, x_at, y_at, s, words[i], words[i + 1]) for i, part, x_at, y_at, s in at)
 
 
 def resolved_transitions(contact: ContactTable, transitions: Sequence[Transition]) -> tuple[Transition, ...]:
-    """Return those transitions on whose both sides zones of several nodes lie.
+    """Return the transitions between zones of several nodes each.
 
-    A zone that a single node stands for is not resolved yet, or it is a node that a support holds.
+    A zone of a single node is not resolved by the mesh yet, or a support holds its node.
     """
-    found = []
+    resolved: list[Transition] = []
     for part in contact.parts:
-        own = [transition for transition in transitions if transition.part == part]
-        ends = [-np.inf, *(transition.s for transition in own), np.inf]
+        of_part = [transition for transition in transitions if transition.part == part]
+        ends = [-np.inf, *(transition.s for transition in of_part), np.inf]
         has_several = np.histogram(contact.s[contact.rows(part)], ends)[0] > 1
-        found += [
-            each for each, is_resolved in zip(own, has_several[:-1] & has_several[1:], strict=True) if is_resolved
-        ]
-    return tuple(found)
+        is_resolved = has_several[:-1] & has_several[1:]
+        resolved += [transition for transition, keep in zip(of_part, is_resolved, strict=True) if keep]
+    return tuple(resolved)
 
 
 def _kept_apart(contact: ContactTable, changes: list[int], places: FloatArray) -> FloatArray:
-    """Put transitions halfway between their nodes where they leave next to nothing of a zone, which has nodes."""
-    kept = places.copy()
+    """Return the arc lengths of transitions, halfway between their nodes where `places` leave too little of a zone."""
+    result = places.copy()
     halfway = np.array([(contact.s[i] + contact.s[i + 1]) / 2.0 for i in changes])
     for part in dict.fromkeys(contact.part[i] for i in changes):
-        own = [k for k, i in enumerate(changes) if contact.part[i] == part]
+        of_part = [k for k, i in enumerate(changes) if contact.part[i] == part]
         ends = contact.s[contact.rows(part)][[0, -1]]
-        least = _LEAST_ZONE * np.diff(halfway[own], prepend=ends[0], append=ends[1])
-        for _ in own:  # what moves back may meet the next transition
-            is_lost = np.diff(kept[own], prepend=ends[0], append=ends[1]) < least
-            kept[own] = np.where(is_lost[:-1] | is_lost[1:], halfway[own], kept[own])
-    return kept
+        least = _LEAST_ZONE * np.diff(halfway[of_part], prepend=ends[0], append=ends[1])
+        for _ in of_part:  # a transition that moves back may come too close to the next one
+            is_lost = np.diff(result[of_part], prepend=ends[0], append=ends[1]) < least
+            result[of_part] = np.where(is_lost[:-1] | is_lost[1:], halfway[of_part], result[of_part])
+    return result
 
 
 def _transition_place(contact: ContactTable, slip: FloatArray, words: list[str], i: int) -> float:
@@ -280,7 +282,7 @@ def _transition_place(contact: ContactTable, slip: FloatArray, words: list[str],
 
 
 def _distance_to_zero(s: FloatArray, field: FloatArray) -> float | None:
-    """Extrapolate powers of the distance from a zone's nodes at s = 0, s[1], ...; None if they do not fall to zero."""
+    """Return how far before s = 0 a field vanishes that falls towards it like a power; None if it does not fall."""
     if not (np.isfinite(field[:2]).all() and field[1] > field[0] >= 0.0):
         return None
     share = (field[0] / field[1]) ** (2.0 / 3.0)
@@ -298,10 +300,10 @@ def _fitted_power_law(s: FloatArray, field: FloatArray, distance: float) -> tupl
     length, logarithms, power = float(s[-1]), np.log(field / field[-1]), 1.5
     for _ in range(_MOST_STEPS):
         relative = (s + distance) / length
-        known = np.stack([np.ones_like(s), np.log(relative), s / length], axis=1)
-        power = float(np.linalg.lstsq(known, logarithms, rcond=None)[0][1])
-        moved = np.column_stack([known, power / relative])
-        step = length * float(np.linalg.lstsq(moved, logarithms, rcond=None)[0][-1])
+        columns = np.stack([np.ones_like(s), np.log(relative), s / length], axis=1)
+        power = float(np.linalg.lstsq(columns, logarithms, rcond=None)[0][1])
+        with_derivative = np.column_stack([columns, power / relative])
+        step = length * float(np.linalg.lstsq(with_derivative, logarithms, rcond=None)[0][-1])
         distance = max(distance + step, -0.9 * float(s[0]))
         if abs(step) <= 1e-12 * s[0]:
             break

@@ -1,13 +1,13 @@
-"""How far a Galerkin solution is from the exact one, judged from the solution itself.
+"""Estimated errors of a Galerkin solution, from the solution itself.
 
 The exact solution has continuous strains along the boundary wherever tractions are continuous, and smooth tractions
 between corners and ends of boundary parts. Strains of the computed displacements jump from element to element, and
-computed tractions are constant or linear on each of them: by as much as jumps and steps tell, element by element, they
-are wrong. Where displacements are given, as on clamped sides, all of the error is in the tractions.
+computed tractions are constant or linear on each. The sizes of these jumps and steps estimate the error of an element.
+Where displacements are given, as on clamped sides, all of the error is in the tractions.
 
-What is estimated is the error of displacements u_h and tractions t_h together, in the norm in which the Galerkin method
-is stable, <W (u - u_h), u - u_h> + <V (t - t_h), t - t_h>: it is a(u - u_h, u - u_h), twice the elastic energy of the
-difference, where t_h is the exact traction of u_h.
+The estimate is one of displacements u_h and tractions t_h together, in the norm in which the Galerkin method is stable,
+<W (u - u_h), u - u_h> + <V (t - t_h), t - t_h>. If t_h is the exact traction of u_h, that is a(u - u_h, u - u_h), twice
+the elastic energy of the difference.
 """
 
 from __future__ import annotations
@@ -37,10 +37,10 @@ CONTACT_CALIBRATION = (1.0 / 16.0, 1.0 / 25.0)
 """Factor between second differences of nodal contact tractions and their squared errors, for degrees 1 and 2: on the
 shipped scenes with a reference the square root of the sum then lies between 0.5 and 2.7 times the error."""
 MEAN_CALIBRATION = 1.25
-"""Of the error of constant tractions on a half-plane in the mean: without it cylinders, wedges and punches on uniform,
-graded and adaptive meshes have estimates of 0.85 to 1.6 times the error."""
+"""Factor of the mean error of constant tractions on a half-plane. Without it estimates of cylinders, wedges and punches
+on uniform, graded and adaptive meshes are 0.85 to 1.6 times the error."""
 LOCAL_CALIBRATION = 1.6
-"""Of the same element by element, on top of that: errors of single elements are up to so much larger."""
+"""Further factor of the same error element by element: errors of single elements are larger by up to so much."""
 PLACE_CALIBRATION = 0.03
 """The square of the 0.17 in the error of elements that end beside a place of change."""
 STEEPEST = 6.0
@@ -81,7 +81,7 @@ def squared_errors(
 
 
 def element_errors(space: BoundarySpace, displacement: FloatArray, plane_modulus: float) -> FloatArray:
-    """Estimate the squared error of each element in the energy norm that shows in the displacements.
+    """Estimate the squared error of each element in the energy norm from jumps of strains.
 
     Parameters
     ----------
@@ -223,21 +223,23 @@ def largest_but_a_share(errors: FloatArray, lengths: FloatArray) -> float:
 def place_error(
     contact: ContactTable, transition: Transition, transitions: Sequence[Transition], end: ZoneEnd
 ) -> float:
-    """Estimate the squared L2 error [Pa^2 m] of the contact tractions of a side for nodes beside a place of change.
+    """Estimate the squared L2 error [Pa^2 m] of contact tractions where a transition lies inside an element.
 
-    Tractions that grow like K sqrt(d) from there are wrong by 0.17 K times its distance from the nearest end of an
-    element; K is that of tractions an element's length away, or halfway to the next place, on the steeper side.
+    Tractions that grow like K sqrt(d) with the distance d from the transition have the error 0.17 K times the distance
+    of the transition from the nearest end of an element. K is fitted to the tractions an element's length away, or
+    halfway to the next transition, on the steeper side.
     """
     rows, length = contact.rows(transition.part), float(end.mesh.lengths[end.element])
-    others = [each.s for each in transitions if each.part == transition.part and each.s != transition.s]
+    others = [other.s for other in transitions if other.part == transition.part and other.s != transition.s]
     bounds = np.array([contact.s[rows].min(), *others, contact.s[rows].max()]) - transition.s
     squared = 0.0
-    for own in (contact.sigma_n, contact.sigma_t):
+    for traction in (contact.sigma_n, contact.sigma_t):
         steepest = 0.0
         for sign in (-1.0, 1.0):
             reach = min([length, *(0.5 * sign * bounds[sign * bounds > 0.0])])
-            here, there = np.interp(transition.s + np.array([0.0, sign * reach]), contact.s[rows], own[rows])
-            steepest = max(steepest, (there - here) ** 2 / reach)
+            places = transition.s + np.array([0.0, sign * reach])
+            at_transition, at_reach = np.interp(places, contact.s[rows], traction[rows])
+            steepest = max(steepest, (at_reach - at_transition) ** 2 / reach)
         squared += steepest
     return float(PLACE_CALIBRATION * squared * end.distance**2)
 
@@ -305,7 +307,7 @@ def _into_the_last(mesh: BoundaryMesh, sizes: FloatArray, *, of_nodes: bool) -> 
 
 
 def _continued(first: FloatArray, second: FloatArray) -> FloatArray:
-    """Return what precedes two sizes as in a geometric sequence; the first again if the second is NaN."""
+    """Return the size before two sizes of a geometric sequence; the first again if the second is NaN."""
     divisor = np.fmax(second, first / STEEPEST)
     return np.nan_to_num(np.divide(first**2, divisor, out=np.zeros_like(first), where=divisor > 0.0))
 

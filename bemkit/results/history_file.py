@@ -93,7 +93,7 @@ def read_history(reader: Reader, last: Solution | AssemblySolution) -> LoadHisto
         return None
     if not reader.has("steps/bodies"):
         raise InputError("its steps are of an older bemkit, which did not keep their fields: run its scene again")
-    asked = scene_from_toml(reader.text("asked", MAX_BYTES), name="scene inside")
+    scene = scene_from_toml(reader.text("asked", MAX_BYTES), name="scene inside")
     rows = rows_of(reader.table("steps", floats=(*_FLOATS, "time_step"), integers=_COUNTS))
     columns = {name: reader.floats(f"steps/contact/{name}") for name in _CONTACT}
     status, slip = reader.integers("steps/contact/status"), reader.floats("steps/slip")
@@ -108,7 +108,7 @@ def read_history(reader: Reader, last: Solution | AssemblySolution) -> LoadHisto
         replace(last.contact, **{name: column[k].copy() for name, column in columns.items()}, status=status[k].copy())
         for k in range(len(rows))
     ]
-    ends = _read_ends(reader, last, asked, tables)
+    ends = _read_ends(reader, last, scene, tables)
     steps = tuple(
         LoadStep(
             work=StepWork(**{name: row[name] for name in _WORK}),
@@ -120,19 +120,19 @@ def read_history(reader: Reader, last: Solution | AssemblySolution) -> LoadHisto
         )
         for k, row in enumerate(rows)
     )
-    return LoadHistory(asked, int(reader.attributes("steps")["n_steps"]), steps)
+    return LoadHistory(scene, int(reader.attributes("steps")["n_steps"]), steps)
 
 
 def _write_ends(group: h5py.Group, ends: Sequence[Any]) -> None:
     """Write the ends of steps, which are all solutions or all solutions of assemblies, into a group."""
     certificates = [end.certificate.as_dict() for end in ends]
     write_table(group.create_group("certificate"), columns_of(certificates, floats=CERTIFICATE_ENTRIES))
-    rows = [{"step": k, **each.as_dict()} for k, end in enumerate(ends) for each in end.transitions]
+    rows = [{"step": k, **transition.as_dict()} for k, end in enumerate(ends) for transition in end.transitions]
     write_table(group.create_group("transitions"), columns_of(rows, **TRANSITION_COLUMNS, integers=("step",)))
-    for number, body in enumerate(zip(*(end.solved_bodies for end in ends), strict=True)):
+    for number, states in enumerate(zip(*(end.solved_bodies for end in ends), strict=True)):
         for name in _FIELDS:
-            group[f"bodies/{number}/{name}"] = np.stack([getattr(own.boundary, name).ravel() for own in body])
-        group[f"bodies/{number}/energy"] = np.array([own.energy for own in body])
+            group[f"bodies/{number}/{name}"] = np.stack([getattr(state.boundary, name).ravel() for state in states])
+        group[f"bodies/{number}/energy"] = np.array([state.energy for state in states])
     assemblies = [end for end in ends if isinstance(end, AssemblySolution)]
     if assemblies:
         group["directions"] = np.stack([end.contact_directions.ravel() for end in assemblies])
@@ -146,24 +146,24 @@ def _write_ends(group: h5py.Group, ends: Sequence[Any]) -> None:
 def _read_ends(
     reader: Reader,
     last: Solution | AssemblySolution,
-    asked: Scene | Assembly,
+    stated: Scene | Assembly,
     tables: Sequence[ContactTable],
 ) -> list[Solution | AssemblySolution]:
-    """Read what `_write_ends` wrote; what is not known of each step is that of the result in the file."""
+    """Read what `_write_ends` wrote; all else of each step is taken from the result in the file."""
     n = len(tables)
     rows = rows_of(reader.table("steps/certificate", floats=CERTIFICATE_ENTRIES))
     transitions = _read_transitions(reader, n)
     bodies = [_read_body(reader, f"steps/bodies/{number}", body, n) for number, body in enumerate(last.solved_bodies)]
     if len(rows) != n:
         raise InputError(f"{len(rows)} certificates for {n} steps")
-    if isinstance(asked, Assembly) != isinstance(last, AssemblySolution):
+    if isinstance(stated, Assembly) != isinstance(last, AssemblySolution):
         raise InputError("the steps are not those of the result")
-    scenes: Sequence[Any] = load_steps(cast(Any, asked))
+    scenes: Sequence[Any] = load_steps(cast(Any, stated))
     names = _OF_ASSEMBLIES if isinstance(last, AssemblySolution) else ()
     columns = {name: reader.floats(f"steps/{name}") for name in names}
     ends: list[Solution | AssemblySolution] = []
     for k, (scene, table, row) in enumerate(zip(scenes[:n], tables, rows, strict=True)):
-        own: dict[str, Any] = {
+        entries: dict[str, Any] = {
             "status": Status.CONVERGED,
             "message": Status.CONVERGED.value,
             "certificate": Certificate(**row),
@@ -172,13 +172,13 @@ def _read_ends(
             "loading": None,
         }
         if isinstance(last, Solution):
-            own["boundary"], own["energy"] = bodies[0][k]
-            own["force_normal"] = float(np.sum(-table.weight * table.sigma_n))
-            own["force_tangential"] = float(np.sum(table.weight * table.sigma_t))
-            ends.append(replace(last, scene=scene, **own))
+            entries["boundary"], entries["energy"] = bodies[0][k]
+            entries["force_normal"] = float(np.sum(-table.weight * table.sigma_n))
+            entries["force_tangential"] = float(np.sum(table.weight * table.sigma_t))
+            ends.append(replace(last, scene=scene, **entries))
         else:
             numbers = {name: column[k] for name, column in columns.items()}
-            ends.append(_assembly_end(last, scene, [body[k] for body in bodies], numbers, own))
+            ends.append(_assembly_end(last, scene, [body[k] for body in bodies], numbers, entries))
     return ends
 
 
@@ -192,7 +192,7 @@ def _assembly_end(
     assembly = step.with_contacts(last.assembly.contacts) if step.touching else step
     scenes = {body.name: assembly.scene_of(body) for body in assembly.placed_bodies}
     bound = numbers["friction_bound"]
-    contact_names = [own.name for own in last.contacts]
+    contact_names = [contact.name for contact in last.contacts]
     return replace(
         last,
         assembly=assembly,
@@ -203,13 +203,13 @@ def _assembly_end(
         contact_directions=numbers["directions"].reshape(-1, 2).copy(),
         friction_bound=None if np.isnan(bound).all() else bound.copy(),
         contacts=tuple(_rows(numbers["contacts"], contact_names, ContactForce)),
-        rigid={own.name: own for own in _rows(numbers["rigid"], last.rigid, RigidResult)},
+        rigid={body.name: body for body in _rows(numbers["rigid"], last.rigid, RigidResult)},
         **common,
     )
 
 
 def _read_transitions(reader: Reader, n_steps: int) -> list[tuple[Transition, ...]]:
-    """Return the places of change of each step."""
+    """Return the transitions of each step."""
     rows = rows_of(reader.table("steps/transitions", **TRANSITION_COLUMNS, integers=("step",)))
     return [tuple(Transition.of(row) for row in rows if row["step"] == k) for k in range(n_steps)]
 

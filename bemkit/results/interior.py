@@ -56,7 +56,7 @@ def whole_boundary(solution: SolvedBody) -> tuple[BoundarySpace, FloatArray, Ele
     displacement = reflected_to_whole(half_space, space, boundary.displacement)
     has_dofs = len(boundary.traction_dofs) > mesh.n_elements
     tractions, half_tractions = (
-        ElementwiseSpace(own.traction_space(each) if has_dofs else ConstantSpace(each))
-        for own, each in ((of_whole, mesh.whole), (discretisation, mesh))
+        ElementwiseSpace(d.traction_space(m) if has_dofs else ConstantSpace(m))
+        for d, m in ((of_whole, mesh.whole), (discretisation, mesh))
     )
     return space, displacement, tractions, reflected_to_whole(half_tractions, tractions, boundary.traction_dofs)

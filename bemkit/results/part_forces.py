@@ -1,4 +1,4 @@
-"""What people ask of a part or a contact: forces, moment, contact length, peak pressure, largest slip."""
+"""Resultants of a part or a contact: forces, moment, contact length, peak pressure, largest slip."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ class RigidResult(PartForce):
 
 @dataclass(frozen=True)
 class ContactForce(PartForce):
-    """What a contact transmits; forces and moment are those on the body whose nodes carry the multipliers.
+    """Forces and sizes of a contact; forces and moment act on the body whose nodes carry the multipliers.
 
     Parameters
     ----------
@@ -168,15 +168,15 @@ def nodal_resultants(table: ContactTable, frame: FloatArray, acting_at: FloatArr
     moments = acting_at[:, 0] * forces[:, 1] - acting_at[:, 1] * forces[:, 0]
     rows = {part: table.rows(part) for part in table.parts}
     return tuple(
-        PartForce(part, float(forces[own, 0].sum()), float(forces[own, 1].sum()), float(moments[own].sum()))
-        for part, own in rows.items()
+        PartForce(part, float(forces[nodes, 0].sum()), float(forces[nodes, 1].sum()), float(moments[nodes].sum()))
+        for part, nodes in rows.items()
     )
 
 
 def contact_forces(
     table: ContactTable, resultants: Sequence[PartForce], transitions: Sequence[Transition]
 ) -> tuple[ContactForce, ...]:
-    """Say what each contact transmits.
+    """Return the forces and sizes of each contact.
 
     Parameters
     ----------
@@ -193,31 +193,29 @@ def contact_forces(
 
 
 def contact_sizes(table: ContactTable, part: str, transitions: Sequence[Transition]) -> dict[str, float]:
-    """Return what `ContactForce` says of a contact besides its resultant."""
-    own = table.rows(part)
-    closed = own & (table.status != NodeStatus.SEPARATED)
+    """Return the entries of `ContactForce` besides the resultant."""
+    nodes = table.rows(part)
+    closed = nodes & (table.status != NodeStatus.SEPARATED)
     return {
-        "force_normal": -float(table.weight[own] @ table.sigma_n[own]),
-        "force_tangential": float(table.weight[own] @ table.sigma_t[own]),
+        "force_normal": -float(table.weight[nodes] @ table.sigma_n[nodes]),
+        "force_tangential": float(table.weight[nodes] @ table.sigma_t[nodes]),
         "contact_length": _contact_length(table, part, transitions),
-        "peak_pressure": float(np.max(-table.sigma_n[own], initial=0.0)),
+        "peak_pressure": float(np.max(-table.sigma_n[nodes], initial=0.0)),
         "largest_slip": float(np.abs(table.u_t[closed]).max(initial=0.0)),
     }
 
 
 def _contact_length(table: ContactTable, part: str, transitions: Sequence[Transition]) -> float:
     """Return the length of the pieces of a part, between its ends and transitions, whose nodes are closed."""
-    own = table.rows(part)
-    s, half = table.s[own], 0.5 * table.weight[own]
-    is_closed = table.status[own] != NodeStatus.SEPARATED
-    begin = max(float(s[0] - half[0]), 0.0)
-    total, length = float(table.weight[own].sum()), 0.0
-    places = [each for each in transitions if each.part == part and "separated" in (each.from_status, each.to_status)]
-    inside, last = bool(is_closed[0]), begin
-    for place in places:
-        if inside:
-            length += place.s - last
-        inside, last = place.to_status != "separated", place.s
-    if inside:
+    nodes = table.rows(part)
+    weights = table.weight[nodes]
+    begin, total, length = max(float(table.s[nodes][0] - 0.5 * weights[0]), 0.0), float(weights.sum()), 0.0
+    is_inside, last = bool(table.status[nodes][0] != NodeStatus.SEPARATED), begin
+    for transition in transitions:
+        if transition.part == part and "separated" in (transition.from_status, transition.to_status):
+            if is_inside:
+                length += transition.s - last
+            is_inside, last = transition.to_status != "separated", transition.s
+    if is_inside:
         length += begin + total - last
     return min(length, total)

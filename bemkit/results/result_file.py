@@ -99,7 +99,13 @@ def check_result_target(path: str | Path) -> Path:
 
 
 def write_result(path: str | Path, solution: Solution | AssemblySolution) -> None:
-    """Write a solution to an HDF5 file, replacing an older result of that name at once or not at all.
+    """Write a solution to an HDF5 file; an older result of that name is replaced as a whole, or not at all.
+
+    Parameters
+    ----------
+    path : str or Path
+        Of the file, usually ``.h5``.
+    solution : Solution or AssemblySolution
 
     Raises
     ------
@@ -126,6 +132,11 @@ def write_result(path: str | Path, solution: Solution | AssemblySolution) -> Non
 
 def read_result(path: str | Path) -> Solution | AssemblySolution:
     """Read a solution from a result file.
+
+    Parameters
+    ----------
+    path : str or Path
+        Of a file written by `write_result`, `run_to_file` or ``bemkit run -o``.
 
     Returns
     -------

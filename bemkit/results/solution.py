@@ -32,9 +32,9 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Solution(SolvedProblem, SolvedBody):
-    """What `bemkit.run` returns and a result file holds.
+    """The solution of a scene, as `bemkit.run` returns it and result files hold it.
 
-    How it was solved is said by the entries of `SolvedProblem`.
+    Status, certificate, contact table and history are entries of `SolvedProblem`.
 
     Parameters
     ----------
@@ -90,16 +90,17 @@ class Solution(SolvedProblem, SolvedBody):
 
     @cached_property
     def estimated_local_traction_error(self) -> float | None:
-        """Estimated largest error of the tractions of a half-plane on an element; None of another body.
+        """Estimated largest error of the tractions of a half-plane on an element; None for another body.
 
-        Relative to the traction there or to the mean of all, whichever is larger, and without the worst elements on an
-        equally small share of what carries tractions: at infinite ones no element is right.
+        Relative to the traction on the element or to the mean of all, whichever is larger. The worst elements are left
+        out, on a share of the loaded length no larger than the error itself: where tractions are infinite no element is
+        right.
         """
         return None if self.surface_errors is None else self.surface_errors.largest
 
     @property
     def stated(self) -> Scene:
-        """What was asked: the scene, with all its load steps."""
+        """The scene that was solved, with all its load steps."""
         return self.scene if self.loading is None else cast(Scene, self.loading.asked)
 
     @property
@@ -124,7 +125,7 @@ class Solution(SolvedProblem, SolvedBody):
 
     @cached_property
     def contacts(self) -> tuple[ContactForce, ...]:
-        """What each contact part feels of its obstacle."""
+        """The forces on each contact part, with contact length, peak pressure and largest slip."""
         from bemkit.results.part_forces import contact_forces
 
         parts = {force.name: force for force in self.part_forces}

@@ -1,4 +1,4 @@
-"""Fields on the boundary of a solved body, and what is estimated from them."""
+"""Fields on the boundary of a solved body, and the errors estimated from them."""
 
 from __future__ import annotations
 
@@ -78,7 +78,7 @@ class BoundaryFields:
 
 
 _FREE_SHARE = 1e-16
-"""Share of the energy of a heated body that cannot expand at all, below which a body counts as free to expand."""
+"""Share of the energy of a heated body that cannot expand at all, up to which a body counts as free to expand."""
 
 
 _ROUND_OFF = 1e-13
@@ -87,7 +87,7 @@ that only move as a whole."""
 
 
 class SolvedBody:
-    """What one body alone and one of several have in common.
+    """Base of the results of a single body and of one of several bodies.
 
     Attributes
     ----------
@@ -114,17 +114,17 @@ class SolvedBody:
 
     @cached_property
     def map_boundary(self) -> BoundaryFields:
-        """The fields on the boundary less the particular solution: what elements stand for, and what has an error."""
+        """The fields on the boundary less the particular solution, which has no discretisation error."""
         if self.particular is None:
             return self.boundary
-        own, mesh = self.boundary, self.mesh.unit
+        total, mesh = self.boundary, self.mesh.unit
         means = self.particular.tractions(ConstantSpace(mesh))[:, 0]
         dofs = means
-        if len(own.traction_dofs) > len(means):
+        if len(total.traction_dofs) > len(means):
             dofs = self.particular.tractions(self.scene.discretisation.traction_space(mesh)).reshape(-1, 2)
-        displacement = own.displacement - self.particular.displacement(own.points)
+        displacement = total.displacement - self.particular.displacement(total.points)
         return replace(
-            own, displacement=displacement, traction=own.traction - means, traction_dofs=own.traction_dofs - dofs
+            total, displacement=displacement, traction=total.traction - means, traction_dofs=total.traction_dofs - dofs
         )
 
     @cached_property
@@ -193,7 +193,10 @@ class SolvedBody:
 
     @property
     def error_unit(self) -> float:
-        """What squared errors in the energy norm are measured by [J/m]: a(u, u), unless heat expands a free body."""
+        """Energy [J/m] to which squared errors are relative: a(u, u).
+
+        At least a share of the energy that heat would cause if the body could not expand.
+        """
         held = 0.0 if self.particular is None else _FREE_SHARE * self.particular.held_energy
         return 2.0 * max(self.energy, held)
 

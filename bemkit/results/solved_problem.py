@@ -1,4 +1,4 @@
-"""What results of one body and of several have in common: how the solve ended, and all steps that led there."""
+"""Base of the results of one body and of several: how the solve ended, and all steps on the way."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class SolvedProblem(ShownInNotebooks):
-    """How a scene or an assembly was solved.
+    """Status, certificate, contact table and history of a solved scene or assembly.
 
     Parameters
     ----------
@@ -49,15 +49,15 @@ class SolvedProblem(ShownInNotebooks):
         Of each stage of the run, and of all.
     plan : Plan
     work : OperationCounts
-        What was computed; equal to ``plan.work`` if all load steps converged.
+        Counts of integrals, factorisations and solves; equal to ``plan.work`` if all load steps converged.
     message : str
         How the solver ended.
     memory : mapping of str to int [bytes]
         Largest memory of all arrays in each stage of the run; empty unless `tracemalloc` was tracing.
     warnings : tuple of str
-        What is doubtful about the result, one sentence each; see `bemkit.results.warnings`.
+        Doubts about the result, one sentence each; see `bemkit.results.warnings`.
     loading : LoadHistory, optional
-        Of a load history the steps up to this one.
+        The steps up to this one; None without a load history.
     """
 
     status: Status
@@ -83,7 +83,7 @@ class SolvedProblem(ShownInNotebooks):
 
     @property
     def _problem(self) -> Scene | Assembly:
-        """What was solved; of a load history that of its last step."""
+        """The scene or assembly; of a load history that of its last step."""
         raise NotImplementedError
 
     @property
@@ -92,7 +92,7 @@ class SolvedProblem(ShownInNotebooks):
         raise NotImplementedError
 
     def _measured_between(self, motion: SlipHistory | None) -> dict[str, BetweenNodes]:
-        """Return what is measured between the nodes of each contact, with their slip for laws that depend on it."""
+        """Return the violations between the nodes of each contact; `motion` is for laws that depend on slip."""
         raise NotImplementedError
 
     def corners_of(self, body: SolvedBody) -> tuple[SingularCorner, ...]:
@@ -104,21 +104,21 @@ class SolvedProblem(ShownInNotebooks):
         return 1
 
     def _sizes(self) -> dict[str, int]:
-        """Return what the summary counts besides elements and contact nodes."""
+        """Return further counts of the summary by name."""
         return {}
 
     def _parts(self) -> dict[str, Any]:
-        """Return what the summary says of bodies, parts and contacts."""
+        """Return the entries of the summary on bodies, parts and contacts."""
         raise NotImplementedError
 
     @property
     def is_converged(self) -> bool:
-        """Whether the result is what was asked for: certified, and as accurate as an accuracy demands."""
+        """Whether the result is certified and, if an accuracy was asked for, as accurate."""
         return self.status is Status.CONVERGED
 
     @property
     def is_certified(self) -> bool:
-        """Whether contact, friction and equilibrium hold on the mesh, be it fine enough for the accuracy or not."""
+        """Whether contact, friction and equilibrium hold on the mesh, even if it is too coarse for the accuracy."""
         return self.status in (Status.CONVERGED, Status.ACCURACY_NOT_REACHED)
 
     def at_step(self, number: int) -> Self:
@@ -171,7 +171,7 @@ class SolvedProblem(ShownInNotebooks):
 
     @property
     def contact_traction_size(self) -> float:
-        """L2 norm of the contact tractions of all bodies [Pa m^(1/2)]: those between two bodies count on either."""
+        """L2 norm of the contact tractions of all bodies [Pa m^(1/2)]; those between two bodies count for both."""
         table = self.contact
         squared = table.weight * (table.sigma_n**2 + table.sigma_t**2)
         return float(np.sqrt(sum(self._n_sides(name) * squared[table.rows(name)].sum() for name in table.parts)))
@@ -193,7 +193,7 @@ class SolvedProblem(ShownInNotebooks):
 
     @cached_property
     def between_nodes(self) -> BetweenNodes | None:
-        """Largest violations of the contact conditions between the nodes, of which the certificate says nothing.
+        """Largest violations of the contact conditions between the nodes, which the certificate does not measure.
 
         None without contact.
         """
@@ -201,7 +201,7 @@ class SolvedProblem(ShownInNotebooks):
 
     @cached_property
     def contacts_between_nodes(self) -> dict[str, BetweenNodes]:
-        """The same of each contact, by the name in the contact table."""
+        """Largest violations between the nodes of each contact, by its name in the contact table."""
         return self._measured_between(None if self.loading is None else self.loading.motion)
 
     @property
@@ -210,9 +210,9 @@ class SolvedProblem(ShownInNotebooks):
         return WhenAsked.held(self, "warnings")
 
     def with_warnings(self, warnings: tuple[str, ...] | Callable[[Any], tuple[str, ...]]) -> Self:
-        """Return the same solution with other warnings, and with all that has been estimated of it.
+        """Return the same solution, with what it has computed, and other warnings.
 
-        If a function of the solution is given, it is called when somebody asks for the warnings.
+        A function of the solution is called when the warnings are first read.
         """
         result = copy(self)
         object.__setattr__(result, "warnings", warnings)
@@ -275,16 +275,16 @@ class SolvedSteps(ShownInNotebooks, tuple[AnySolution, ...]):
 
 
 def with_totals(result: AnySolution, solutions: Sequence[AnySolution], names: Sequence[str]) -> AnySolution:
-    """Return a solution with the steps, linear solves, times and memory of all that led to it, in their order.
+    """Return a solution with the steps, linear solves, times and memory of all solutions on the way, in their order.
 
-    The names say what each of them is, for the remarks of its steps: "load step 1 of 3".
+    `names`, such as "load step 1 of 3", are put before the messages of the steps of each.
     """
     records: list[StepRecord] = []
     for name, solution in zip(names, solutions, strict=True):
-        first, spent = (records[-1].step + 1, records[-1].linear_solves) if records else (0, 0)
+        first, solves_before = (records[-1].step + 1, records[-1].linear_solves) if records else (0, 0)
         for record in solution.history:
             message = "; ".join(filter(None, (name, record.message)))
-            total = spent + record.linear_solves
+            total = solves_before + record.linear_solves
             records.append(replace(record, step=first + record.step, linear_solves=total, message=message))
     return replace(
         with_times(result, solutions),
@@ -296,29 +296,29 @@ def with_totals(result: AnySolution, solutions: Sequence[AnySolution], names: Se
 
 
 def with_times(result: AnySolution, solutions: Sequence[AnySolution]) -> AnySolution:
-    """Return a solution with the times and the memory of all that led to it."""
+    """Return a solution with the total times and the largest memory of all solutions on the way."""
     return replace(
         result,
         warnings=result.unasked_warnings,
         timings={name: sum(solution.timings[name] for solution in solutions) for name in result.timings},
-        memory={name: max(each.memory.get(name, 0) for each in solutions) for name in result.memory},
+        memory={name: max(solution.memory.get(name, 0) for solution in solutions) for name in result.memory},
     )
 
 
 def following(
-    so_far: AnySolution | None, solution: AnySolution, asked: Scene | Assembly, number: int, n_steps: int
+    so_far: AnySolution | None, solution: AnySolution, stated: Scene | Assembly, number: int, n_steps: int
 ) -> AnySolution:
-    """Return a step of a load history with the records, solves, times, memory and warnings of all before it as well.
+    """Return a step of a load history with the records, solves, times, memory and warnings of all before it.
 
-    Of warnings that differ in numbers alone the last one stands for all; `at_step` keeps those of a step.
+    Of warnings that differ in numbers alone the last one is kept; `at_step` has those of a step.
 
     Parameters
     ----------
     so_far : Solution or AssemblySolution, optional
-        What this function returned for the step before.
+        The result of this function for the step before.
     solution : Solution or AssemblySolution
         Of the step.
-    asked : Scene or Assembly
+    stated : Scene or Assembly
         With all steps.
     number, n_steps : int
         Of the step, counted from 1, and of all.
@@ -328,15 +328,15 @@ def following(
     name = f"load step {number} of {n_steps}"
     before = () if so_far is None else (so_far,)
     total: AnySolution = with_totals(solution, [*before, solution], [*("" for _ in before), name])
-    warnings = unlike((*solution.warnings, *(text for each in before for text in each.warnings)))
-    loading = None if solution.loading is None else replace(solution.loading, asked=asked)
+    warnings = unlike((*solution.warnings, *(text for earlier in before for text in earlier.warnings)))
+    loading = None if solution.loading is None else replace(solution.loading, asked=stated)
     message = f"{name}: {solution.message}"
     whole: AnySolution = replace(total, message=message, warnings=warnings, loading=loading)
     return whole
 
 
 def unlike(texts: Iterable[str]) -> tuple[str, ...]:
-    """Return the first of all sentences that differ in numbers, and in what else these count, alone."""
+    """Return sentences without those that differ from an earlier one in numbers and plurals alone."""
     first: dict[str, str] = {}
     for text in texts:
         kind = re.sub(r", and \d+ more [a-z]+ like it|(?<=node)s|\d+(\.\d+)?(e[-+]?\d+)?", "", text)

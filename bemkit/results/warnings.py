@@ -1,4 +1,4 @@
-"""What a solution that is certified may still leave in doubt, in sentences for its reader."""
+"""Doubts about a certified solution, in sentences for its reader."""
 
 from __future__ import annotations
 
@@ -27,14 +27,14 @@ if TYPE_CHECKING:
 LARGEST_ERROR = 0.05
 """Estimated relative error above which a solution carries a warning."""
 LARGEST_SHARE_ALONE = 0.2
-"""Share of the boundary without an estimate above which the estimate of the whole says too little."""
+"""Share of the boundary without an estimate above which the estimate of the whole is unreliable."""
 LARGEST_TURN = 50.0
 """Degrees by which the boundary may turn on one element. A ring of quadratic elements of 90 degrees is 35 % off while
-the estimate says 3 %; of 45 degrees it says enough."""
+the estimate is 3 %; of 45 degrees it is reliable."""
 LARGEST_STRAIN = 0.1
 """Strain or rotation [rad] of a share of the boundary above which displacements are not small."""
 STRAINED_SHARE = 0.05
-"""That share; corners and ends of parts are strained without bound in theory, but over ever shorter lengths."""
+"""That share. In theory strains at corners and ends of parts have no bound, but on short lengths only."""
 LARGEST_PENETRATION = 0.2
 """Penetration between the nodes, as `BetweenNodes` measures it, above which nodes do not feel the contact: a cylinder
 pressed by constant elements on a zone of six of them comes to that."""
@@ -46,17 +46,17 @@ the displacement that the contact force causes, above which contact is no longer
 FEWEST_NODES = 4
 """Contact nodes that resolve a zone: fewer tell neither its size nor its largest traction."""
 _CLOSED = 1e-9
-"""Share of the largest clearance that may be the round-off of none."""
+"""Clearance, relative to the largest one, up to which a node counts as closed: round-off of zero."""
 
 
 def find_warnings(solution: Solution | AssemblySolution) -> tuple[str, ...]:
-    """Say what is doubtful about a solution.
+    """Return the doubts about a solution.
 
     Returns
     -------
     tuple of str
-        One sentence for each doubt: what it is, its value and the remedy. Those of the plan come first. Of many alike
-        doubts about several bodies and contacts, the first.
+        One sentence for each doubt with its value and the remedy. Those of the plan come first. Of many doubts of one
+        kind about several bodies and contacts there are the first three.
     """
     if not solution.is_certified:
         return solution.plan.warnings
@@ -80,7 +80,7 @@ def find_warnings(solution: Solution | AssemblySolution) -> tuple[str, ...]:
         _hidden_overlaps(solution.contacts_between_nodes, solution.contact, solution.units, remedy),
     ]
     is_one = isinstance(solution, Solution)
-    return (*solution.plan.warnings, *chain(*(each if is_one else _first(list(each)) for each in doubts)))
+    return (*solution.plan.warnings, *chain(*(kind if is_one else _first(list(kind)) for kind in doubts)))
 
 
 def _first(doubts: list[str]) -> list[str]:
@@ -90,7 +90,7 @@ def _first(doubts: list[str]) -> list[str]:
 
 
 def _remedy(bodies: Iterable[SolvedBody]) -> str:
-    """Say what makes a solution better; meshes follow an accuracy only where errors are estimated and may be graded."""
+    """Return the remedy in words; an accuracy needs an error estimate and meshes that may be graded."""
     for body in bodies:
         is_periodic = body.mesh.surface is not None and body.mesh.surface.is_periodic
         if is_periodic or not body.scene.discretisation.estimates_error:
@@ -119,7 +119,7 @@ def _large(error: float | None, remedy: str) -> Iterator[str]:
 
 
 def _error(solution: Solution) -> Iterator[str]:
-    """Doubt an estimated error that is large, and one that could not be made."""
+    """Doubt a large estimated error, and an error that could not be estimated."""
     discretisation = solution.scene.discretisation
     if not discretisation.estimates_error:
         return
@@ -130,7 +130,7 @@ def _error(solution: Solution) -> Iterator[str]:
     yield from _large(error, _remedy((solution,)))
     if solution.coefficient_errors is not None:
         return  # elements of high degree are judged by themselves
-    # elements without a neighbour on their piece: their strains meet no others
+    # elements without a neighbour on their piece have no jumps of strains
     whole = solution.mesh.whole
     is_alone = break_nodes(whole)[whole.elements].all(axis=1)
     if (share := whole.lengths[is_alone].sum() / whole.lengths.sum()) > LARGEST_SHARE_ALONE:
@@ -152,7 +152,7 @@ def _error(solution: Solution) -> Iterator[str]:
 
 
 def _turned(solution: Solution) -> Iterator[str]:
-    """Doubt constant elements without slopes, which take rotation for strain, where the body turns more than that."""
+    """Doubt constant elements without slopes, which take rotation for strain, if the rotation is larger."""
     discretisation, mesh = solution.scene.discretisation, solution.mesh
     if discretisation.keeps_rotations:
         return
@@ -239,11 +239,11 @@ def _narrow_zones(contact: ContactTable, smooth: Collection[str], remedy: str) -
     is_closed = (words != "separated") & ~is_apart
     is_word = {word: words == word for word in ("stick", "slip")}
     for part in contact.parts:
-        own = contact.rows(part)
-        kinds = {"contact": own & is_closed}
+        is_of_part = contact.rows(part)
+        kinds = {"contact": is_of_part & is_closed}
         if part not in smooth:
-            kinds |= {word: own & chosen for word, chosen in is_word.items()}
-        reported = np.zeros(own.size, bool)
+            kinds |= {word: is_of_part & chosen for word, chosen in is_word.items()}
+        reported = np.zeros(is_of_part.size, bool)
         for kind, chosen in kinds.items():
             narrow = [zone for zone in _zones(contact, chosen) if zone.size < FEWEST_NODES]
             narrow = [zone for zone in narrow if not reported[zone].all()]
@@ -255,7 +255,7 @@ def _narrow_zones(contact: ContactTable, smooth: Collection[str], remedy: str) -
 def _hidden_overlaps(
     contacts: Mapping[str, BetweenNodes], table: ContactTable, units: UnitNames | None, remedy: str
 ) -> Iterator[str]:
-    """Doubt contacts whose sides are in each other between the nodes, by more than what contact forces displace."""
+    """Doubt contacts whose sides overlap between the nodes, by a share of the displacement by contact forces."""
     is_pressed = bool(table.sigma_n.any() or table.sigma_t.any())
     length = (
         "the displacement that contact forces cause" if is_pressed else "how far bodies move, without contact forces"

@@ -1,4 +1,4 @@
-"""Where zones of one contact status end, by the elements of the boundaries there."""
+"""Where zones of one contact status end: elements and places on them."""
 
 from __future__ import annotations
 
@@ -27,9 +27,9 @@ _MOST_STEPS = 20
 
 
 class ZoneEnd(NamedTuple):
-    """Where zones of one status end: in which element, and at which fraction of its length.
+    """The end of a zone of one status: the element, and the fraction of its length.
 
-    The zone length says what the element is short or long compared with [m].
+    `zone_length` [m] is the length to which that of the element is compared.
     """
 
     mesh: BoundaryMesh
@@ -40,14 +40,14 @@ class ZoneEnd(NamedTuple):
 
     @property
     def distance(self) -> float:
-        """From the nearer end of the element [m]."""
+        """Distance from the nearer end of the element [m]."""
         return float(min(self.fraction, 1.0 - self.fraction) * self.mesh.lengths[self.element])
 
 
 def zone_end(mesh: BoundaryMesh, contact: ContactTable, transition: Transition) -> ZoneEnd:
-    """Return where a transition is on a body alone.
+    """Return the place of a transition on a single body.
 
-    Zones are as long as their part; on a half-plane, of which a part may be any strip, as half of what touches there.
+    The zone length is that of the part; on a half-plane, where a part may be any strip, half of the contact length.
     """
     elements = along_boundary(mesh, mesh.part(transition.part))
     ends = np.cumsum(mesh.lengths[elements])
@@ -94,10 +94,10 @@ class Side:
         """Yield the points where another side that lies on this one ends inside it, and where they are on this one."""
         for point in other.ends():
             place = self.near(point)
-            here = self.mesh.points(np.array([place.element]), np.array([2.0 * place.fraction - 1.0]))[0, 0]
+            foot = self.mesh.points(np.array([place.element]), np.array([2.0 * place.fraction - 1.0]))[0, 0]
             near = LYING_ON * min(self.length, other.length)
-            is_inside = all(np.linalg.norm(end - here) > near for end in self.ends())
-            if is_inside and np.linalg.norm(point - here) <= near:
+            is_inside = all(np.linalg.norm(end - foot) > near for end in self.ends())
+            if is_inside and np.linalg.norm(point - foot) <= near:
                 yield point, place
 
     def elements_at(self, point: FloatArray) -> IntArray:
@@ -115,13 +115,13 @@ def _nearest(mesh: BoundaryMesh, elements: IntArray, point: FloatArray) -> tuple
     chord = end - start
     along = np.clip(np.sum((point - start) * chord, axis=1) / np.sum(chord**2, axis=1), 0.0, 1.0)
     k = int(np.argmin(norms(start + along[:, None] * chord - point)))
-    own, fraction = elements[k : k + 1], float(along[k])
-    if not mesh.is_straight[own[0]]:
+    element, fraction = elements[k : k + 1], float(along[k])
+    if not mesh.is_straight[element[0]]:
         for _ in range(_MOST_STEPS):
             xi = np.array([2.0 * fraction - 1.0])
-            tangent = mesh.derivatives(own, xi)[0, 0]
-            step = 0.5 * float((point - mesh.points(own, xi)[0, 0]) @ tangent / (tangent @ tangent))
+            tangent = mesh.derivatives(element, xi)[0, 0]
+            step = 0.5 * float((point - mesh.points(element, xi)[0, 0]) @ tangent / (tangent @ tangent))
             fraction = min(max(fraction + step, 0.0), 1.0)
             if abs(step) <= np.finfo(float).eps:
                 break
-    return int(own[0]), fraction
+    return int(element[0]), fraction

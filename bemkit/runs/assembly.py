@@ -78,7 +78,7 @@ def run_assembly_history(
 ) -> SolvedSteps[AssemblySolution]:
     """Solve assemblies that follow each other in time, slip counting from the end of the step before.
 
-    Every body is factored once for all steps. Where the jump to a load stalls, it is gone in halves; see
+    Every body is factored once for all steps. Where the jump to a load stalls, it is halved; see
     `bemkit.runs.load_path.reach`.
 
     Parameters

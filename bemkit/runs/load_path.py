@@ -19,22 +19,22 @@ from bemkit.solvers.active_sets import NodeStatus
 from bemkit.solvers.base import ContactSolution, ContactSolver, Status, StepRecord, solve
 
 MOST_HALVINGS = 6
-"""Times that an increment is halved before a step counts as out of reach."""
+"""How often an increment is halved before a step is given up."""
 MOST_LAWS = 60
 """Solves of one increment under a law that depends on its slip."""
 _SETTLED = 1e-10
-"""Change of such a law, relative to the largest bound, that counts as none: below the tolerance of the certificate."""
+"""Change of such a law, relative to the largest bound, up to which it has converged."""
 
 _HOPELESS = (Status.UNSOLVABLE_LOAD, Status.TOO_FAR, Status.TOO_COSTLY)
-"""What smaller increments do not change."""
+"""Failures that smaller increments do not change."""
 _UNDECIDED = (Status.MAX_STEPS, Status.STALLED, Status.CYCLING, Status.SINGULAR)
-"""What may be the driver's failure or a collapse."""
+"""Failures that may be the driver's, or a collapse."""
 
 Callback = Callable[[StepRecord], None] | None
 
 
 class StepModel(Protocol):
-    """A model as its load history sees it: `Model` and `AssembledModel` are some."""
+    """The members of a model that a load history needs; `Model` and `AssembledModel` have them."""
 
     @property
     def problem(self) -> ContactProblem:
@@ -68,7 +68,7 @@ class Standing:
     gap : (n_contact,) array
         Dimensionless.
     acts : callable
-        () -> what `StepModel.acting` returns there; a single zero each at rest.
+        () -> the forces and displacements of `StepModel.acting` there; a single zero each at rest.
     """
 
     state: ContactState
@@ -83,7 +83,7 @@ class Standing:
 
     @classmethod
     def at_rest(cls, model: StepModel) -> Standing:
-        """Return what is before any load: obstacles that overlap with the body have not come yet."""
+        """Return the state before any load, with obstacles that overlap with the body still at its surface."""
         n = model.problem.n_contact
         return cls(_no_state(n), SlipHistory.at_rest(n), np.maximum(model.problem.gap, 0.0), _nothing)
 
@@ -93,7 +93,7 @@ class Standing:
         return cls(state, motion, model.problem.gap, partial(model.acting, state))
 
     def work_from(self, before: Standing, model: StepModel) -> StepWork:
-        """Return the work from another end to this one, by the trapezoidal rule."""
+        """Return the work from the end of the increment before to this one, by the trapezoidal rule."""
         units = model.units
         unit = units.stress * units.displacement * units.length
         weights = 0.5 * unit * model.problem.body.weights
@@ -101,24 +101,24 @@ class Standing:
         moved = self.state.displacement - before.state.displacement
         with np.errstate(invalid="ignore"):  # infinite gaps, whose nodes carry nothing
             approached = np.where(np.isfinite(self.gap), self.gap - before.gap, 0.0)
-        # a node that opens or closes is carried by other forces for a part of its way
+        # at a node that opens or closes the traction is not that of the trapezoidal rule: not counted as dissipation
         is_held = (before.state.traction != 0.0).any(axis=1) & (self.state.traction != 0.0).any(axis=1)
         of_friction = -sigma[:, 1] * moved[:, 1]
-        taken = max(float(of_friction[is_held].sum()), 0.0)
+        dissipation = max(float(of_friction[is_held].sum()), 0.0)
         along_slip = 2.0 * weights * self.state.traction[:, 1] * moved[:, 1]
         (forces_before, displacements_before), (forces, displacements) = before.acting, self.acting
         of_forces = 0.5 * float((forces_before + forces) @ (displacements - displacements_before))
         return StepWork(
             external_work=of_forces + float(sigma[:, 0] @ approached),
-            dissipation=taken,
-            increment_work=float(sigma[:, 0] @ (approached - moved[:, 0])) + float(of_friction.sum()) - taken,
+            dissipation=dissipation,
+            increment_work=float(sigma[:, 0] @ (approached - moved[:, 0])) + float(of_friction.sum()) - dissipation,
             friction_gain=float(np.maximum(along_slip, 0.0).sum()),
         )
 
 
 @dataclass(frozen=True, eq=False)
 class ReachedStep:
-    """Where the increments to a load step have led.
+    """Result of the increments to a load step.
 
     Parameters
     ----------
@@ -138,12 +138,12 @@ class ReachedStep:
 
     @property
     def end(self) -> Standing:
-        """Of the last increment that converged."""
+        """The end of the last increment that converged."""
         return (self.path.start, *self.ends)[-1]
 
     @property
     def work(self) -> StepWork:
-        """Up to there."""
+        """The work up to that end."""
         stands = pairwise((self.path.start, *self.ends))
         return sum((end.work_from(before, self.path.model) for before, end in stands), StepWork())
 
@@ -184,7 +184,7 @@ class Path:
 
 
 def reach(path: Path, guess: ContactState | None = None, callback: Callback = None) -> ReachedStep:
-    """Go from the load of one step to that of the next one, in halves where a jump does not converge.
+    """Go from the load of one step to that of the next one, in smaller increments where a jump does not converge.
 
     Parameters
     ----------
@@ -196,16 +196,16 @@ def reach(path: Path, guess: ContactState | None = None, callback: Callback = No
     Returns
     -------
     ReachedStep
-        Converged under the load of the step, or how the last increment failed, the smallest that is tried. After an
-        increment that converges the next one is twice as large.
+        Converged under the load of the step, or with the failure of the last and smallest increment. An increment that
+        fails is halved; after one that converges the next is twice as large.
 
     Notes
     -----
-    Loads that nothing can balance are found by the static programme before any step, see `bemkit.contact.solvability`,
+    Loads that nothing can balance are found by a linear programme before any step, see `bemkit.contact.solvability`,
     and are not approached. Loads that contact can balance make a convex set, so that without friction there is no
     collapse between two of them: an increment that fails has stalled. With Coulomb friction, whose slip does not
-    dilate, the programme is a bound from above: bodies may give way below it, and which of the two has happened is not
-    decided.
+    dilate, the programme gives an upper bound: bodies may give way below it, and this function does not decide which of
+    the two has happened.
     """
     reached, increment, end = 0.0, 1.0, path.start
     ends: tuple[Standing, ...] = ()
@@ -219,29 +219,29 @@ def reach(path: Path, guess: ContactState | None = None, callback: Callback = No
         words = "" if target == 1.0 and not records else f"increment to {target:.4g} of the step"
         recorder = _Recorder(records, words, callback)
         attempt = _attempt(path, problem, end, path.time_at(target), guess if is_first else end.state, recorder)
-        records, failure = attempt.result.history, attempt.result
-        if failure.is_converged:
-            end = path.standing(problem, target, failure.state, attempt.motion)
+        records, result = attempt.result.history, attempt.result
+        if result.is_converged:
+            end = path.standing(problem, target, result.state, attempt.motion)
             reached, ends, increment = target, (*ends, end), 2.0 * increment
             if reached == 1.0:
                 break
-            _ = end.acting  # now, while a compressed body still knows this response
-        elif is_first or failure.status in _HOPELESS or target - reached <= 0.5**MOST_HALVINGS:
+            _ = end.acting  # now, while a compressed body still holds this response
+        elif is_first or result.status in _HOPELESS or target - reached <= 0.5**MOST_HALVINGS:
             break
         else:
             increment = 0.5 * (target - reached)
-    words = failure.message
-    if failure.is_converged and len(ends) > 1:
+    words = result.message
+    if result.is_converged and len(ends) > 1:
         words += f" The jump to this load stalled; {len(ends)} increments in its place led there."
-    elif not is_first and failure.status in _UNDECIDED:
+    elif not is_first and result.status in _UNDECIDED:
         bound = "" if problem.law.is_frictionless else ", but friction may give way before that does"
         words = (
             f"{Status.LOAD_NOT_REACHED.value} Increments down to {target - reached:.2g} of the step led to "
             f"{reached:.3g} of it. The static programme finds no collapse under this load{bound}. The last increment "
-            f"ended {failure.status.name.lower().replace('_', ' ')}: {words}"
+            f"ended {result.status.name.lower().replace('_', ' ')}: {words}"
         )
-        failure = replace(failure, status=Status.LOAD_NOT_REACHED)
-    return ReachedStep(path, attempt.problem, replace(failure, message=words), ends)
+        result = replace(result, status=Status.LOAD_NOT_REACHED)
+    return ReachedStep(path, attempt.problem, replace(result, message=words), ends)
 
 
 @dataclass(frozen=True, eq=False)
@@ -271,7 +271,8 @@ def _attempt(
         motion = end.motion.followed(time, slip, result.node_status != NodeStatus.SEPARATED)
         if not law.needs_history:
             return _Attempt(present, result, motion)
-        bounds = [each.bound(np.minimum(result.state.sigma_n, 0.0)) for each in (present.law, law.at_slip(motion))]
+        sigma_n = np.minimum(result.state.sigma_n, 0.0)
+        bounds = [of_slip.bound(sigma_n) for of_slip in (present.law, law.at_slip(motion))]
         if np.abs(bounds[1] - bounds[0]).max(initial=0.0) <= _SETTLED * np.abs(bounds[0]).max(initial=0.0):
             return _Attempt(present, result, motion)
         start = result.state
@@ -293,35 +294,34 @@ class _Recorder:
 
     def solved(self, problem: ContactProblem, solver: ContactSolver, start: ContactState | None) -> ContactSolution:
         records = self.records
-        first, spent = (records[-1].step + 1, records[-1].linear_solves) if records else (0, 0)
+        first, solves_before = (records[-1].step + 1, records[-1].linear_solves) if records else (0, 0)
 
-        def following(record: StepRecord) -> StepRecord:
+        def renumbered(record: StepRecord) -> StepRecord:
             if not records and not self.words:
                 return record
             message = "; ".join(filter(None, (self.words, record.message)))
-            return replace(
-                record, step=first + record.step, linear_solves=spent + record.linear_solves, message=message
-            )
+            total = solves_before + record.linear_solves
+            return replace(record, step=first + record.step, linear_solves=total, message=message)
 
-        def told(record: StepRecord) -> None:
+        def report(record: StepRecord) -> None:
             if self.callback is not None:
-                self.callback(following(record))
+                self.callback(renumbered(record))
 
         if problem.n_contact:
-            result = solve(problem, solver, start=start, throw=False, callback=told)
+            result = solve(problem, solver, start=start, throw=False, callback=report)
         else:
             from bemkit.model.untouched_body import certified
 
-            result = certified(problem.body, told)
-        history = (*records, *(following(record) for record in result.history))
+            result = certified(problem.body, report)
+        history = (*records, *(renumbered(record) for record in result.history))
         steps = history[-1].step if history else 0
-        return replace(result, history=history, steps=steps, linear_solves=spent + result.linear_solves)
+        return replace(result, history=history, steps=steps, linear_solves=solves_before + result.linear_solves)
 
 
 def _acting(
     model: StepModel, before: StepModel | None, share: float, state: ContactState
 ) -> tuple[FloatArray, FloatArray]:
-    """Return what acts at a share of the way from the loads of a step before; it is affine in the loads."""
+    """Return `StepModel.acting` at a share of the way from the loads of the step before, in which it is affine."""
     forces, displacements = model.acting(state)
     if before is None:
         return forces, displacements

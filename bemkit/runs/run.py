@@ -29,13 +29,13 @@ if TYPE_CHECKING:
 
 
 _COARSEST, _RATIO = 1024, 16
-"""Elements that are solved for from cold, and by how many there are fewer on each coarser mesh of a large body."""
+"""Elements of the coarsest mesh of a large body, and the ratio of their numbers from one mesh to the next."""
 _LARGE = 5000
-"""Elements of a mesh that tells whether the equations of such a body are compressed."""
+"""Elements of the mesh whose plan decides whether the equations of such a body are compressed."""
 
 
 class LoadHistoryError(InputError):
-    """A load history where only a single load makes sense."""
+    """A load history was given where only a single load is possible."""
 
 
 @overload
@@ -64,23 +64,23 @@ def run(
     ----------
     scene : Scene or Assembly
     mesh : BoundaryMesh, optional
-        Of a single body: a mesh of one's own with the parts of the scene; by default the one the scene describes, or as
-        many as its accuracy needs.
+        For a single body: a mesh of your own with the parts of the scene. By default the mesh that the scene describes,
+        or meshes until its accuracy is reached.
     start : Solution, optional
-        Of a single body: where to start, on any mesh; see `bemkit.runs.nested.run_cascade`. By default every node
-        sticks; of large scenes on compressed equations a solution on a coarser mesh is the start. Where a scene has
-        several solutions the start chooses among them. Refused without contact, where there is only one.
+        For a single body: a solution to start from, on any mesh; see `bemkit.runs.nested.run_cascade`. By default every
+        node sticks; large scenes on compressed equations start from a solution on a coarser mesh. Where a scene has
+        several solutions the start chooses among them. An error without contact, where there is only one solution.
     callback : callable, optional
         Receives a record of every step as soon as it exists.
     executor : Executor, optional
-        Of several bodies: where these are assembled and factored, copies once. Any of `concurrent.futures`, or that of
-        a `distributed` client; by default here, in turn.
+        For several bodies: where they are assembled and factored, copies once. An executor of `concurrent.futures`, or
+        that of a `distributed` client; by default in this process, in turn.
 
     Returns
     -------
     Solution or AssemblySolution
-        Look at its status before you use it: a run that did not converge returns what it reached. Of a load
-        history this is the last step, with the linear solves and the records of all steps.
+        Look at its status before you use it: a run that did not converge returns its last state. Of a load history
+        this is the last step, with the linear solves and the records of all steps.
 
     Raises
     ------
@@ -111,10 +111,10 @@ def run(
 
 
 def _gain_by_cascade(scene: Scene) -> int:
-    """Return by what to divide the elements of coarser meshes that find nearly all of the contact, zero for none.
+    """Return the ratio of elements of a cascade of meshes, zero if the scene is solved on its mesh at once.
 
-    That pays where a contact step costs about as much as all the rest: of periodic half-planes, which have no matrices,
-    and of large bodies on compressed equations.
+    A cascade pays where a contact step costs about as much as the assembly: for periodic half-planes, which have no
+    matrices, and for large bodies on compressed equations.
     """
     outline = scene.shape.outline()
     if outline.surface is not None and not outline.surface.is_periodic:
@@ -135,8 +135,8 @@ def _run_assembly(
     callback: Callable[[StepRecord], None] | None,
     executor: Executor | None,
 ) -> AssemblySolution:
-    for name, given in (("mesh", mesh), ("start", start)):
-        if given is not None:
+    for name, value in (("mesh", mesh), ("start", start)):
+        if value is not None:
             raise InputError(f"{name} is given with an assembly of several bodies: leave it out")
     if assembly.mesh.accuracy is not None:
         from bemkit.runs.adaptive import run_assembly_adaptive
@@ -163,8 +163,7 @@ def run_steps(
 def run_probe(scene: Scene, *, n_starts: int = 8, mesh: BoundaryMesh | None = None) -> tuple[Solution, ...]:
     """Solve a scene from several starts and return the distinct solutions.
 
-    With Coulomb friction a scene may have more than one solution; which of them `run` returns is a matter of its
-    start.
+    With Coulomb friction a scene may have more than one solution; which of them `run` returns depends on its start.
 
     Parameters
     ----------
@@ -199,14 +198,15 @@ def run_probe(scene: Scene, *, n_starts: int = 8, mesh: BoundaryMesh | None = No
         if load is not None:
             raise UnsolvableSceneError(ONE_BODY.explained(model, load))
         clock = clock.closed(Stage.CONDENSE)
-        found = [with_energy_checked(model, result) for result in probe(model.problem, scene.solver, n_starts=n_starts)]
+        results = probe(model.problem, scene.solver, n_starts=n_starts)
+        results = tuple(with_energy_checked(model, result) for result in results)
         clock = clock.closed(Stage.SOLVE)
-        return tuple(solution_of(model, result, plan, clock) for result in found if result.is_converged)
+        return tuple(solution_of(model, result, plan, clock) for result in results if result.is_converged)
 
 
 @dataclass(frozen=True)
 class FailedRun:
-    """Stands in a list of solutions for a scene that has none.
+    """Entry of `run_all` for a scene that was refused.
 
     Parameters
     ----------
@@ -220,7 +220,7 @@ class FailedRun:
 
     @property
     def is_converged(self) -> bool:
-        """False, as of a solution that is none."""
+        """False."""
         return False
 
 

@@ -90,7 +90,7 @@ class ContactPair:
 
     @property
     def name(self) -> str:
-        """What the contact is called in results."""
+        """Name of the contact in results."""
         return " / ".join(self.sides)
 
     @property
@@ -100,7 +100,7 @@ class ContactPair:
 
     @property
     def elastic_parts(self) -> tuple[tuple[str, str], ...]:
-        """The same as names of body and part."""
+        """The elastic sides as pairs (body, part or side)."""
         return tuple(body_and_part(side) for side in self.elastic_sides)
 
     @property
@@ -111,7 +111,7 @@ class ContactPair:
 
 @dataclass(frozen=True)
 class Touching:
-    """Every two sides of different bodies that face each other are in contact, sides that are free as a whole.
+    """Puts every two free sides of different bodies that face each other in contact.
 
     Parameters
     ----------
@@ -160,8 +160,8 @@ class Assembly(Stated):
     law : FrictionLaw
         In all contacts that have no law of their own, with bodies and with rigid obstacles.
     load_factors : tuple of float
-        The short way to say a load history: all loads, given displacements and body forces that are not constant times
-        these numbers, at the times 1, 2, 3 and so on. Gaps and obstacles stay as they are.
+        A short form of load history: all loads, given displacements and body forces that are not constant times these
+        numbers, at the times 1, 2, 3 and so on. Gaps and obstacles stay as they are.
     steps : tuple of Step
         The load history: what changes from step to step; slip counts from the end of the step before.
     discretisation : Discretisation
@@ -211,8 +211,8 @@ class Assembly(Stated):
             raise InputError("bodies is empty: give at least one body")
         names = [*(body.name for body in self.placed_bodies), *(body.name for body in self.rigid)]
         check_names("bodies", names, "bodies")
-        own = {f"law of contact {pair.name!r}": self.law_of(pair) for pair in self.contacts}
-        check_laws({"law": self.law, **own}, self.steps)
+        laws = {f"law of contact {pair.name!r}": self.law_of(pair) for pair in self.contacts}
+        check_laws({"law": self.law, **laws}, self.steps)
         pairs = Counter(frozenset(pair.sides) for pair in self.contacts)
         for pair in self.contacts:
             if pairs[frozenset(pair.sides)] > 1:
@@ -239,12 +239,11 @@ class Assembly(Stated):
         for body in self.bodies:
             discretisation = self.discretisation if body.discretisation is None else body.discretisation
             if discretisation.needs_accuracy != self.discretisation.needs_accuracy:
-                own, others = (
-                    ("'hp'", "a fixed degree") if discretisation.needs_accuracy else ("a fixed degree", "'hp'")
-                )
+                kinds = ("a fixed degree", "'hp'")
+                of_body, of_assembly = kinds[::-1] if discretisation.needs_accuracy else kinds
                 raise InputError(
-                    f"body {body.name!r} has {own}, the assembly {others}: degrees rise for all bodies or for none: "
-                    "give the assembly alone a discretisation"
+                    f"body {body.name!r} has {of_body}, the assembly {of_assembly}: degrees rise for all bodies or for "
+                    "none: give the assembly alone a discretisation"
                 )
             if not discretisation.estimates_error:
                 raise InputError(
@@ -276,11 +275,11 @@ class Assembly(Stated):
             raise InputError(f"a contact names {side!r}: the bodies are {choices(body, list(self._by_name))}")
         placed = self._by_name[body]
         sides = self._side_names(placed)
-        if any(part == own.name for own in placed.parts) or not any(part in names for names in sides):
+        if any(part == stated.name for stated in placed.parts) or not any(part in names for names in sides):
             _ = placed.contact_part(part)
 
     def _side_names(self, body: Body) -> tuple[tuple[str, str], ...]:
-        """Return the name and the group of each side of a body; copies share them, for an outline checks itself."""
+        """Return the name and the group of each side of a body; copies share them, since making an outline is slow."""
         if id(body.shape) not in self._sides:
             self._sides[id(body.shape)] = tuple(
                 (side.name, side.group or side.name) for side in body.shape.outline().sides
@@ -331,18 +330,18 @@ class Assembly(Stated):
 
     @cached_property
     def _scenes(self) -> dict[tuple[object, ...], Scene]:
-        """What is said of bodies; copies share it."""
+        """The scenes of bodies; copies share one."""
         return {}
 
     def scene_of(self, body: Body) -> Scene:
-        """Return what is said of one placed body, in its own coordinates: sides in contact are free parts.
+        """Return the scene of one placed body, in which sides in contact are free parts.
 
-        Loads, given displacements and obstacles are those of the body in its place. Copies have one scene in common,
-        and so have bodies that are made of the same objects.
+        Its shape is in the coordinates of the body; loads, given displacements and obstacles are those in its place.
+        Copies share one scene, and so do bodies that are made of the same objects.
         """
         stated = (body.shape, body.mesh, body.discretisation, *body.parts, None, *body.body_forces)
         key = (
-            *(id(each) for each in stated),
+            *(id(entry) for entry in stated),
             body.material,
             self.contact_parts(body),
             lines_across(body, self.symmetry),

@@ -85,7 +85,7 @@ class Body:
         )
 
     def copied(self) -> Iterator[Body]:
-        """Yield the body in each of its places."""
+        """Yield each copy of the body, with a name and a placement of its own; the body itself without copies."""
         if self.copies is None:
             yield self
             return
@@ -98,7 +98,7 @@ class Body:
         Raises
         ------
         InputError
-            If there is none of that name, or something acts on it.
+            If there is none of that name, or it has a support, a load or an obstacle.
         """
         for part in self.parts:
             if part.name == name:
@@ -114,7 +114,7 @@ class Body:
 
 
 def lines_across(body: Body, symmetry: Symmetry | None) -> Symmetry | None:
-    """Return those of some symmetry lines that cross a placed body; None if there is none."""
+    """Return the symmetry lines that cross a placed body; None if none does."""
     if symmetry is None:
         return None
     low, high = _extent(body)
@@ -125,7 +125,7 @@ def lines_across(body: Body, symmetry: Symmetry | None) -> Symmetry | None:
 
 
 def check_place(body: Body, symmetry: Symmetry) -> None:
-    """Refuse a placed body that lies beyond a symmetry line, and one that a line crosses away from where it was drawn.
+    """Check that a body lies on the listed side of symmetry lines, and has no placement if a line crosses it.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""What acts inside the body: weight, rotation, temperature; frozen values in one consistent set of units."""
+"""Body forces: weight, rotation and temperature; frozen values in one consistent set of units."""
 
 from __future__ import annotations
 
@@ -25,9 +25,9 @@ class Gravity:
     density : float [kg/m^3]
         Positive.
     acceleration : (float, float) [m/s^2]
-        Of a falling body.
+        Acceleration of gravity, in the direction of the weight.
     is_constant : bool
-        Whether load factors leave it as it is.
+        Whether load factors do not apply to it.
 
     Raises
     ------
@@ -50,7 +50,7 @@ class Gravity:
 
 @dataclass(frozen=True)
 class Rotation:
-    """The centrifugal force of a body that turns at a constant rate, density * angular_velocity^2 * distance.
+    """The centrifugal force of a body that turns at a constant rate: density * angular_velocity^2 * distance.
 
     Parameters
     ----------
@@ -58,9 +58,9 @@ class Rotation:
         Positive.
     angular_velocity : float [rad/s]
     centre : (float, float) [m]
-        About which the body turns.
+        Centre of the rotation.
     is_constant : bool
-        Whether load factors leave it as it is.
+        Whether load factors do not apply to it.
 
     Raises
     ------
@@ -90,16 +90,16 @@ class Rotation:
 
 @dataclass(frozen=True)
 class Heating:
-    """A change of temperature without sources of heat inside the body: a harmonic function of the coordinates.
+    """A stationary change of temperature without heat sources in the body: a harmonic function of the coordinates.
 
     Parameters
     ----------
     expansion : float [1/K]
-        Coefficient of thermal expansion: the strain per temperature of a body that nothing holds.
+        Coefficient of thermal expansion: strain per temperature of a body that is free to expand.
     temperature : float, Expression or callable [K]
-        Above the one at which the body has its shape.
+        Difference from the temperature of the undeformed body.
     is_constant : bool
-        Whether load factors leave it as it is.
+        Whether load factors do not apply to it.
 
     Raises
     ------
@@ -116,7 +116,7 @@ class Heating:
         check_field(self.temperature, "temperature")
 
     def strain_at(self, points: FloatArray) -> FloatArray:
-        """Evaluate the strain (n,) [-] of a body that nothing holds at (n, 2) points [m]."""
+        """Evaluate the strain (n,) [-] of a body that is free to expand at (n, 2) points [m]."""
         return np.asarray(self.expansion * evaluate_field(self.temperature, points))
 
 
@@ -124,7 +124,7 @@ BodyForce: TypeAlias = Gravity | Rotation | Heating
 
 
 def seen_from(force: BodyForce, placement: Placement) -> BodyForce:
-    """Return what acts inside a placed body in the coordinates of its shape."""
+    """Return a body force in the coordinates of the shape of a placed body."""
     match force:
         case Gravity(acceleration=acceleration):
             x, y = placement.turned_back(np.array(acceleration)).tolist()
@@ -136,14 +136,14 @@ def seen_from(force: BodyForce, placement: Placement) -> BodyForce:
             if isinstance(temperature, int | float):
                 return force
 
-            def there(x: FloatArray, y: FloatArray) -> FloatArray:
+            def on_shape(x: FloatArray, y: FloatArray) -> FloatArray:
                 return evaluate_field(temperature, placement.forward(np.stack([x, y], axis=-1)))
 
-            return replace(force, temperature=there)
+            return replace(force, temperature=on_shape)
 
 
 def scaled_body_force(force: BodyForce, factor: float) -> BodyForce:
-    """Return what acts inside a body times a number.
+    """Return a body force times a load factor.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""How displacements and tractions are discretised: by symmetric Galerkin, by collocation, or in a way of one's own."""
+"""Discretisations of displacements and tractions: symmetric Galerkin, collocation, or one of your own."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ from bemkit.scene.mesh_options import thinness_warnings
 class Discretisation(Protocol):
     """Spaces of displacements and tractions, and the map between them; a frozen dataclass without a mesh.
 
-    A discretisation of one's own derives from this class, or from `SymmetricGalerkin`, and writes the members without a
+    A discretisation of your own derives from this class, or from `SymmetricGalerkin`, and writes the members without a
     default; `bemkit.testing.check_discretisation` proves its promises.
     """
 
     @property
     def method(self) -> str:
-        """What the method is called in messages; the name of the class unless given."""
+        """Name of the method in messages; by default that of the class."""
         return type(self).__name__
 
     @property
@@ -41,7 +41,7 @@ class Discretisation(Protocol):
 
     @property
     def keeps_rotations(self) -> bool:
-        """Whether rotations leave no strain."""
+        """Whether rotations cause no forces."""
         return True
 
     @property
@@ -54,27 +54,27 @@ class Discretisation(Protocol):
 
     @property
     def takes_layers(self) -> bool:
-        """Whether meshes that follow an accuracy are few elements in geometric layers, or many of a fitting density."""
+        """Whether meshes for an accuracy have few elements in geometric layers; many of fitted density otherwise."""
         return False
 
     @property
     def needs_accuracy(self) -> bool:
-        """Whether it makes no sense without meshes that follow an accuracy."""
+        """Whether it can only be used with an accuracy."""
         return False
 
     def of_images(self, n_images: int) -> Discretisation:
-        """Return what it is on the whole body, of which a mesh with a symmetry is one of so many images."""
+        """Return the discretisation of the whole body, of which a mesh with a symmetry is one of `n_images` images."""
         return self
 
     def at_level(self, number: int) -> Discretisation:
-        """Return what to use on a mesh of those that follow an accuracy; the first one has the `number` 0.
+        """Return the discretisation of a mesh for an accuracy, by its number from 0 on in the sequence of meshes.
 
-        Where the number may be skipped, the discretisations should be ever better ones.
+        Numbers may be skipped, so that a larger number should mean a smaller error.
         """
         return self
 
     def with_degrees(self, degrees: tuple[int, ...]) -> Discretisation:
-        """Return it with the degrees of each element that a mesh has; itself unless they may differ."""
+        """Return the discretisation with these degrees of the elements; itself unless degrees may differ."""
         return self
 
     @abstractmethod
@@ -94,11 +94,11 @@ class Discretisation(Protocol):
         mesh : BoundaryMesh
         material : Material
         linear_solver : LinearSolver
-            To be followed if `is_symmetric`.
+            To be used if `is_symmetric`.
         """
 
     def why_dense(self, mesh: BoundaryMesh) -> str:
-        """Say why the equations on a mesh cannot be compressed over a tree; empty if `hierarchical_map` makes them."""
+        """Return why the equations on a mesh cannot be compressed over a tree; empty if `hierarchical_map` does it."""
         return f"{self.method} has no such equations"
 
     def may_be_negative(self, mesh: BoundaryMesh) -> bool:
@@ -108,7 +108,7 @@ class Discretisation(Protocol):
     def hierarchical_map(
         self, mesh: BoundaryMesh, material: Material, options: Hierarchical | MatrixFree
     ) -> SteklovPoincare:
-        """Return the map with its equations compressed or not stored, the usual one unless `why_dense` is empty."""
+        """Return the map with its equations compressed or not stored; `elastic_map` unless `why_dense` is empty."""
         return self.elastic_map(mesh, material, DenseCholesky())
 
     def chosen_map(self, mesh: BoundaryMesh, material: Material, chosen: ChosenLinearSolver) -> SteklovPoincare:
@@ -118,12 +118,12 @@ class Discretisation(Protocol):
         return self.hierarchical_map(mesh, material, chosen.hierarchical)
 
     def needs(self, case: BodyCase) -> BodyNeeds:
-        """Foresee what the map takes; nothing is foreseen unless this is written."""
+        """Return counts, memory and time that the map will take, for the plan; by default none are foreseen."""
         return BodyNeeds()
 
 
 class SymmetricGalerkin(Discretisation, Protocol):
-    """The symmetric Galerkin method; a discretisation of one's own writes its two spaces.
+    """The symmetric Galerkin method; a discretisation of your own writes its two spaces.
 
     Displacements are continuous; tractions may jump where boundary parts end and the boundary has corners, at least.
     """
@@ -150,7 +150,7 @@ class SymmetricGalerkin(Discretisation, Protocol):
         return GalerkinElasticity(mesh, material, displacements, tractions, linear_solver)
 
     def needs(self, case: BodyCase) -> BodyNeeds:
-        """Return what the Galerkin map takes."""
+        """Return counts, memory and time of the Galerkin map."""
         if case.mesh.surface is not None:
             from bemkit.operators.half_plane.maps import half_plane_needs
 
@@ -206,27 +206,27 @@ class Galerkin(SymmetricGalerkin):
 
     @property
     def method(self) -> str:
-        """Galerkin, and from degree 3 on which."""
+        """Galerkin, from degree 3 on with the degree."""
         if min(self._degrees) < self.largest_degree:
             return f"Galerkin of degrees {min(self._degrees)} to {self.largest_degree}"
         return "Galerkin" if self.largest_degree <= 2 else f"Galerkin of degree {self.largest_degree}"
 
     @property
     def estimates_error(self) -> bool:
-        """True but for elements of degree 1 among others, on which nothing tells it."""
+        """True, except for elements of degree 1 among others: there is no estimate for them."""
         return len(set(self._degrees)) == 1 or min(self._degrees) > 1
 
     @property
     def takes_layers(self) -> bool:
-        """From degree 3 on."""
+        """True from degree 3 on."""
         return self.largest_degree > 2
 
     def of_images(self, n_images: int) -> Discretisation:
-        """Return the degrees of all elements, if there is one for each."""
+        """Return the discretisation with the degrees repeated for each image, if each element has its own."""
         return replace(self, degree=self.degree * n_images) if isinstance(self.degree, tuple) else self
 
     def at_level(self, number: int) -> Discretisation:
-        """Return quadratic elements for the first look of a higher degree, later itself."""
+        """Return quadratic elements on the first mesh if the degree is higher, later the discretisation itself."""
         return QuadraticGalerkin() if number == 0 and self.takes_layers else self
 
     def displacement_space(self, mesh: BoundaryMesh) -> BoundarySpace:
@@ -237,11 +237,11 @@ class Galerkin(SymmetricGalerkin):
         return _galerkin_displacements(self, mesh) if mesh.surface is None else ConstantSpace(mesh)
 
     def traction_space(self, mesh: BoundaryMesh) -> BoundarySpace:
-        """Return the functions of a degree less that may jump at corners and at ends of parts, or the constants."""
+        """Return functions of one degree less, which may jump at corners and at ends of parts, or constants."""
         return _galerkin_tractions(self, mesh)
 
     def why_dense(self, mesh: BoundaryMesh) -> str:
-        """Say what stands in the way: a half-plane, or another degree than 1 or 2 on all elements."""
+        """Return the reason: a half-plane, or another degree than 1 or 2 on all elements."""
         if mesh.surface is not None:
             return "a half-plane has a map of its own"
         return "" if set(self._degrees) <= {self.largest_degree} <= {1, 2} else "elements are not of degree 1 or 2"
@@ -252,23 +252,23 @@ class Galerkin(SymmetricGalerkin):
         """Return the compressed map."""
         from bemkit.operators.steklov_poincare.hierarchical_galerkin import HierarchicalGalerkin
 
-        assert isinstance(options, Hierarchical)  # `why_stored` leaves no other choice
+        assert isinstance(options, Hierarchical)  # MatrixFree is chosen for collocation alone
         return HierarchicalGalerkin(mesh, material, options, self.displacement_space(mesh), self.traction_space(mesh))
 
     def degrees_on(self, mesh: BoundaryMesh) -> IntArray | None:
         """Return the degrees (n_elements,) of the elements of a mesh; None if all are equal."""
         if not isinstance(self.degree, tuple):
             return None
-        degrees, n_own = np.array(self.degree), mesh.n_elements
-        if degrees.size != n_own:
+        degrees = np.array(self.degree)
+        if degrees.size != mesh.n_elements:
             raise GeometryError(
-                f"degree has {degrees.size} entries, but the mesh has {n_own} elements: give one degree for each "
-                "element, or a single one"
+                f"degree has {degrees.size} entries, but the mesh has {mesh.n_elements} elements: give one degree for "
+                "each element, or a single one"
             )
         return None if (degrees == degrees[0]).all() else degrees
 
 
-@lru_cache(maxsize=4)  # few spaces, so that what they know is found out once
+@lru_cache(maxsize=4)  # a space keeps what it has computed, so that equal ones should be the same object
 def _galerkin_displacements(galerkin: Galerkin, mesh: BoundaryMesh) -> BoundarySpace:
     return LagrangeSpace(mesh, degree=galerkin.largest_degree, element_degrees=galerkin.degrees_on(mesh))
 
@@ -302,7 +302,7 @@ class HpGalerkin(Galerkin):
     Parameters
     ----------
     degree : int
-        On the mesh at hand: 2 on the first one, and that of its mesh in a solution.
+        Degree on one mesh: 2 on the first; in a solution that of its mesh.
 
     Raises
     ------
@@ -323,7 +323,7 @@ class HpGalerkin(Galerkin):
         return True
 
     def at_level(self, number: int) -> Discretisation:
-        """Return the degree 2 for the first look, and a degree more for each number."""
+        """Return degree 2 on the first mesh, and one degree more for each further number."""
         return HpGalerkin(min(2 + number, LARGEST_DEGREE))
 
     def with_degrees(self, degrees: tuple[int, ...]) -> Discretisation:
@@ -338,9 +338,9 @@ class ConstantCollocation(Discretisation):
     Parameters
     ----------
     slopes : bool
-        Whether the double layer takes the slope of the displacement between neighbouring elements, which keeps
-        rotations and makes displacements and energies converge with the second order. Without, this is the method of
-        the source paper, of the first order.
+        Whether the double layer takes account of the slope of the displacement between neighbouring elements. Rotations
+        then cause no forces, and displacements and energies converge with the second order. Without slopes this is the
+        method of the paper, of the first order.
     """
 
     slopes: bool = True
@@ -352,7 +352,7 @@ class ConstantCollocation(Discretisation):
 
     @property
     def keeps_rotations(self) -> bool:
-        """With slopes alone."""
+        """True with slopes only."""
         return self.slopes
 
     def displacement_space(self, mesh: BoundaryMesh) -> BoundarySpace:
@@ -370,7 +370,7 @@ class ConstantCollocation(Discretisation):
         return CollocationElasticity(mesh, material, slopes=self.slopes)
 
     def why_dense(self, mesh: BoundaryMesh) -> str:
-        """Nothing."""
+        """Return no reason: collocation can always be compressed."""
         return ""
 
     def may_be_negative(self, mesh: BoundaryMesh) -> bool:
@@ -386,7 +386,7 @@ class ConstantCollocation(Discretisation):
         return HierarchicalCollocation(mesh, material, options, slopes=self.slopes)
 
     def needs(self, case: BodyCase) -> BodyNeeds:
-        """Return what collocation takes, and warn of bodies that are thin for their elements."""
+        """Return counts, memory and time of collocation, with a warning if the body is thin for its elements."""
         if case.linear_solver.hierarchical is None:
             needs = collocation_needs(case, takes_slopes=self.slopes)
         elif isinstance(case.linear_solver.hierarchical, MatrixFree):

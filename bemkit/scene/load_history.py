@@ -1,8 +1,8 @@
 """Load histories: one scene after the other in time, with slip counted from the end of the step before.
 
-The static law judges slip by the total displacement, as if the whole load came at once. Real loads grow, and friction
-remembers: under the incremental law a point that stuck under the first tenth of the load keeps that place as its new
-origin. For a cylinder pressed into a block the two laws differ by a factor of two in the size of the stick zone.
+Under the static law slip is the total displacement, as if the whole load came at once. Under the incremental law slip
+counts from the last step: a point that sticks under the first tenth of the load keeps that place as its new origin. For
+a cylinder pressed into a block the stick zones of the two laws differ in size by a factor of two.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ def load_steps(scene: AnyScene) -> tuple[AnyScene, ...]:
     -------
     tuple of Scene or of Assembly
         One for each increment of each step, or for each load factor. Each has a single load and, in a history, a single
-        step that only says its time.
+        step with a time and nothing else.
 
     Raises
     ------
@@ -67,20 +67,20 @@ def load_steps(scene: AnyScene) -> tuple[AnyScene, ...]:
                 states.append(_at_time(base, changes, load_factor, time))
             except ValueError as error:
                 raise type(error)(f"steps[{number}]: {error}") if scene.steps else error from error
-        # what a step leaves stays
+        # values at the end of a step hold in the steps after it
         last, load_factor = step.time, _value(load_factor, step.time)
         changes = {place: _value(value, step.time) for place, value in changes.items()}
     return tuple(states)
 
 
 def with_changed_steps(scene: AnyScene, change: Callable[[AnyScene], AnyScene]) -> AnyScene:
-    """Return a scene whose load steps are those of another one after a change of each.
+    """Return a scene with each of its load steps changed.
 
     Parameters
     ----------
     scene : Scene or Assembly
     change : callable
-        Takes a scene or an assembly of one step, and returns what it becomes.
+        Takes a scene or an assembly of one step, and returns the changed one.
 
     Returns
     -------
@@ -90,8 +90,9 @@ def with_changed_steps(scene: AnyScene, change: Callable[[AnyScene], AnyScene]) 
     first, *others = (change(step) for step in load_steps(scene))
     if not others:
         return first
-    own = [entry.name for entry in fields(first) if entry.init and entry.name not in ("title", "steps", "load_factors")]
-    names = [name for name in own if any(getattr(step, name) != getattr(first, name) for step in others)]
+    excluded = ("title", "steps", "load_factors")
+    names = [entry.name for entry in fields(first) if entry.init and entry.name not in excluded]
+    names = [name for name in names if any(getattr(step, name) != getattr(first, name) for step in others)]
     steps = [Step(step.steps[0].time, {name: getattr(step, name) for name in names}) for step in (first, *others)]
     return replace(first, steps=tuple(steps))
 
@@ -109,7 +110,7 @@ def _at_time(scene: AnyScene, changes: Mapping[str, Any], factor: TimeValue, tim
 
 
 def _value(value: Any, time: float) -> Any:
-    """Return a value at a time: formulas know t, and those without x and y are numbers."""
+    """Return a value at a time: functions and formulas of t are evaluated; those of x and y remain formulas."""
     if isinstance(value, Expression) or not (callable(value) or isinstance(value, str)):
         return value
     if not isinstance(value, str):
@@ -148,7 +149,7 @@ def with_scaled_loads(scene: AnyScene, factor: float) -> AnyScene:
 def _scaled(loaded: Scene | Body, factor: float, known: dict[int, Any]) -> dict[str, Any]:
     """Return parts and body forces under scaled loads; those without loads are the same objects.
 
-    What several bodies share they share afterwards: `known` holds, by the identity of an object, what became of it.
+    Objects that several bodies share stay shared: `known` maps the identity of each to its scaled copy.
     """
 
     def scaled(field: ScalarField) -> ScalarField:

@@ -24,16 +24,16 @@ if TYPE_CHECKING:
 DEFAULT_ELEMENTS = 320
 """Elements where neither a number nor an accuracy is given."""
 FIRST_ELEMENTS = 40
-"""About the size of the first mesh where the accuracy decides."""
+"""Elements of the first mesh, roughly, if an accuracy is given."""
 SMALLEST_ACCURACY = 1e-10
-"""What double precision holds of a solution."""
+"""Smallest accuracy that round-off allows."""
 MOST_ELEMENTS = 1500
-"""Where the search for an accuracy ends unless another number is given."""
+"""Elements at which the search for an accuracy ends by default."""
 _LONGEST = 0.75
 """Length of elements, in thicknesses, at which the energy of a pinched ring is 2 per cent off; it grows with the third
 power of the length."""
 _SHARE = 0.25
-"""Of the boundary: more than what is thin in the tip of a wedge or between a hole and a side."""
+"""Share of the boundary that must be thin for a warning: more than the tip of a wedge or the strip beside a hole."""
 _FACING = -0.5
 _ROWS, _FEW = 4096, 1024
 """Elements whose neighbours are found at a time; all distances of few take less time than loading a tree (measured)."""
@@ -58,11 +58,11 @@ class MeshOptions:
         and, down to 1e-3, element by element (`Solution.estimated_local_traction_error`).
         Meshes then follow the solution: see `bemkit.runs.adaptive.run_adaptive`.
     most_elements : int, optional
-        No mesh on the way to the accuracy has more elements, the first one aside; 1500 if left out. Elements of high
-        degree count as the quadratic ones with as many nodes. Of a scene with a symmetry these are the elements with
-        unknowns.
+        Largest number of elements of a mesh on the way to the accuracy, except the first; 1500 if left out. Elements of
+        high degree count as the quadratic ones with as many nodes. Of a scene with a symmetry only elements with
+        unknowns count.
     most_seconds : float, optional [s]
-        No mesh is begun that would take longer, all meshes counted; no limit if left out.
+        Time for all meshes: no mesh is begun that would exceed it. No limit if left out.
 
     Raises
     ------
@@ -189,22 +189,22 @@ def thicknesses(mesh: BoundaryMesh, reach: FloatArray | float = np.inf) -> Float
     """
     whole, result = mesh.whole, np.full(mesh.n_elements, np.inf)
     farthest = np.minimum(reach, 4.0 * whole.diameter) + np.zeros(mesh.n_elements)
-    for own, other in _near_pairs(mesh, farthest):
-        arm = whole.centres[other] - whole.centres[own]
-        across, distance = -np.sum(arm * whole.normals[own], axis=1), np.hypot(arm[:, 0], arm[:, 1])
-        facing = np.sum(whole.normals[own] * whole.normals[other], axis=1)
-        faces = (distance <= farthest[own]) & (facing < _FACING) & (across > np.sqrt(0.5) * distance)
-        np.minimum.at(result, own[faces], distance[faces])
+    for first, second in _near_pairs(mesh, farthest):
+        arm = whole.centres[second] - whole.centres[first]
+        across, distance = -np.sum(arm * whole.normals[first], axis=1), np.hypot(arm[:, 0], arm[:, 1])
+        cosine = np.sum(whole.normals[first] * whole.normals[second], axis=1)
+        faces = (distance <= farthest[first]) & (cosine < _FACING) & (across > np.sqrt(0.5) * distance)
+        np.minimum.at(result, first[faces], distance[faces])
     return result
 
 
 def _near_pairs(mesh: BoundaryMesh, farthest: FloatArray) -> Iterator[tuple[IntArray, IntArray]]:
-    """Yield elements and those of the whole body that are as near."""
+    """Yield pairs of an element and an element of the whole body within the distance `farthest` of the first."""
     whole, elements = mesh.whole, np.arange(mesh.n_elements)
     if whole.n_elements <= _FEW:
         arms = whole.centres - mesh.centres[:, None]
-        own, other = np.nonzero(np.hypot(arms[:, :, 0], arms[:, :, 1]) <= farthest[:, None])
-        yield own, other
+        first, second = np.nonzero(np.hypot(arms[:, :, 0], arms[:, :, 1]) <= farthest[:, None])
+        yield first, second
         return
     from scipy.spatial import KDTree
 

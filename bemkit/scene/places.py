@@ -25,7 +25,7 @@ Node = TypeVar("Node")
 
 
 class PlaceError(InputError):
-    """A place that a scene does not have, or a value that does not fit there; the message names the place."""
+    """A key that a scene does not have, or a value that does not fit there; the message names the key."""
 
 
 @dataclass(frozen=True)
@@ -52,13 +52,13 @@ class Place:
 
     @property
     def names(self) -> tuple[str | int, ...]:
-        """The names and numbers that lead there."""
-        found = _STEP.findall(self.text)
-        return tuple(int(name[1:-1]) if name.startswith("[") else name.strip('"') for name in found)
+        """The names and numbers of the path, from the outside in."""
+        steps = _STEP.findall(self.text)
+        return tuple(int(name[1:-1]) if name.startswith("[") else name.strip('"') for name in steps)
 
 
 def value_at(scene: object, place: Place) -> Any:
-    """Return what stands at a place of a scene or an assembly.
+    """Return the value at a place of a scene or an assembly.
 
     Raises
     ------
@@ -72,7 +72,7 @@ def value_at(scene: object, place: Place) -> Any:
 
 
 def with_value(scene: Node, place: Place, value: object) -> Node:
-    """Return a scene or an assembly with another value at a place; what does not lead there are the same objects.
+    """Return a scene or an assembly with another value at a place; all else are the same objects.
 
     Parameters
     ----------
@@ -112,7 +112,7 @@ def _replaced(node: Any, declared: Any, names: tuple[str | int, ...], value: obj
 
 
 def _fitting(value: object, declared: Any, path: str) -> Any:
-    """Return a value as the place holds it."""
+    """Return a value in the type that the place has."""
     if not isinstance(value, bool | int | float | str | list | dict):
         return value
     from bemkit.scene.serialisation import StructureError, structure  # heavy, and only for scenes that change
@@ -124,7 +124,7 @@ def _fitting(value: object, declared: Any, path: str) -> Any:
 
 
 def _inside(node: Any, declared: Any, name: str | int, path: str) -> tuple[Any, Any, str]:
-    """Return what stands in an object under a name or number, its declared type, and its path."""
+    """Return the entry of an object under a name or number, its declared type, and its path."""
     if node is None:
         raise PlaceError(f"{path} is left out in the scene: write it there first")
     inner_path = f"{path}[{name}]" if isinstance(name, int) else f"{path}.{name}".lstrip(".")
@@ -142,8 +142,8 @@ def _inside(node: Any, declared: Any, name: str | int, path: str) -> tuple[Any, 
     if is_dataclass(node):
         _known(name, [entry.name for entry in fields(node) if entry.init and entry.name != "name"], path)
         return getattr(node, name), _declared_types(cast(type, type(node)))[name], inner_path
-    what = "a list: give the number of an entry, such as [0]" if isinstance(node, tuple | list) else "no table"
-    raise PlaceError(f"{path}.{name}: unknown key: {path} is {what}")
+    kind = "a list: give the number of an entry, such as [0]" if isinstance(node, tuple | list) else "no table"
+    raise PlaceError(f"{path}.{name}: unknown key: {path} is {kind}")
 
 
 def _entry_type(declared: Any, number: int, entry: object) -> Any:

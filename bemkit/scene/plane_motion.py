@@ -1,4 +1,4 @@
-"""What moves as it is told or as forces drive it: rigid bodies in an assembly, and half-planes far away."""
+"""Prescribed and driven rigid motions: of rigid bodies in an assembly, and of half-planes far away."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ COMPONENTS = (("x", "force_x"), ("y", "force_y"), ("turn", "moment"))
 
 @dataclass(frozen=True, kw_only=True)
 class PlaneMotion:
-    """What rigid bodies and half-planes have in common.
+    """Motions of a rigid body, or of a half-plane far away, and the loads that drive them.
 
-    Of each motion and its load one is given, and the other follows; what is given of neither does not move.
+    Of each motion and its load one is given, and the other follows. If neither is given, the motion is zero.
     """
 
     x: float | None = None
@@ -48,7 +48,7 @@ class PlaneMotion:
 
     @property
     def _owner(self) -> str:
-        """What moves, for messages, with a colon and a space behind it."""
+        """Name of the body for messages, followed by a colon and a space."""
         return ""
 
     @property
@@ -67,7 +67,7 @@ class PlaneMotion:
         return np.array([getattr(self, load) or 0.0 for _, load in COMPONENTS])
 
     def scaled(self, factor: float) -> Self:
-        """Return the same with its given motions and loads multiplied by a number."""
+        """Return it with given motions and loads multiplied by a number."""
         return self.multiplied(np.full(3, factor), np.full(3, factor))
 
     def multiplied(self, motions: FloatArray, loads: FloatArray) -> Self:
@@ -82,7 +82,7 @@ class PlaneMotion:
 class RigidBody(PlaneMotion):
     """A rigid obstacle that moves.
 
-    Of each motion and its load one is given, and the other follows; what is given of neither does not move.
+    Of each motion and its load one is given, and the other follows. If neither is given, the motion is zero.
 
     Parameters
     ----------
@@ -130,7 +130,7 @@ class RigidBody(PlaneMotion):
 class FarField(PlaneMotion):
     """Motion or load of a half-plane far away from its surface.
 
-    Of each motion and its load one is given, and the other follows; what is given of neither does not move. A rigid
+    Of each motion and its load one is given, and the other follows. If neither is given, the motion is zero. A rigid
     indenter that is pressed down with a force is a half-plane that is pressed up against it with the same force.
 
     Parameters

@@ -1,4 +1,4 @@
-"""What the user states: the body, its boundary parts, loads, obstacles, the friction law, mesh and solver.
+"""A scene: the body, its boundary parts, loads, obstacles, the friction law, mesh and solver.
 
 Everything here is a frozen value. A scene can be written in Python or as a TOML file (`bemkit.scene.toml`), and either
 form can be turned into the other. All quantities are in one consistent set of units, for example m, N and Pa.
@@ -35,7 +35,7 @@ from bemkit.solvers.ssn import SemismoothNewton
 
 
 class NoContactError(InputError):
-    """A question about contact, asked of a scene without any."""
+    """Something that needs contact was asked of a scene without contact parts."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -54,8 +54,8 @@ class Scene(Stated):
     law : FrictionLaw
         On all contact parts that have no law of their own.
     load_factors : tuple of float
-        The short way to say a load history: all tractions, pressures, prescribed displacements and body forces times
-        these numbers, at the times 1, 2, 3 and so on.
+        A short form of load history: all tractions, pressures, prescribed displacements and body forces times these
+        numbers, at the times 1, 2, 3 and so on.
     steps : tuple of Step
         The load history: what changes from step to step. Without one, or with a single step, slip counts from the
         undeformed body (the static law); with several, from the end of the step before (the incremental law).
@@ -63,9 +63,9 @@ class Scene(Stated):
         Lines about which the scene, which describes the whole body, is symmetric. Only the elements on the side
         x <= a, y <= b carry unknowns, the others are their images; results are those of that side.
     body_forces : tuple of BodyForce
-        What acts inside the body: gravity, rotation, heating.
+        Gravity, rotation, heating.
     far : FarField, optional
-        Of a half-plane: how it moves far away, or what drives it there. It rests there by default.
+        Motion or load of a half-plane far away from its surface. By default it is at rest there.
     discretisation : Discretisation
     linear_solver : LinearSolver or Automatic
         How the displacements of the body away from the contact boundary are solved for.
@@ -81,8 +81,7 @@ class Scene(Stated):
     ValueError
         If the title is empty, two parts share a name, a part names an unknown side, a load factor is missing or not
         finite, times do not increase, a law needs slip or time without steps, body forces act in an exterior, an
-        accuracy is asked of collocation, or a law with friction or a
-        solver is given without any contact.
+        accuracy is asked of collocation, or a law with friction or a solver is given without any contact.
     GeometryError
         If the outline of the shape is not a valid boundary.
     """
@@ -155,14 +154,14 @@ class Scene(Stated):
         return tuple(part for part in self.parts if isinstance(part.condition, Contact))
 
     def parts_on(self, mesh: BoundaryMesh) -> list[tuple[Part, IntArray]]:
-        """Return the parts with their elements on a mesh, but for parts beyond a symmetry line."""
+        """Return the parts with their elements (k,) on a mesh, without parts beyond a symmetry line."""
         return [(part, elements) for part in self.parts if (elements := mesh.part(part.name)).size]
 
     @property
     def laws(self) -> dict[str, FrictionLaw]:
         """The friction law of each contact part, by name."""
-        own = {part.name: part.condition.law for part in self.parts if isinstance(part.condition, Contact)}
-        return {name: self.law if law is None else law for name, law in own.items()}
+        laws = {part.name: part.condition.law for part in self.parts if isinstance(part.condition, Contact)}
+        return {name: self.law if law is None else law for name, law in laws.items()}
 
     @property
     def selections(self) -> dict[str, Selection]:
@@ -189,12 +188,12 @@ class Scene(Stated):
         laws: list[FrictionLaw] = [Frictionless()] if held.any() else []
         nodes = [np.flatnonzero(held)] if held.any() else []
         for name, law in self.laws.items():
-            own = np.flatnonzero(np.array([part == name for part in parts], bool) & ~held)
+            part_nodes = np.flatnonzero(np.array([part == name for part in parts], bool) & ~held)
             try:
-                laws.append(law.at(points[own]))
+                laws.append(law.at(points[part_nodes]))
             except ValueError as error:
                 raise LawError(f"part {name!r}: friction law: {error}") from error
-            nodes.append(own)
+            nodes.append(part_nodes)
         if not laws:  # a scene without contact
             return self.law
         if len(laws) == 1 or all(law is laws[0] for law in laws):
@@ -227,7 +226,7 @@ class Scene(Stated):
 def _check_half_plane(
     outline: Outline, far: FarField | None, discretisation: Discretisation, mesh: MeshOptions, parts: Sequence[Part]
 ) -> None:
-    """Refuse in a scene what a half-plane does not have, and a far field of other bodies.
+    """Check that a half-plane has nothing that only other bodies have, and another body no far field.
 
     Raises
     ------

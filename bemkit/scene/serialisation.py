@@ -1,7 +1,7 @@
 """Plain tables (from TOML) to frozen dataclasses and back.
 
-cattrs does the walking. Added here are strict numbers, formulas, arrays, and classes named by a word: either the word
-alone (``solver = "semismooth-newton"``) or a table with its options (``{ kind = "tresca", bound_value = 0.5 }``).
+cattrs converts field by field. Added here are strict numbers, formulas, arrays, and classes named by a word: either the
+word alone (``solver = "semismooth-newton"``) or a table with its options (``{ kind = "tresca", bound_value = 0.5 }``).
 """
 
 from __future__ import annotations
@@ -30,24 +30,24 @@ T = TypeVar("T")
 
 
 class StructureError(InputError):
-    """A table that does not describe the wanted object; the message is ``key: value: remedy``."""
+    """A table that does not describe the object of the declared type; the message is ``key: value: remedy``."""
 
 
 class UnstructureError(InputError):
     """An object that cannot be written as a table."""
 
 
-def structure(table: object, wanted: type[T]) -> T:
+def structure(table: object, declared: type[T]) -> T:
     """Turn a table into an object.
 
     Parameters
     ----------
     table : dict, list, str, number or bool
-    wanted : type
+    declared : type
 
     Returns
     -------
-    object of the wanted type
+    object of the declared type
 
     Raises
     ------
@@ -55,10 +55,10 @@ def structure(table: object, wanted: type[T]) -> T:
         Naming the key, the value and the remedy.
     """
     try:
-        return _converter().structure(table, wanted)
+        return _converter().structure(table, declared)
     except RecursionError:
         raise StructureError("nested too deeply: simplify it") from None
-    except Exception as error:  # whatever a constructor raised, it rejects what the user wrote
+    except Exception as error:  # whatever a constructor raised, it rejects the text of the user
         from bemkit.scene.explanations import explain
 
         raise StructureError(explain(error)) from error
@@ -110,8 +110,8 @@ def unstructure(value: Any, declared: Any = None, path: str = "", *, keep_defaul
 
 
 def _without_file(value: Any) -> Any:
-    """Return what a file of a shape holds in its place: texts need it no more."""
-    from bemkit.geometry.files.shape_file import ShapeFile  # heavy, and only for what is written
+    """Return the shape that a file holds instead of the file, so that the text does not depend on the file."""
+    from bemkit.geometry.files.shape_file import ShapeFile  # heavy, and only needed for writing
 
     return value.shape if isinstance(value, ShapeFile) else value
 
@@ -136,7 +136,7 @@ def _unstructure_dataclass(value: Any, declared: Any, path: str, keep_defaults: 
 def _written_fields(value: Any, keep_defaults: bool) -> Iterator[tuple[Field[Any], Any]]:
     for entry in fields(value):
         content = getattr(value, entry.name)
-        # the number of elements is always written: nobody should have to look up how fine a mesh was
+        # the number of elements is always written, so that a file tells how fine its mesh is
         is_kept = keep_defaults or entry.name == "elements" or not _is_default(content, entry)
         if entry.init and content is not None and is_kept:
             yield entry, content
@@ -160,20 +160,20 @@ def _converter() -> Converter:
     converter.register_structure_hook(int, lambda value, _: _integer(value))
     converter.register_structure_hook(bool, lambda value, _: _exactly(value, bool, "true or false"))
     converter.register_structure_hook(str, lambda value, _: _exactly(value, str, "a text in quotation marks"))
-    add(lambda wanted: wanted == FloatArray, lambda value, _: _array(value))
-    add(lambda wanted: get_origin(wanted) is tuple, lambda value, wanted: _tuple(converter, value, wanted))
-    add(lambda wanted: get_origin(wanted) is Mapping, lambda value, wanted: _mapping(converter, value, wanted))
-    add(lambda wanted: _is_class(wanted, Enum), lambda value, wanted: _enum(value, wanted))
-    add(lambda wanted: bool(options_of(wanted)), lambda value, wanted: _one_of(converter, value, wanted))
-    converter.register_structure_hook_factory(is_dataclass, lambda wanted: _table_hook(converter, wanted))
-    add(lambda wanted: wanted is Expression, lambda value, _: Expression(value))
-    add(lambda wanted: registry_of(wanted) is not None, lambda value, wanted: _tagged(converter, value, wanted))
-    add(lambda wanted: bool(heading_of(wanted)), lambda value, wanted: _named(converter, value, wanted))
+    add(lambda declared: declared == FloatArray, lambda value, _: _array(value))
+    add(lambda declared: get_origin(declared) is tuple, lambda value, declared: _tuple(converter, value, declared))
+    add(lambda declared: get_origin(declared) is Mapping, lambda value, declared: _mapping(converter, value, declared))
+    add(lambda declared: _is_class(declared, Enum), lambda value, declared: _enum(value, declared))
+    add(lambda declared: bool(options_of(declared)), lambda value, declared: _one_of(converter, value, declared))
+    converter.register_structure_hook_factory(is_dataclass, lambda declared: _table_hook(converter, declared))
+    add(lambda declared: declared is Expression, lambda value, _: Expression(value))
+    add(lambda declared: registry_of(declared) is not None, lambda value, declared: _tagged(converter, value, declared))
+    add(lambda declared: bool(heading_of(declared)), lambda value, declared: _named(converter, value, declared))
     return converter
 
 
 def registry_of(declared: Any) -> Registry | None:
-    """Return the registry whose words name the classes that stand under a declared type, None if there is none."""
+    """Return the registry whose words name the classes of a declared type, None if there is none."""
     alternatives = options_of(declared) or (declared,)
     return next((registry for registry in REGISTRIES if registry.holds(alternatives)), None)
 
@@ -185,8 +185,8 @@ def heading_of(declared: Any) -> str:
     return HEADINGS.get(reference_of(inner[0]), "") if is_listed else ""
 
 
-def _is_class(wanted: Any, parent: type) -> bool:
-    return isinstance(wanted, type) and issubclass(wanted, parent)
+def _is_class(declared: Any, parent: type) -> bool:
+    return isinstance(declared, type) and issubclass(declared, parent)
 
 
 def _number(value: object) -> float:
@@ -207,8 +207,8 @@ def _integer(value: object) -> int:
     return value
 
 
-def _exactly(value: object, wanted: type[T], description: str) -> T:
-    if isinstance(value, wanted):
+def _exactly(value: object, declared: type[T], description: str) -> T:
+    if isinstance(value, declared):
         return value
     raise InputError(f"{_show(value)} does not fit: give {description}")
 
@@ -218,9 +218,9 @@ def _array(value: object) -> FloatArray:
     return np.array([_array(item) if isinstance(item, list) else _number(item) for item in items], dtype=float)
 
 
-def _tuple(converter: Converter, value: object, wanted: Any) -> tuple[Any, ...]:
+def _tuple(converter: Converter, value: object, declared: Any) -> tuple[Any, ...]:
     items = _exactly(value, list, "a list in square brackets")
-    inner = get_args(wanted)
+    inner = get_args(declared)
     if len(inner) == 2 and inner[1] is Ellipsis:
         inner = (inner[0],) * len(items)
     if len(items) != len(inner):
@@ -232,39 +232,39 @@ def _tuple(converter: Converter, value: object, wanted: Any) -> tuple[Any, ...]:
     return tuple(structured)
 
 
-def _mapping(converter: Converter, value: object, wanted: Any) -> dict[str, Any]:
+def _mapping(converter: Converter, value: object, declared: Any) -> dict[str, Any]:
     structured = {}
     for key, item in _exactly(value, dict, "a table").items():
         with _at(key):
-            structured[key] = converter.structure(item, get_args(wanted)[1])
+            structured[key] = converter.structure(item, get_args(declared)[1])
     return structured
 
 
-def _enum(value: object, wanted: type[Enum]) -> Enum:
-    words = [str(member.value) for member in wanted]
-    for member in wanted:
+def _enum(value: object, declared: type[Enum]) -> Enum:
+    words = [str(member.value) for member in declared]
+    for member in declared:
         if member.value == value:
             return member
     raise InputError(f"{_show(value)} is unknown: give one of {', '.join(words)}{closest(str(value), words)}")
 
 
-def options_of(wanted: Any) -> tuple[Any, ...]:
+def options_of(declared: Any) -> tuple[Any, ...]:
     """Return the alternatives of a union that a table can hold."""
-    if get_origin(wanted) not in (Union, types.UnionType):
+    if get_origin(declared) not in (Union, types.UnionType):
         return ()
-    return tuple(option for option in get_args(wanted) if option is not type(None) and not _is_callable(option))
+    return tuple(option for option in get_args(declared) if option is not type(None) and not _is_callable(option))
 
 
-def _is_callable(wanted: Any) -> bool:
-    return get_origin(wanted) is Callable
+def _is_callable(declared: Any) -> bool:
+    return get_origin(declared) is Callable
 
 
-def _is_list(wanted: Any) -> bool:
-    return get_origin(wanted) is tuple or wanted == FloatArray  # whose origin depends on the version of numpy
+def _is_list(declared: Any) -> bool:
+    return get_origin(declared) is tuple or declared == FloatArray  # whose origin depends on the version of numpy
 
 
-def _one_of(converter: Converter, value: object, wanted: Any) -> Any:
-    options = options_of(wanted)
+def _one_of(converter: Converter, value: object, declared: Any) -> Any:
+    options = options_of(declared)
     for option in options:
         if _fits(value, option):
             return converter.structure(value, option)
@@ -295,40 +295,40 @@ def _name(option: Any) -> str:
     return names.get(option, "a list" if _is_list(option) else "a table")
 
 
-def _table_hook(converter: Converter, wanted: Any) -> Callable[[object, Any], Any]:
-    structure_fields = make_dict_structure_fn(wanted, converter)
+def _table_hook(converter: Converter, declared: Any) -> Callable[[object, Any], Any]:
+    structure_fields = make_dict_structure_fn(declared, converter)
 
     def hook(value: object, _: Any) -> Any:
-        return structure_fields(_exactly(value, dict, "a table of keys and values"), wanted)
+        return structure_fields(_exactly(value, dict, "a table of keys and values"), declared)
 
     return hook
 
 
-def _tagged(converter: Converter, value: object, wanted: Any) -> Any:
-    registry = cast(Registry, registry_of(wanted))  # the hook is chosen by it
+def _tagged(converter: Converter, value: object, declared: Any) -> Any:
+    registry = cast(Registry, registry_of(declared))  # the hook is chosen by it
     if isinstance(value, str):
         value = {"kind": value}
     table = registry.without_variant(_exactly(value, dict, f"a {registry.role} as a word or as a table with its kind"))
     if "kind" not in table:
         raise InputError(f"kind is missing: add kind = one of {', '.join(registry.built_in)}")
     with _at("kind"):
-        found = registry.find(_exactly(table["kind"], str, "a text"))
-    return converter.structure({key: item for key, item in table.items() if key != "kind"}, found)
+        named_class = registry.find(_exactly(table["kind"], str, "a text"))
+    return converter.structure({key: item for key, item in table.items() if key != "kind"}, named_class)
 
 
 def _named(converter: Converter, value: object, declared: Any) -> tuple[Any, ...]:
-    found: list[Any] = []
-    wanted, heading = get_args(declared)[0], heading_of(declared)
+    structured: list[Any] = []
+    item_type, heading = get_args(declared)[0], heading_of(declared)
     of_bodies = ", in one of several bodies [bodies.BODY.parts.NAME]" if heading == "parts" else ""
     written = f"[{heading}.NAME]{of_bodies}"
     for name, options in _exactly(value, dict, f"a table of {heading}: write {written}").items():
         with _at(name):
             table = _exactly(options, dict, "a table of keys and values")
             if "name" in table:
-                role = re.sub(r"(?<!^)(?=[A-Z])", " ", wanted.__name__).lower()
+                role = re.sub(r"(?<!^)(?=[A-Z])", " ", item_type.__name__).lower()
                 raise InputError(f"unknown key 'name': the name of a {role} stands in its heading [{heading}.NAME]")
-            found.append(converter.structure({"name": name, **table}, wanted))
-    return tuple(found)
+            structured.append(converter.structure({"name": name, **table}, item_type))
+    return tuple(structured)
 
 
 @contextmanager

@@ -23,21 +23,21 @@ TimeValue: TypeAlias = float | str | Callable[[float], float]
 
 @dataclass(frozen=True)
 class Step:
-    """What changes in one step of a load history; what is not named stays as the step before left it.
+    """One step of a load history: what changes in it. All else stays as it was at the end of the step before.
 
     Parameters
     ----------
     time : float [s]
         At the end of the step; positive, and later than the step before. The history begins at 0.
     changes : mapping of str to value
-        By the places of scene files, such as ``"parts.press.condition.y"``, ``"law.friction_coefficient"`` or
-        ``"rigid.punch.y"``: a number, a text, a table or an object as the place takes it, or a Python function of the
-        time that returns one. Numbers hold from the first increment of the step on; formulas of the time ``t`` follow
-        it to the end of the step, and what they have come to stays.
+        New values by their keys in scene files, such as ``"parts.press.condition.y"``, ``"law.friction_coefficient"``
+        or ``"rigid.punch.y"``: a number, a text, a table or an object as the key takes it, or a Python function of the
+        time that returns one. Numbers hold from the first increment of the step on; formulas of the time ``t`` are
+        evaluated at each increment, and keep their last value after the step.
     load_factor : float, str, callable or None
         Multiplies all loads, prescribed displacements and body forces that are not constant.
     increments : int
-        Equal parts in which the time of the step passes, each a step of the result.
+        Number of equal parts of the time of the step, each a step of the result.
 
     Raises
     ------
@@ -58,17 +58,17 @@ class Step:
         object.__setattr__(self, "changes", MappingProxyType(dict(self.changes)))
 
     def __reduce__(self) -> tuple[type[Step], tuple[object, ...]]:
-        """Travel to another process; a read-only mapping does not."""
+        """Pickle with a plain dict: a read-only mapping cannot be pickled."""
         return Step, (self.time, dict(self.changes), self.load_factor, self.increments)
 
     @property
     def is_plain(self) -> bool:
-        """Whether it says the time and nothing else, as the steps of results do."""
+        """Whether it has a time and nothing else, as the steps of results do."""
         return not self.changes and self.load_factor is None and self.increments == 1
 
 
 class Stated(ShownInNotebooks):
-    """What frozen dataclasses of one body and of several say about themselves, whatever they are made of."""
+    """Base of `Scene` and `Assembly`: title, load factors and steps, with their checks."""
 
     title: str
     load_factors: tuple[float, ...]
@@ -112,14 +112,14 @@ def check_stated(scene: object) -> None:
 
 
 def check_names(owner: str, names: Iterable[str], kind: str) -> None:
-    """Refuse names of parts or bodies of which one is given twice."""
+    """Raise InputError if two parts or bodies have one name."""
     for name, count in Counter(names).items():
         if count > 1:
             raise InputError(f"{owner}: {name!r} is the name of two {kind}: give each its own name")
 
 
 def check_laws(laws: Mapping[str, FrictionLaw], steps: Sequence[Step]) -> None:
-    """Refuse laws that need a load history where there are no steps.
+    """Check that laws that depend on slip or time have a load history.
 
     Raises
     ------

@@ -29,15 +29,15 @@ from bemkit.scene.conditions import Clamped, Contact, Part, PrescribedDisplaceme
 _PER_PIECE = 4
 """Elements of each piece of the boundary in the coarse mesh on which images are looked for."""
 _PLACES = np.array([-0.9, -0.37, 0.31, 0.8])
-"""Where on an element: at no end, where parts change, and at places that are not symmetric themselves."""
+"""Local coordinates of the points compared on each element: not its ends, where parts change, and not symmetric."""
 _TOLERANCE = 1e-9
-"""Difference, relative to the size of what is compared, that round-off and digits left out may explain."""
+"""Difference, relative to the values compared, up to which they count as equal: round-off and omitted digits."""
 _PRESSURES = (1e-6, 1e-4, 1e-2, 1.0)
-"""In units of E': where the bounds of friction laws are compared."""
+"""Pressures in units of E' at which the bounds of friction laws are compared."""
 
 
 class SymmetricScene(Protocol):
-    """What is compared of a scene; `bemkit.scene.scene.Scene` has it."""
+    """The members of a scene that are compared; `bemkit.scene.scene.Scene` is one."""
 
     @property
     def shape(self) -> Shape:
@@ -45,11 +45,11 @@ class SymmetricScene(Protocol):
 
     @property
     def material(self) -> Material:
-        """Whose modulus is the unit of pressures."""
+        """The material; its modulus is the unit of pressures."""
 
     @property
     def parts(self) -> tuple[Part, ...]:
-        """What acts where."""
+        """The boundary parts with their conditions."""
 
     @property
     def selections(self) -> Mapping[str, Selection]:
@@ -61,7 +61,7 @@ class SymmetricScene(Protocol):
 
     @property
     def body_forces(self) -> tuple[BodyForce, ...]:
-        """What acts inside the body."""
+        """Gravity, rotation, heating."""
 
     @property
     def symmetry(self) -> Symmetry | None:
@@ -84,7 +84,7 @@ def check_symmetry(scene: SymmetricScene, mesh: BoundaryMesh) -> None:
     Raises
     ------
     AsymmetricSceneError
-        Naming the first thing found that has no image, and both places.
+        Naming the first condition or point without an image, and both places.
     """
     if scene.symmetry != mesh.symmetry:
         raise AsymmetricSceneError(
@@ -114,8 +114,8 @@ def check_law_symmetry(name: str, law: FrictionLaw, points: FloatArray, symmetry
     """
     for signs in symmetry.images[1:]:
         images = symmetry.reflected(points, signs)
-        own, of_images = (_bounds(law, places, modulus) for places in (points, images))
-        difference = _first_difference(own, of_images, (points, images), signs)
+        bounds, image_bounds = (_bounds(law, places, modulus) for places in (points, images))
+        difference = _first_difference(bounds, image_bounds, (points, images), signs)
         if difference is not None:
             raise AsymmetricSceneError(
                 f"contact {name!r}: its law is not symmetric about {symmetry}: {difference}: correct it, or leave the "
@@ -140,7 +140,7 @@ def find_symmetry(scene: SymmetricScene) -> Symmetry | None:
         samples = _samples(whole.mesh)
         x, y = whole.mesh.centre.tolist()
         has_x, has_y = (whole.difference(line, samples) is None for line in (Symmetry(x=x), Symmetry(y=y)))
-    except InputError:  # the model says better what is wrong
+    except InputError:  # the error of preparing the scene explains it better
         return None
     return Symmetry(x if has_x else None, y if has_y else None) if has_x or has_y else None
 
@@ -195,25 +195,25 @@ class _Whole:
         signs = line.images[1]
         points = line.reflected(samples.points, signs)
         location = Locator(self.mesh).locate(points)
-        away = np.hypot(*(self._points(location.element, location.xi) - points).T)
-        k = int(np.argmax(away))
-        if away[k] > _TOLERANCE * self.mesh.diameter:
+        distance = np.hypot(*(self._points(location.element, location.xi) - points).T)
+        k = int(np.argmax(distance))
+        if distance[k] > _TOLERANCE * self.mesh.diameter:
             return (
                 f"the image {format_point(points[k])} of the boundary point {format_point(samples.points[k])} lies "
-                f"{away[k]:.3g} away from the boundary"
+                f"{distance[k]:.3g} away from the boundary"
             )
         inside = _inside(self.scene, samples.points), _inside(self.scene, points)
-        found = _first_difference(*inside, (samples.points, points), signs)
-        if found is not None:
-            return found
+        difference = _first_difference(*inside, (samples.points, points), signs)
+        if difference is not None:
+            return difference
         names = _part_names(self.mesh)
         images = _Samples(points, signs * samples.normals, tuple(names[e] for e in location.element.tolist()))
         pairs = list(zip(samples.parts, images.parts, strict=True))
         for pair in dict.fromkeys(pairs):
             rows = np.flatnonzero([other == pair for other in pairs])
-            found = self._compare(samples.take(rows), images.take(rows), signs)
-            if found is not None:
-                return found
+            difference = self._compare(samples.take(rows), images.take(rows), signs)
+            if difference is not None:
+                return difference
         return None
 
     def _points(self, elements: IntArray, xi: FloatArray) -> FloatArray:
@@ -223,48 +223,50 @@ class _Whole:
             points[rows] = self.mesh.points(np.array([element]), xi[rows])[0]
         return points
 
-    def _compare(self, here: _Samples, there: _Samples, signs: FloatArray) -> str | None:
-        """Compare what acts at points of one part with what acts at their images in one part."""
+    def _compare(self, samples: _Samples, images: _Samples, signs: FloatArray) -> str | None:
+        """Compare the conditions at points of one part with those at their images, which all lie in one part."""
         parts = {part.name: part for part in self.scene.parts}
-        kind, own = _acting(self.scene, parts.get(here.parts[0]), here)
-        kind_there, images = _acting(self.scene, parts.get(there.parts[0]), there)
-        places = (format_point(here.points[0]), format_point(there.points[0]))
-        if kind != kind_there:
-            return f"the boundary is {kind} at {places[0]} and {kind_there} at its image {places[1]}"
-        return _first_difference(own, images, (here.points, there.points), signs, gap_size=self.mesh.diameter)
+        kind, values = _acting(self.scene, parts.get(samples.parts[0]), samples)
+        image_kind, image_values = _acting(self.scene, parts.get(images.parts[0]), images)
+        places = (format_point(samples.points[0]), format_point(images.points[0]))
+        if kind != image_kind:
+            return f"the boundary is {kind} at {places[0]} and {image_kind} at its image {places[1]}"
+        points = (samples.points, images.points)
+        return _first_difference(values, image_values, points, signs, gap_size=self.mesh.diameter)
 
 
 def _first_difference(
-    own: Mapping[str, FloatArray],
-    images: Mapping[str, FloatArray],
+    values: Mapping[str, FloatArray],
+    image_values: Mapping[str, FloatArray],
     places: tuple[FloatArray, FloatArray],
     signs: FloatArray,
     gap_size: float = 0.0,
 ) -> str | None:
-    """Say which of some values (n, 1), or vectors (n, 2), at points and at their images are not each other's image."""
-    here, there = places
-    for name, values in own.items():
-        expected = values * signs if values.shape[1] == 2 else values
-        size = max(_largest(values), _largest(images[name]), gap_size if name == "gap" else 0.0)
-        same = expected == images[name]  # infinite gaps
-        off = np.abs(np.where(same, 0.0, expected) - np.where(same, 0.0, images[name])).max(axis=1)
-        k = int(np.argmax(off))
-        if not off[k] <= _TOLERANCE * size:
+    """Say where values (n, 1), or vectors (n, 2), at points are not those at their images; None if they all are."""
+    points, images = places
+    for name, at_points in values.items():
+        at_images = image_values[name]
+        expected = at_points * signs if at_points.shape[1] == 2 else at_points
+        size = max(_largest(at_points), _largest(at_images), gap_size if name == "gap" else 0.0)
+        same = expected == at_images  # infinite gaps
+        difference = np.abs(np.where(same, 0.0, expected) - np.where(same, 0.0, at_images)).max(axis=1)
+        k = int(np.argmax(difference))
+        if not difference[k] <= _TOLERANCE * size:
             return (
-                f"the {name} is {_text(values[k])} at {format_point(here[k])} and {_text(images[name][k])} "
-                f"at its image {format_point(there[k])}"
+                f"the {name} is {_text(at_points[k])} at {format_point(points[k])} and {_text(at_images[k])} "
+                f"at its image {format_point(images[k])}"
             )
     return None
 
 
 def _inside(scene: SymmetricScene, points: FloatArray) -> dict[str, FloatArray]:
-    """Return the body force (n, 2) and the thermal strain (n, 1); a harmonic one is told by its boundary values."""
+    """Return body force (n, 2) and thermal strain (n, 1), which is harmonic: its boundary values determine it."""
     force, strain = np.zeros_like(points), np.zeros((len(points), 1))
-    for each in scene.body_forces:
-        if isinstance(each, Heating):
-            strain += each.strain_at(points)[:, None]
+    for body_force in scene.body_forces:
+        if isinstance(body_force, Heating):
+            strain += body_force.strain_at(points)[:, None]
         else:
-            force += each.force_at(points)
+            force += body_force.force_at(points)
     return {"body force": force, "thermal strain": strain}
 
 
@@ -279,8 +281,8 @@ def _acting(scene: SymmetricScene, part: Part | None, samples: _Samples) -> tupl
         case Traction() | Pressure() as load:
             return "free or loaded", {"traction": load.at(points, normals)}
         case PrescribedDisplacement() as motion:
-            given = " and ".join(name for name, is_given in zip("xy", motion.is_prescribed, strict=True) if is_given)
-            return f"displaced along {given}", {"displacement": motion.at(points)}
+            axes = " and ".join(name for name, is_given in zip("xy", motion.is_prescribed, strict=True) if is_given)
+            return f"displaced along {axes}", {"displacement": motion.at(points)}
         case Clamped():
             return "clamped", {}
         case Roller():

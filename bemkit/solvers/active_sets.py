@@ -17,7 +17,7 @@ from bemkit.contact.projection import (
 
 
 class NodeStatus(IntEnum):
-    """What a contact node does."""
+    """Status of a contact node."""
 
     SEPARATED = 0
     STICK = 1
@@ -29,13 +29,14 @@ class NodeStatus(IntEnum):
 
 @dataclass(frozen=True, eq=False)
 class ActiveSets:
-    """The sets of Algorithm 2, node by node.
+    """The active sets of Algorithm 2, node by node.
 
     Parameters
     ----------
     is_closed : (n_contact,) bool array
-    direction : (n_contact,) array
-        +1 or -1 for slip along or against the tangent, 0 for stick.
+        Whether ``u_n = g`` holds; open nodes carry no normal traction.
+    direction : (n_contact,) int array
+        +1 or -1 for slip along or against the tangent, 0 for stick; of open nodes that of the projection (16).
     """
 
     is_closed: BoolArray
@@ -66,9 +67,9 @@ class Residual:
     ----------
     state : ContactState
     sets : ActiveSets
-        By the generalised derivatives of the projections. Ties count as separated and as stick.
+        From the generalised derivatives of the projections: a node at a tie counts as separated, or as sticking.
     bound, slope : (n_contact,) arrays [Pa], [-]
-        Friction bound and its derivative at the predicted normal traction.
+        Friction bound and its derivative at `predicted_sigma_n`.
     predicted_sigma_n : (n_contact,) array [Pa]
         ``-[rho_n (u_n - g) - multiplier_n]_+``.
     value : (n_contact, 2) array [Pa]
@@ -84,13 +85,17 @@ class Residual:
 
     @property
     def is_free(self) -> BoolArray:
-        """(n_contact,) bool array: nodes that slide freely, because neither a bound nor its derivative is there."""
+        """(n_contact,) bool array: nodes without friction, whose bound and its derivative vanish."""
         return np.asarray((self.bound == 0.0) & (self.slope == 0.0))
 
 
 @dataclass(frozen=True, eq=False)
 class ProjectionEquations:
-    """Contact and friction as the projection equations (15), (16), ready for semismooth Newton [AlartCurnier1991].
+    """Contact and friction as the projection equations (15), (16) of the paper [AlartCurnier1991].
+
+    With the multiplier m, which is the traction itself unless it is held fixed,
+
+        sigma_n = -[rho_n (u_n - g) - m_n]_+,    sigma_t = -clip(rho_t slip - m_t, bound(sigma_n)).
 
     Parameters
     ----------
@@ -104,7 +109,7 @@ class ProjectionEquations:
         Friction bound held fixed (lagged). Without it the bound follows the predicted normal traction, and the
         Newton matrix contains its derivative.
     friction_share : float
-        Factor of a bound that is not held fixed; less than one in problems on the way to the one proper.
+        Factor of a bound that is not held fixed: less than one for weaker friction than that of the law.
     """
 
     problem: ContactProblem
@@ -144,37 +149,41 @@ class ProjectionEquations:
         return Residual(state, sets, bound, slope, predicted_sigma_n, value)
 
     def linearised(self, residual: Residual, sets: ActiveSets) -> LinearConditions:
-        """Return the Newton equations at a residual for the given sets (its own, or those of `through_stick`).
+        """Return the equations of a Newton step as conditions on the body.
 
-        Where neither a bound nor its derivative is present the node slides freely, whatever its direction.
+        Parameters
+        ----------
+        residual : Residual
+            Where the friction bound is linearised.
+        sets : ActiveSets
+            Those of the residual, or those of `through_stick`. Nodes without friction slide, whatever their direction.
         """
         problem = self.problem
         if self.multiplier is None:
-            held = stick(problem.gap, problem.slip_origin)
+            sticking = stick(problem.gap, problem.slip_origin)
         else:
-            held = augmented(problem.gap, problem.slip_origin, self.multiplier, self.rho_n, self.rho_t)
+            sticking = augmented(problem.gap, problem.slip_origin, self.multiplier, self.rho_n, self.rho_t)
         intercept = residual.bound - residual.slope * residual.predicted_sigma_n
         sliding = slip(problem.gap, sets.direction.astype(float), residual.slope, intercept)
         slides = (sets.direction != 0) | residual.is_free
-        return of_statuses(sets.is_closed, slides, held, sliding)
+        return of_statuses(sets.is_closed, slides, sticking, sliding)
 
     def through_stick(self, residual: Residual, previous: ActiveSets) -> ActiveSets:
         """Return the sets of `residual` with every direct change of slip direction replaced by stick.
 
-        A node, open or closed, may slip the other way only after it has come to rest. Without this the active sets of
-        stiff bodies alternate between slip to the left and slip to the right for ever. Nodes without any bound slide
-        whatever their direction is; theirs is zero here, so that equal sets give equal steps.
+        Otherwise the active sets of stiff bodies alternate between slip in both directions for ever. The direction of
+        nodes without friction does not matter; it is set to zero, so that equal sets give equal steps.
         """
         sets = residual.sets
-        flips = sets.direction * previous.direction < 0
-        return ActiveSets(sets.is_closed, np.where(flips | residual.is_free, 0, sets.direction))
+        reverses = sets.direction * previous.direction < 0
+        return ActiveSets(sets.is_closed, np.where(reverses | residual.is_free, 0, sets.direction))
 
 
 def contact_sets(problem: ContactProblem, state: ContactState) -> ActiveSets:
-    """Return the active sets of a state under the exact conditions, rho being the stiffness scale of the body.
+    """Return the active sets of a state by the exact conditions, with the stiffness scale of the body as rho.
 
-    Nothing makes a node without any friction stick: where it does not move, that is chance, and it counts as slipping.
-    A node without pressure touches if cohesion holds it, which ends when a node opens.
+    A closed node without friction counts as slipping even if it happens not to move. A node without pressure counts as
+    closed if cohesion holds it; see `coheres`.
     """
     rho = problem.body.stiffness_scale
     residual = ProjectionEquations(problem, rho, rho).evaluate(state, coheres(problem, state))
@@ -183,9 +192,9 @@ def contact_sets(problem: ContactProblem, state: ContactState) -> ActiveSets:
 
 
 def coheres(problem: ContactProblem, state: ContactState) -> BoolArray:
-    """Return (n_contact,) bool: where friction that needs contact but no pressure acts, as cohesion does.
+    """Return (n_contact,) bool: nodes that cohesion holds, which is friction that needs contact but no pressure.
 
-    As in a certificate a node with less shear than would close its clearance is open.
+    As in the certificate a node is open if its tangential traction is less than what would close its clearance.
     """
     has_cohesion = (problem.cohesion > 0.0) & ~np.asarray(problem.law.acts_across_gap)
     clearance = problem.body.stiffness_scale * np.abs(problem.gap - state.u_n)

@@ -26,8 +26,8 @@ class InnerNewton:
     max_steps : int
         Linear solves allowed in one outer step.
     full_steps : int
-        Steps taken in full before the line search takes over. Full steps end after finitely many almost always, and
-        fastest; the line search makes the rest certain.
+        Full steps before the line search begins. Full steps nearly always end after a few; the line search makes the
+        iteration converge from any start.
     """
 
     max_steps: int = 100
@@ -45,13 +45,13 @@ class BoundUpdate(Enum):
     """The multiplier of the last outer step, as printed in Algorithm 1: each outer step solves a Tresca problem."""
 
     CURRENT = "current"
-    """The present one, differentiated inside the inner Newton iteration: the outer iteration no longer waits for the
-    bound and converges at the rate of the augmentation alone."""
+    """The present one, differentiated inside the inner Newton iteration. The outer iteration then converges at the rate
+    of the augmentation alone."""
 
 
 @dataclass(frozen=True)
 class AugmentedLagrangian:
-    """Algorithm 1: solve with fixed multipliers, take the resulting tractions as the next multipliers.
+    """Algorithm 1 of the paper: solve with fixed multipliers, and take the tractions as the next multipliers.
 
     Parameters
     ----------
@@ -60,6 +60,7 @@ class AugmentedLagrangian:
         them in units of E'/L. By default 100 times the stiffness scale of the body.
     inner : InnerNewton
     bound : BoundUpdate
+        Whether the friction bound of an outer step comes from the multiplier or from the present normal traction.
     max_steps : int
         Outer steps allowed.
 
@@ -128,9 +129,9 @@ class InnerResult:
 def solve_projected(equations: ProjectionEquations, start: ContactState, options: InnerNewton) -> InnerResult:
     """Solve projection equations with fixed multipliers by semismooth Newton, from a response of the body.
 
-    With a given bound the residual along a Newton direction d, weighted, ``sum w residual . d``, is the slope of a
-    convex function if the body is symmetric (the augmented energy), so going to its zero makes the iteration descend
-    from any start.
+    With a given bound and a symmetric body the weighted residual along a Newton direction d, ``sum w residual . d``, is
+    the slope of a convex function, the augmented energy. A line search to the zero of this slope makes the iteration
+    descend from any start.
     """
     residual = equations.evaluate(start)
     sets, linear_solves, n_regularised = residual.sets, 0, 0
@@ -153,14 +154,14 @@ def solve_projected(equations: ProjectionEquations, start: ContactState, options
 def _is_solved(
     equations: ProjectionEquations, residual: Residual, reached: Residual, sets: ActiveSets, *, is_regularised: bool
 ) -> bool:
-    """Whether the Newton point solves the equations: no residual, or its own sets and its own linearised bound."""
+    """Whether the Newton point solves the equations: no residual, or the same sets and an exactly linear bound."""
     stress, _ = certificate_scales(equations.problem, reached.state)
-    nothing = negligible(equations.problem.body) * stress
-    if np.abs(reached.value).max() <= nothing:
+    tolerance = negligible(equations.problem.body) * stress
+    if np.abs(reached.value).max() <= tolerance:
         return True
-    # Displacements times a large rho leave more than that as round-off, so look at what was linearised instead.
+    # The round-off of displacements times a large rho may be larger, so compare what was linearised instead.
     linearised = residual.bound + residual.slope * (reached.predicted_sigma_n - residual.predicted_sigma_n)
-    is_exact = bool(np.all(np.abs(reached.bound - linearised)[sets.direction != 0] <= nothing))
+    is_exact = bool(np.all(np.abs(reached.bound - linearised)[sets.direction != 0] <= tolerance))
     return not is_regularised and reached.sets.key == sets.key and is_exact
 
 

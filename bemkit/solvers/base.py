@@ -57,7 +57,7 @@ class Status(Enum):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Iterate:
-    """Where a driver stands; drivers derive their own iterates from it.
+    """One state of an iteration; drivers that remember more derive their own iterates from it.
 
     Parameters
     ----------
@@ -66,9 +66,9 @@ class Iterate:
     linear_solves : int
         Linear systems spent since `init`.
     ended : Status or None
-        Set by a driver that cannot go on.
+        Why the driver cannot go on; None while it can.
     message : str
-        Why it ended, or a note on the step for the history.
+        The reason in words, or a note on the step for the history.
     """
 
     state: ContactState
@@ -128,8 +128,9 @@ class StepRecord:
         Linear systems spent so far.
     certificate : Certificate
     relative_change : float
-        ``max|u - u_previous| / max|u|``, the paper's stopping quantity (infinite at the start).
+        ``max|u - u_previous| / max|u|``, by which the paper decides when to stop (infinite at the start).
     n_separated, n_stick, n_slip : int
+        Number of nodes in each status.
     n_changed : int
         Nodes whose status changed in this step.
     message : str
@@ -149,17 +150,18 @@ class StepRecord:
 
 @dataclass(frozen=True, eq=False)
 class ContactSolution:
-    """What a solve returns.
+    """State, status and history of one call of `solve`.
 
     Parameters
     ----------
     state : ContactState
-        Physical displacements and tractions.
+        Displacements and tractions; NaN if the solve ended before there was a state.
     status : Status
     certificate : Certificate
-        Of this very state.
+        Of `state`.
     node_status : (n_contact,) array of `NodeStatus` values
     steps, linear_solves : int
+        Steps of the driver, and linear systems solved in all of them and at the start.
     message : str
         One sentence on how the solve ended.
     history : tuple of StepRecord
@@ -264,19 +266,19 @@ class _Run:
     callback: Callable[[StepRecord], None] | None
 
     def finish(self, start: ContactState | None) -> ContactSolution:
-        """Step until a status is reached."""
+        """Run the driver from a start until there is a status."""
         # Overflow is not warned about: it ends in the status NOT_FINITE.
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
             try:
                 untouched = self._untouched()
                 if untouched is None and (unsolvable := find_unsolvable_load(self.problem)) is not None:
-                    return self._nothing_done(Status.UNSOLVABLE_LOAD, unsolvable.description)
-                iterate = self._without_contact(self._first(start, spent=int(untouched is not None)), untouched)
+                    return self._without_state(Status.UNSOLVABLE_LOAD, unsolvable.description)
+                iterate = self._without_contact(self._first(start, n_before=int(untouched is not None)), untouched)
             except SingularResponse as error:
-                return self._nothing_done(Status.SINGULAR, str(error))
+                return self._without_state(Status.SINGULAR, str(error))
             sets = contact_sets(self.problem, iterate.state)
             history = [self._record(iterate, sets, 0, float("inf"), 0)]
-            while (status := self._verdict(iterate, history)) is None:
+            while (status := self._status(iterate, history)) is None:
                 try:
                     following = self.solver.step(self.problem, iterate)
                 except SingularResponse as error:
@@ -286,7 +288,7 @@ class _Run:
                 change = _relative_change(following.state, iterate.state)
                 history.append(self._record(following, new_sets, len(history), change, new_sets.n_changed(sets)))
                 iterate, sets = following, new_sets
-            # a certificate measures by the travel where that hides the deformation
+            # where the travel to the obstacle hides the deformation, the certificate is relative to the travel
             may_travel = untouched is None and status is not Status.MAX_STEPS
             if may_travel and (travel := find_long_travel(self.problem)) is not None:
                 status, words = Status.TOO_FAR, f"the travel is {travel:.1e} times the deformation"
@@ -304,25 +306,25 @@ class _Run:
 
     def _untouched(self) -> FloatingResponse | None:
         """Return the response without any contact, if there is one; it does not depend on the law."""
-        known = self.problem.of_body
-        if "untouched" not in known:
-            known["untouched"] = None if needs_contact(self.problem) else untouched_response(self.problem.body)
-        untouched: FloatingResponse | None = known["untouched"]
-        return untouched
+        problem = self.problem
+        return problem.for_all_laws(
+            "untouched", lambda: None if needs_contact(problem) else untouched_response(problem.body)
+        )
 
-    def _first(self, start: ContactState | None, spent: int) -> Iterate:
+    def _first(self, start: ContactState | None, n_before: int) -> Iterate:
+        """Return the iterate of a start, its linear solves and those before it counted."""
         if start is None:
             state, linear_solves = self.problem.sticking_state, 1
         else:
             state, linear_solves = consistent_state(self.problem, start)
         iterate = self.solver.init(self.problem, state)
-        return replace(iterate, linear_solves=iterate.linear_solves + linear_solves + spent)
+        return replace(iterate, linear_solves=iterate.linear_solves + linear_solves + n_before)
 
     def _without_contact(self, iterate: Iterate, untouched: FloatingResponse | None) -> Iterate:
-        """Return the iterate without contact tractions, if the body needs none where the iterate has brought it.
+        """Return the iterate without contact tractions, if the body needs none at its displacements.
 
-        Drivers only come ever closer to tractions that vanish. What they leave is no small error, having nothing to be
-        small against; a body that has been carried far may be moved out of the obstacle by a last little.
+        Drivers only approach tractions that vanish, and where all vanish nothing tells that the rest is small. A body
+        that has moved far may be moved on by a little, out of the obstacle.
         """
         if untouched is None or not iterate.state.is_finite:
             return iterate
@@ -331,15 +333,13 @@ class _Run:
             return iterate
         return replace(iterate, state=state, message="the body rests without touching")
 
-    def _record(
-        self, iterate: Iterate, sets: ActiveSets, step: int, relative_change: float, n_changed: int
-    ) -> StepRecord:
+    def _record(self, iterate: Iterate, sets: ActiveSets, step: int, change: float, n_changed: int) -> StepRecord:
         slips = sets.is_closed & (sets.direction != 0)
         record = StepRecord(
             step=step,
             linear_solves=iterate.linear_solves,
             certificate=certify(self.problem, iterate.state),
-            relative_change=relative_change,
+            relative_change=change,
             n_separated=int(np.count_nonzero(~sets.is_closed)),
             n_stick=int(np.count_nonzero(sets.is_closed & ~slips)),
             n_slip=int(np.count_nonzero(slips)),
@@ -350,7 +350,8 @@ class _Run:
             self.callback(record)
         return record
 
-    def _verdict(self, iterate: Iterate, history: list[StepRecord]) -> Status | None:
+    def _status(self, iterate: Iterate, history: list[StepRecord]) -> Status | None:
+        """Return the status with which the solve ends here, None if it goes on."""
         if not iterate.state.is_finite:
             return Status.NOT_FINITE
         if history[-1].certificate.is_below(self.tolerance):
@@ -376,7 +377,7 @@ class _Run:
             history=tuple(history),
         )
 
-    def _nothing_done(self, status: Status, message: str) -> ContactSolution:
+    def _without_state(self, status: Status, message: str) -> ContactSolution:
         n_contact = self.problem.n_contact
         unknown = np.full((n_contact, 2), np.nan)
         return ContactSolution(

@@ -25,8 +25,9 @@ class FixedPoint:
 
     Notes
     -----
-    The classical proof of existence [NecasJarusekHaslinger1980] made into a method. It contracts for moderate friction
-    only; beyond, it ends with CYCLING or STALLED. The limit of `AugmentedLagrangian` for large rho.
+    The iteration of the classical proof of existence [NecasJarusekHaslinger1980]; also the limit of
+    `AugmentedLagrangian` for large rho. It converges for moderate friction only; otherwise it ends with CYCLING or
+    STALLED.
     """
 
     inner: SemismoothNewton = field(default_factory=SemismoothNewton)

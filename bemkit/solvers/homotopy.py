@@ -1,14 +1,14 @@
-"""Follow the path of exact solutions while an extra pressure and an extra friction are taken off.
+"""Follow the path of exact solutions while an extra pressure and an extra friction decrease to zero.
 
-Pressed hard enough by extra forces at the contact nodes and held by enough extra friction, every body touches
-everywhere and sticks everywhere. Between two changes of a node's status the response is linear in the amount of the
-extras, so the path from there to the problem proper consists of straight pieces: at each joint one node changes its
-status, and the amount goes on falling, or rises again for a while where the path folds. Folds are where Newton's method
-and plain continuation fail; here they cost nothing. This is Lemke's complementary pivoting [Lemke1965], carried out
-on a body instead of a matrix.
+With enough extra pressure and friction at the contact nodes every node is closed and sticks. Between two changes of a
+node's status the response is linear in the amount of the extras. So the path from there to the problem itself consists
+of straight pieces: at each joint one node changes its status, and the amount goes on falling, or rises for a while
+where the path folds. At folds Newton's method and plain continuation fail; this method does not. It is Lemke's
+complementary pivoting [Lemke1965], carried out on a body instead of a matrix.
 
-The path may also start with any other statuses, those at which Newton's method gives up: then only nodes that violate
-an inequality get extras, of pressure, friction, gap or slip, which make it hold. Few are wrong, so this path is short.
+The path may also start with other statuses, such as those at which Newton's method gives up. Then only nodes that
+violate an inequality get extras (of pressure, friction, gap or slip), so that it holds. These are few, and the path is
+short.
 """
 
 from dataclasses import dataclass
@@ -64,7 +64,7 @@ class PathEnd(NamedTuple):
 
 
 class _Piece(NamedTuple):
-    """Where the path runs straight: tractions and displacements are ``origin + amount * rate``."""
+    """A straight piece of the path: tractions and displacements are ``origin + amount * rate``."""
 
     origin: ContactState
     rate: ContactState
@@ -74,10 +74,10 @@ class _Piece(NamedTuple):
 
 
 def why_no_path(problem: ContactProblem, *, is_short: bool = False) -> str:
-    """Return why the path of solutions is not to be followed, nothing if it is.
+    """Return why the path of solutions cannot be followed; empty if it can.
 
-    It asks for two responses or more for each contact node, unless it is short, and the law has to be continuous where
-    nodes open.
+    Unless it is short it takes two responses or more for each contact node. The friction bound has to be continuous
+    where nodes open.
     """
     if problem.body.is_costly and not is_short:
         return "the path of solutions is not followed, because responses of this body are costly"
@@ -95,11 +95,11 @@ def follow_path(
     Parameters
     ----------
     problem : ContactProblem
-        Its law is not asked; `bound` stands for it.
+        Its law is replaced by `bound`.
     bound : AffineBound
     start : ActiveSets, optional
-        By default all nodes are closed and stick, from where a path leads to a solution of every body that is held.
-        From statuses near those of a solution it is short, but may lead nowhere.
+        By default all nodes are closed and stick; that path leads to a solution if the body is held. From statuses near
+        those of a solution the path is short, but may not lead to one.
     max_pieces : int, optional
         By default ``20 n_contact + 100``; about 1.5 pieces a node are usual.
 
@@ -109,24 +109,24 @@ def follow_path(
         Two linear solves a piece. Tractions and displacements are exact up to round-off.
     """
     try:
-        path, is_closed, direction, n_solves = _begun(problem, bound, start)
+        path, is_closed, direction, n_solves = _start_of_path(problem, bound, start)
     except SingularResponse as error:
         return PathEnd(None, 2, 0, f"the path begins with a singular response: {error}")
     limit = 20 * problem.n_contact + 100 if max_pieces is None else max_pieces
-    state, n_pieces, reason = _walked(path, is_closed, direction, limit)
+    state, n_pieces, reason = _follow_pieces(path, is_closed, direction, limit)
     return PathEnd(state, n_solves + 2 * n_pieces, n_pieces, reason)
 
 
-def _begun(
+def _start_of_path(
     problem: ContactProblem, bound: AffineBound, start: ActiveSets | None
 ) -> tuple["_Path", BoolArray, IntArray, int]:
-    """Return a path, its first statuses (closed, direction of slip), and the linear solves that these took."""
+    """Return a path, its first statuses (closed, direction of slip), and the linear solves to find them."""
     if start is None:
         at_rest = np.zeros(problem.n_contact, dtype=np.intp)
         return _Path(problem, bound, Extras.everywhere(problem)), np.isfinite(problem.gap), at_rest, 0
     path = _Path(problem, bound, Extras.nothing(problem))
     is_closed, n_solves = start.is_closed, 0
-    while True:  # until no node slips and is pulled, which extra pressure could not mend without changing the friction
+    while True:  # open nodes that slip under tension: extra pressure there would change the friction
         piece = path.piece(is_closed, start.direction)
         n_solves += 2
         is_pulled = is_closed & (start.direction != 0) & (piece.slack[_Kind.PRESSURE] < 0.0)
@@ -136,7 +136,7 @@ def _begun(
         is_closed = is_closed & ~is_pulled
 
 
-def _walked(
+def _follow_pieces(
     path: "_Path", is_closed: BoolArray, direction: IntArray, limit: int
 ) -> tuple[ContactState | None, int, str]:
     """Return the end of a path (None if it does not lead to a solution), the number of its pieces, and the reason."""
@@ -166,7 +166,7 @@ def _walked(
 
 @dataclass(frozen=True, eq=False)
 class Extras:
-    """What is added to a problem so that given statuses solve it, for an amount of one.
+    """Additions to a problem, for an amount of one, with which given statuses solve it.
 
     Parameters
     ----------
@@ -196,20 +196,20 @@ class Extras:
 
     @classmethod
     def covering(cls, piece: "_Piece", bound: AffineBound, direction: IntArray) -> "Extras":
-        """Return what makes the inequalities hold that a piece without extras violates, and leaves its response.
+        """Return the extras that make all inequalities of a piece hold and do not change its response.
 
-        No node of the piece slips and is pulled: there an extra pressure would change the friction.
+        Needs a piece in which no slipping node is under tension: extra pressure there would change the friction.
         """
         missing = np.where(piece.is_kept, np.maximum(-piece.slack, 0.0), 0.0)
         missing *= _uneven(missing.size).reshape(missing.shape)
         pressure = missing[_Kind.PRESSURE]
         friction = np.maximum(missing[_Kind.FORWARD], missing[_Kind.BACKWARD])
-        friction = np.maximum(friction + bound.slope * pressure, 0.0)  # with what the extra pressure brings
+        friction = np.maximum(friction + bound.slope * pressure, 0.0)  # less what the extra pressure adds
         return cls(pressure, friction, missing[_Kind.CLEARANCE], -direction * missing[_Kind.SLIP])
 
 
 def _uneven(count: int) -> FloatArray:
-    """Return numbers from 1 to 3/2, as unequal as can be, which keep symmetric nodes from changing at once."""
+    """Return numbers from 1 to 3/2, all different, so that nodes of symmetric problems do not change at once."""
     return 1.0 + 0.5 * spread_fractions(count)
 
 
@@ -241,7 +241,7 @@ class _Path:
         sliding = slip(problem.gap, direction.astype(float), bound.slope, bound.intercept)
         conditions = of_statuses(is_closed, slips, held, sliding)
 
-        # The body carries contact traction plus extra pressure; the conditions speak of contact tractions alone.
+        # The body carries contact traction plus extra pressure; the conditions are on contact tractions alone.
         extras = self.extras
         extra_value = conditions.on_traction[:, :, 0] * extras.pressure[:, None]
         extra_value[:, 1] -= direction * extras.friction
@@ -270,18 +270,18 @@ class _Path:
 
 
 def _first_amount(piece: _Piece) -> float:
-    """Return an amount of extras from which on upwards all inequalities hold."""
+    """Return an amount of extras above which all inequalities hold."""
     grows = piece.is_kept & (piece.slack_rate > 0.0)
     return max(0.0, float(np.max(-piece.slack[grows] / piece.slack_rate[grows], initial=0.0))) * 1.01
 
 
 def _next_joint(piece: _Piece, amount: float, falling: float) -> tuple[float, _Kind, int]:
-    """Return how far the piece reaches, and the inequality and node that end it."""
+    """Return by how much the amount changes on the piece, and the inequality and node that end it."""
     rate = falling * piece.slack_rate
     ends = piece.is_kept & (rate < 0.0)
     reach = np.full(rate.shape, np.inf)
-    here = piece.slack[ends] + amount * piece.slack_rate[ends]
-    reach[ends] = np.maximum(here, 0.0) / -rate[ends]
+    slack = piece.slack[ends] + amount * piece.slack_rate[ends]
+    reach[ends] = np.maximum(slack, 0.0) / -rate[ends]
     kind, node = np.unravel_index(np.argmin(reach), reach.shape)
     return float(reach[kind, node]), _Kind(int(kind)), int(node)
 
@@ -289,7 +289,7 @@ def _next_joint(piece: _Piece, amount: float, falling: float) -> tuple[float, _K
 def _pivoted(
     is_closed: BoolArray, direction: IntArray, kind: _Kind, node: int
 ) -> tuple[BoolArray, IntArray, tuple[_Kind, int]]:
-    """Return the statuses after the joint and the inequality that takes over from the one that ended the piece."""
+    """Return the statuses after the joint, and the inequality that becomes active instead of the one that ended."""
     is_closed, direction = is_closed.copy(), direction.copy()
     if kind in (_Kind.PRESSURE, _Kind.CLEARANCE):
         is_closed[node] = not is_closed[node]

@@ -26,8 +26,8 @@ def probe(
     problem : ContactProblem
     solver : ContactSolver
     n_starts : int
-        Starts made here: all nodes sticking, open, slipping forward, slipping backward, then random choices,
-        always the same.
+        Number of starts that are made: all nodes sticking, open, slipping forward, slipping backward, then random
+        choices with a fixed seed.
     starts : sequence of ContactState
         Further starts, tried first.
 
@@ -47,12 +47,12 @@ def probe(
     uniform = [1, 0, 2, 3]
     choices = [np.full(problem.n_contact, status) for status in uniform[:n_starts]]
     choices += [random.integers(0, 4, problem.n_contact) for _ in range(n_starts - len(choices))]
-    found: list[ContactSolution] = []
+    distinct: list[ContactSolution] = []
     for start in [*starts, *(start_with(problem, choice) for choice in choices)]:
         solution = solve(problem, solver, start=start, throw=False)
-        if solution.is_converged and not any(_is_same(problem, solution.state, other.state) for other in found):
-            found.append(solution)
-    return tuple(found)
+        if solution.is_converged and not any(_is_same(problem, solution.state, other.state) for other in distinct):
+            distinct.append(solution)
+    return tuple(distinct)
 
 
 def start_with(problem: ContactProblem, node_status: Sequence[int] | IntArray) -> ContactState:

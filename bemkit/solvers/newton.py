@@ -1,4 +1,8 @@
-"""Newton steps on the projection equations, shared by all drivers, also where they leave the body free to move."""
+"""Newton steps on the projection equations, shared by all drivers; and how to respond where they leave the body free.
+
+Active sets on the way to a solution may leave rigid motions of a body free. If the forces on it balance, it stays where
+it is along them (`floating_response`); otherwise weak springs hold it during the step (`respond`).
+"""
 
 from dataclasses import dataclass
 
@@ -25,42 +29,42 @@ from bemkit.contact.problem import (
 from bemkit.errors import InputError
 from bemkit.solvers.active_sets import ActiveSets, ProjectionEquations, Residual, coheres
 
-_SPRING = 1e-3
-"""Springs that hold an unheld body, in units of its stiffness scale. Small: each further step reduces what the
-springs still carry by about this factor. Not tiny: the response must stay well determined."""
+_SPRING_STIFFNESS = 1e-3
+"""Stiffness of the springs that hold a free body, in units of its stiffness scale. Small, because each step reduces the
+force in the springs by about this factor; not tiny, because the response must stay well determined."""
 
-_WEAKER = 0.1
+_SPRING_DECREASE = 0.1
 WEAKEST_AFTER = 8
-"""Springs become weaker by the factor with every step that ends in the sets it began with, so that a small force soon
-carries the body to where other sets hold it; so many times at most."""
+"""Factor of the stiffness after each step that ends in the sets it began with, and how often it is applied at most. A
+small force then soon carries the body to where other sets hold it."""
 
 _BEYOND = 1.01
-"""Share of the way to the next node that closes by which a body is carried there: a little beyond it, so that the node
-counts as closed although springs pull it back, and no other one does."""
+"""Factor of the way of a body to where the next node closes. A little beyond it the node counts as closed although
+springs pull it back, and no other node does."""
 
 _NEGLIGIBLE = 100.0
-"""Residuals and imbalances below this many times the accuracy of a body mean nothing. Of a direct solver that is 1e-12:
-a certificate asks for 1e-9, but a load of 1e-10 may still carry a body to an obstacle."""
+"""Residuals and imbalances below this many times the accuracy of a body are round-off: 1e-12 for a direct solver, since
+a load of 1e-10 may still carry a body to an obstacle, although a certificate asks for 1e-9."""
 
-_UNFELT = 1e-12
-"""Squared size of slips, relative to the largest, below which a motion makes no slip."""
+_NO_SLIP = 1e-12
+"""Squared size of slips, relative to the largest, below which a rigid motion makes no slip."""
 
-_JAMMED = 1e-12
-"""Rest of a least-squares problem below which there is no way out of the obstacle."""
+_INFEASIBLE = 1e-12
+"""Residual of a least-squares problem below which no motion takes all nodes out of the obstacle."""
 
 _MOST_PINNED = 60
-"""Of more free motions than that the forces are not sorted out: springs hold them."""
+"""Largest number of free motions for which reactions are computed; of more motions springs hold the body."""
 
 
 @dataclass(frozen=True, eq=False)
 class Response:
-    """Answer of the body to Newton's linear equations.
+    """Solution of Newton's linear equations.
 
     Parameters
     ----------
     state : ContactState
     linear_solves : int
-        Linear systems spent.
+        Linear systems solved for it.
     is_regularised : bool
         Whether the conditions left the body free to move, so that springs had to hold it in this step.
     """
@@ -73,9 +77,22 @@ class Response:
 def respond(equations: ProjectionEquations, residual: Residual, sets: ActiveSets, n_regularised: int = 0) -> Response:
     """Solve the equations linearised at a residual, for the given sets.
 
-    If the sets do not hold the body, it stays near its present displacements: exactly there if the forces on it
-    balance, or else held by weak springs during this step, weaker after `n_regularised` such steps with the same sets.
-    Raises `SingularResponse` if even springs at all free nodes do not hold it.
+    If the sets do not hold the body, it stays as near to its present displacements as they allow: without springs if
+    the forces on it balance, otherwise held by weak springs during this step.
+
+    Parameters
+    ----------
+    equations : ProjectionEquations
+    residual : Residual
+        Where the equations are linearised.
+    sets : ActiveSets
+    n_regularised : int
+        Steps with springs and with these same sets before this one; the springs are weaker for each.
+
+    Raises
+    ------
+    SingularResponse
+        If even springs at all free nodes do not hold the body.
     """
     body = equations.problem.body
     linear = equations.linearised(residual, sets)
@@ -85,7 +102,8 @@ def respond(equations: ProjectionEquations, residual: Residual, sets: ActiveSets
         floating = floating_response(body, linear)
         if floating is not None:
             return Response(floating.nearest(residual.state.displacement), 2, is_regularised=False)
-        stiffness = spring_stiffness(equations.problem, residual.state) * _WEAKER ** min(n_regularised, WEAKEST_AFTER)
+        decrease = _SPRING_DECREASE ** min(n_regularised, WEAKEST_AFTER)
+        stiffness = spring_stiffness(equations.problem, residual.state) * decrease
         springs = linear.regularised(residual.state.displacement, stiffness)
         return Response(equations.problem.respond(springs), 2, is_regularised=True)
 
@@ -96,26 +114,37 @@ def spring_stiffness(problem: ContactProblem, state: ContactState) -> float:
     nearest = float(np.min(problem.gap - state.u_n))
     stiffness = problem.body.stiffness_scale
     if np.isfinite(nearest) and nearest > 0.0:
-        return _SPRING * stiffness / (1.0 + _SPRING * stiffness * nearest / stress)
-    return _SPRING * stiffness
+        return _SPRING_STIFFNESS * stiffness / (1.0 + _SPRING_STIFFNESS * stiffness * nearest / stress)
+    return _SPRING_STIFFNESS * stiffness
 
 
 def carried_on(problem: ContactProblem, before: ContactState, after: ContactState) -> ContactState:
-    """Return a state in which springs hold a body, moved on the way it takes until the next open node closes.
+    """Return a state in which springs hold a body, moved on in the direction of the step until the next node closes.
 
-    A force so small that it hardly moves the body against the springs would need ever weaker ones, and these at last
-    let go: a disc that stands on a single node, a little out of balance. If no node closes, it stays where it is.
+    A force so small that it hardly moves the body against the springs, such as that on a disc that stands on a single
+    node a little out of balance, would need ever weaker springs, until these no longer hold the body.
+
+    Parameters
+    ----------
+    problem : ContactProblem
+    before, after : ContactState
+        At the beginning and at the end of the step.
+
+    Returns
+    -------
+    ContactState
+        `after` itself if no node closes.
     """
-    way, clearance = after.displacement - before.displacement, problem.gap - after.u_n
-    closes = (clearance > 0.0) & (way[:, 0] > 0.0)
+    step, clearance = after.displacement - before.displacement, problem.gap - after.u_n
+    closes = (clearance > 0.0) & (step[:, 0] > 0.0)
     if not closes.any():
         return after
-    share = _BEYOND * float(np.min(clearance[closes] / way[closes, 0]))
-    return ContactState(after.displacement + share * way, after.traction)
+    factor = _BEYOND * float(np.min(clearance[closes] / step[closes, 0]))
+    return ContactState(after.displacement + factor * step, after.traction)
 
 
 def merit(problem: ContactProblem, residual: Residual) -> float:
-    """Return the size of the residual of (15), (16) in the weighted mean square, relative to the traction scale."""
+    """Return the weighted root mean square of the residual of (15), (16), relative to the stress of the certificate."""
     weights = problem.body.weights
     mean_square = float(weights @ (residual.value**2).sum(axis=1)) / float(weights.sum())
     stress, _ = certificate_scales(problem, residual.state)
@@ -125,8 +154,8 @@ def merit(problem: ContactProblem, residual: Residual) -> float:
 def consistent_state(problem: ContactProblem, guess: ContactState) -> tuple[ContactState, int]:
     """Return the response of the body to the sets of a guessed state, and the linear solves spent.
 
-    A guess need not be in equilibrium; what drivers start from is. The guess chooses the branch where a problem has
-    several solutions.
+    Drivers start from states in equilibrium; a guess need not be one. Where a problem has several solutions the guess
+    chooses among them.
 
     Raises
     ------
@@ -147,18 +176,18 @@ def consistent_state(problem: ContactProblem, guess: ContactState) -> tuple[Cont
 
 
 def negligible(body: LinearBody) -> float:
-    """Return the relative size below which a residual is nothing but the inaccuracy of the body's responses."""
+    """Return the relative size below which a residual is due to the inaccuracy of the body's responses."""
     return _NEGLIGIBLE * body.accuracy
 
 
 @dataclass(frozen=True, eq=False)
 class FloatingResponse:
-    """Forces in balance without help from the obstacle, and a body that may be anywhere along its free motions.
+    """Responses of a body whose forces balance and whose position along its free motions is arbitrary.
 
     Parameters
     ----------
     state : ContactState
-        One of its positions.
+        One of the responses; the others differ by free motions.
     free_motions : (n_free, n_contact, 2) array
         Rigid motions that change no condition.
     """
@@ -167,75 +196,80 @@ class FloatingResponse:
     free_motions: FloatArray
 
     def nearest(self, displacement: FloatArray) -> ContactState:
-        """Return the position nearest to displacements (n_contact, 2) [m], by least squares over all contact nodes."""
+        """Return the response nearest to displacements (n_contact, 2) [m], by least squares over all contact nodes."""
         motions = self.free_motions.reshape(len(self.free_motions), -1)
-        way = (displacement - self.state.displacement).ravel()
-        shift = np.linalg.lstsq(motions.T, way, rcond=None)[0] @ motions
+        difference = (displacement - self.state.displacement).ravel()
+        shift = np.linalg.lstsq(motions.T, difference, rcond=None)[0] @ motions
         return ContactState(self.state.displacement + shift.reshape(-1, 2), self.state.traction)
 
     def nearest_clear(self, displacement: FloatArray, gap: FloatArray) -> ContactState:
-        """Return the nearest position, moved by the least that takes all nodes out of the obstacle.
-
-        That is done only where it is little beside the displacement, and where it can be. The least c with
-        ``motions_n^T c >= u_n - gap`` is the rest of a least-squares problem whose factors are not negative; of the
-        nodes only those count that have been the deepest.
+        """Return the nearest response, moved by the smallest free motion that takes all nodes out of the obstacle.
 
         Parameters
         ----------
         displacement : (n_contact, 2) array [m]
         gap : (n_contact,) array [m]
+
+        Returns
+        -------
+        ContactState
+            Not moved if no free motion clears the obstacle, or if nodes lie deeper than 1e-3 of the displacement.
+
+        Notes
+        -----
+        The smallest c with ``M_n c >= u_n - gap``, M_n the normal components of orthonormal free motions, follows from
+        the residual of a non-negative least-squares problem [LawsonHanson1974], chapter 23. Nodes become constraints
+        one by one: each time the deepest.
         """
         from scipy.optimize import nnls
 
         state = self.nearest(displacement)
         motions = np.linalg.qr(self.free_motions.reshape(len(self.free_motions), -1).T)[0]
-        depth, shift, asked = state.u_n - gap, np.zeros(len(motions)), []
+        depth, shift, nodes = state.u_n - gap, np.zeros(len(motions)), []
         if depth.max() > DEFORMED * np.abs(state.displacement).max():
             return state
-        while (deepest := int(np.argmax(depth - shift[0::2]))) not in asked and depth[deepest] > shift[2 * deepest]:
-            asked.append(deepest)
-            rows = np.vstack([motions[2 * np.array(asked)].T, depth[asked] / np.abs(depth[asked]).max()])
-            rest = rows @ nnls(rows, np.eye(len(rows))[-1])[0] - np.eye(len(rows))[-1]
-            if abs(rest[-1]) < _JAMMED:
+        while (deepest := int(np.argmax(depth - shift[0::2]))) not in nodes and depth[deepest] > shift[2 * deepest]:
+            nodes.append(deepest)
+            rows = np.vstack([motions[2 * np.array(nodes)].T, depth[nodes] / np.abs(depth[nodes]).max()])
+            residual = rows @ nnls(rows, np.eye(len(rows))[-1])[0] - np.eye(len(rows))[-1]
+            if abs(residual[-1]) < _INFEASIBLE:
                 return state
-            shift = motions @ (np.abs(depth[asked]).max() * rest[:-1] / -rest[-1])
+            shift = motions @ (np.abs(depth[nodes]).max() * residual[:-1] / -residual[-1])
         return ContactState(state.displacement - shift.reshape(-1, 2), state.traction)
 
 
 def untouched_response(body: LinearBody) -> FloatingResponse | None:
-    """Return the response without any contact, if the body floats and the load on it balances.
+    """Return the response without any contact, if rigid motions of the body are free and the load does no work on them.
 
-    Then no load pushes it anywhere, whatever round-off supports leave that carry it along.
+    The work that round-off of supports leaves does not count.
     """
     return floating_response(body, separated(body.n_contact))
 
 
 def floating_response(body: LinearBody, conditions: LinearConditions) -> FloatingResponse | None:
-    """Return the response under conditions that leave rigid motions free, if there are any and forces balance.
+    """Return the response under conditions that leave rigid motions free; None if none is, or forces do not balance.
 
-    Where only tractions are prescribed, as many displacements are held as there are free motions: just enough to
-    determine the response, so that their reactions are what is out of balance. If that is round-off, the prescribed
-    tractions take their place. The result carries them to the last digit; weak springs would leave a little
-    everywhere, which a condition such as "friction only where something presses" cannot tell from contact.
+    As many displacements are pinned as there are motions, at conditions that prescribe tractions. The reactions of the
+    pins are then what is missing to the balance of forces. If they are round-off, the prescribed tractions replace
+    them, so that these are exact. Weak springs would leave a small traction at every node, and a condition such as
+    "friction only where something presses" would take it for contact.
     """
     free = _few(conditions.free_motions(body.rigid_motions()), body.n_contact)
     gives_traction = ~np.any(conditions.on_displacement != 0.0, axis=2)
     gives_traction[:, 1] &= ~body.tangent_is_eliminated  # whose displacement cannot be held
     if not len(free) or np.count_nonzero(gives_traction) < len(free):
         return None
-    pins = _determinate(free, gives_traction)
-    held = conditions.replaced(pins, stick(np.zeros(body.n_contact), np.zeros(body.n_contact)))
+    pins = _choose_pins(free, gives_traction)
+    pinned = conditions.replaced(pins, stick(np.zeros(body.n_contact), np.zeros(body.n_contact)))
     try:
-        response = body.respond(held)
+        response = body.respond(pinned)
     except SingularResponse:
         return None
     traction = response.traction.copy()
-    own = np.einsum("nii->ni", conditions.on_traction)
-    other = np.stack([conditions.on_traction[:, 0, 1], conditions.on_traction[:, 1, 0]], axis=1)
-    for row in (0, 1):  # the friction of a slipping node follows its pressure
-        node = np.flatnonzero(pins[:, row])
-        rest = conditions.value[node, row] - other[node, row] * traction[node, 1 - row]
-        traction[node, row] = rest / own[node, row]
+    for row in (0, 1):  # the normal traction first: the friction of a slipping node follows from it
+        nodes = np.flatnonzero(pins[:, row])
+        factor, other_factor = conditions.on_traction[nodes, row, row], conditions.on_traction[nodes, row, 1 - row]
+        traction[nodes, row] = (conditions.value[nodes, row] - other_factor * traction[nodes, 1 - row]) / factor
     state = ContactState(response.displacement, traction)
     return FloatingResponse(state, free) if body.imbalance(state).is_below(negligible(body)) else None
 
@@ -243,30 +277,32 @@ def floating_response(body: LinearBody, conditions: LinearConditions) -> Floatin
 def with_least_slip(problem: ContactProblem, state: ContactState, sets: ActiveSets) -> ContactState:
     """Return a state moved along the rigid motions that its sets leave free, so that contact nodes slip least.
 
-    Nothing says how far a disc turns in a hole without friction; responses leave it where round-off has put it.
+    Contact does not determine, for instance, how far a disc turns in a hole without friction: responses leave it
+    wherever round-off has put it. The slip is least in the weighted mean square.
 
     Parameters
     ----------
     problem : ContactProblem
     state : ContactState
-        That obeys it.
+        A solution of the problem.
     sets : ActiveSets
-        Its own; see `contact_sets`.
+        Those of the state; see `contact_sets`.
     """
     motions = problem.body.rigid_motions()
     if not motions.shape[0]:
         return state
-    held, given = stick(problem.gap, problem.slip_origin), separated(problem.n_contact)
-    conditions = of_statuses(sets.is_closed, sets.direction != 0, held, given)
+    sticking, open_nodes = stick(problem.gap, problem.slip_origin), separated(problem.n_contact)
+    conditions = of_statuses(sets.is_closed, sets.direction != 0, sticking, open_nodes)
     free = as_rows(conditions.free_motions(motions))
     if not free.shape[0]:
         return state
-    along, weights = free[:, 1::2], problem.body.weights
-    work = along @ (weights * (state.u_t - problem.slip_origin))
-    weighted = along * weights if isinstance(along, np.ndarray) else along.multiply(weights).tocsr()
-    squares = weighted @ along.T
-    dense = squares if isinstance(squares, np.ndarray) else squares.toarray()
-    amounts = -np.linalg.lstsq(dense, work, rcond=_UNFELT)[0]
+    # least squares by normal equations, which of many bodies are small: one unknown for each free motion
+    tangential, weights = free[:, 1::2], problem.body.weights
+    right_side = tangential @ (weights * (state.u_t - problem.slip_origin))
+    weighted = tangential * weights if isinstance(tangential, np.ndarray) else tangential.multiply(weights).tocsr()
+    normal = weighted @ tangential.T
+    dense = normal if isinstance(normal, np.ndarray) else normal.toarray()
+    amounts = -np.linalg.lstsq(dense, right_side, rcond=_NO_SLIP)[0]
     return ContactState(state.displacement + (free.T @ amounts).reshape(-1, 2), state.traction)
 
 
@@ -277,8 +313,8 @@ def _few(motions: RigidMotions, n_contact: int) -> FloatArray:
     )
 
 
-def _determinate(free: FloatArray, allowed: BoolArray) -> BoolArray:
-    """Return (n_contact, 2) bool: as many of the allowed displacements as there are free motions, and independent."""
+def _choose_pins(free: FloatArray, allowed: BoolArray) -> BoolArray:
+    """Return (n_contact, 2) bool: as many of the allowed displacements as free motions, which determine the motions."""
     from scipy.linalg import qr
 
     candidates = np.flatnonzero(allowed)

@@ -38,7 +38,7 @@ class OuterIterate(Iterate):
 
     @classmethod
     def begun(cls, problem: ContactProblem, start: ContactState) -> "OuterIterate":
-        """Return the first iterate."""
+        """Return the first iterate, at the start."""
         return cls(state=start, best=_residual(problem, start))
 
     def followed_by(self, problem: ContactProblem, state: ContactState, linear_solves: int) -> "OuterIterate":
@@ -62,9 +62,9 @@ class OuterIterate(Iterate):
         )
 
     def failed_at(self, state: ContactState, linear_solves: int, message: str) -> "OuterIterate":
-        """Return the last iterate, after an inner solve that has failed for the reason given."""
-        spent = self.linear_solves + linear_solves
-        return replace(self, state=state, linear_solves=spent, ended=Status.INNER_FAILED, message=message)
+        """Return the last iterate, after an inner solve that failed for the reason given in the message."""
+        total = self.linear_solves + linear_solves
+        return replace(self, state=state, linear_solves=total, ended=Status.INNER_FAILED, message=message)
 
 
 def _residual(problem: ContactProblem, state: ContactState) -> float:

@@ -15,7 +15,7 @@ from bemkit.errors import InputError
 from bemkit.testing.failure import demand
 
 _MARGIN = 1e3
-"""Errors allowed, in units of the accuracy that a body states: what its condition may make of it."""
+"""Errors allowed, in units of the accuracy that a body states: the condition of a response may magnify its errors."""
 
 
 def check_body(
@@ -30,9 +30,9 @@ def check_body(
     is_symmetric : bool
         Whether to demand that responses are reciprocal (Betti), as those of Galerkin and finite elements are.
     reloaded : LinearBody, optional
-        The same body under another load: it has to answer changes of the conditions alike.
+        The same body under another load. Its responses must change by as much when the conditions change.
     seed : int
-        Of the conditions tried.
+        Of the random conditions.
 
     Raises
     ------
@@ -40,34 +40,34 @@ def check_body(
         Naming the body, the promise broken, and by how much. Errors are measured by the accuracy that the body states.
     """
     _check_numbers(body)
-    asked = _Asked.of(body)
-    _check_rigid_motions(asked)
-    _check_eliminated_tangents(asked)
+    tested = _TestedBody.of(body)
+    _check_rigid_motions(tested)
+    _check_eliminated_tangents(tested)
     random = np.random.default_rng(seed)
     for _ in range(3):
-        kind = _conditions(asked, random)
-        conditions = [kind, _with_other_values(asked, kind, random)]
-        states = [asked.respond(each) for each in conditions]
+        kind = _conditions(tested, random)
+        conditions = [kind, _with_other_values(tested, kind, random)]
+        states = [tested.respond(each) for each in conditions]
         other_value = conditions[1].value
         between = LinearConditions(kind.on_displacement, kind.on_traction, 0.75 * kind.value + 0.25 * other_value)
-        asked.demand_equal(asked.respond(between), states[0].blended(states[1], 0.25), "is not linear")
-        _check_balance(asked, states[0])
+        tested.demand_equal(tested.respond(between), states[0].blended(states[1], 0.25), "is not linear")
+        _check_balance(tested, states[0])
         if is_symmetric:
-            _check_reciprocity(asked, [*states, asked.respond(_conditions(asked, random))])
+            _check_reciprocity(tested, [*states, tested.respond(_conditions(tested, random))])
         if reloaded is not None:
-            _check_reloaded(asked, _Asked.of(reloaded), conditions, states)
+            _check_reloaded(tested, _TestedBody.of(reloaded), conditions, states)
 
 
 @dataclass(frozen=True, eq=False)
-class _Asked:
-    """A body, and the length [m] of the displacements that it is asked for."""
+class _TestedBody:
+    """A body with a contact problem on it, and the size [m] of the displacements that conditions prescribe."""
 
     body: LinearBody
     problem: ContactProblem
     length: float
 
     @classmethod
-    def of(cls, body: LinearBody) -> _Asked:
+    def of(cls, body: LinearBody) -> _TestedBody:
         problem = ContactProblem(body, np.zeros(body.n_contact), Frictionless())
         return cls(body, problem, float(np.abs(problem.sticking_state.traction).max()) / body.stiffness_scale or 1.0)
 
@@ -86,12 +86,12 @@ class _Asked:
         is_same &= state.traction == again.traction
         demand(bool(is_same.all()), f"{self.name} gives two answers to one question")
         demand(state.is_finite, f"{self.name} returns numbers that are not finite")
-        missed = np.einsum("nij,nj->ni", conditions.on_displacement, state.displacement)
-        missed += np.einsum("nij,nj->ni", conditions.on_traction, state.traction) - conditions.value
-        missed[self.body.tangent_is_eliminated, 1] = state.sigma_t[self.body.tangent_is_eliminated]
+        residual = np.einsum("nij,nj->ni", conditions.on_displacement, state.displacement)
+        residual += np.einsum("nij,nj->ni", conditions.on_traction, state.traction) - conditions.value
+        residual[self.body.tangent_is_eliminated, 1] = state.sigma_t[self.body.tangent_is_eliminated]
         displacement, traction = self.sizes(state)
         size = np.abs(conditions.on_displacement).max() * displacement + np.abs(conditions.on_traction).max() * traction
-        worst = float(np.abs(missed).max() / size)
+        worst = float(np.abs(residual).max() / size)
         demand(worst <= self.tolerance, f"{self.name} misses the conditions it was given by {worst:.1e}")
         return state
 
@@ -103,7 +103,7 @@ class _Asked:
         return displacement + traction / stiffness, traction + stiffness * displacement
 
     def demand_equal(self, one: ContactState, other: ContactState, complaint: str) -> None:
-        """Compare what is no tangential displacement that follows the others."""
+        """Compare displacements and tractions, except tangential displacements that the body has eliminated."""
         displacement, traction = self.sizes(one, other)
         off = np.abs(one.displacement - other.displacement) / displacement
         off[self.body.tangent_is_eliminated, 1] = 0.0
@@ -130,10 +130,10 @@ def _check_numbers(body: LinearBody) -> None:
         demand(np.shape(array) == shape, f"{name}.{word} has the shape {np.shape(array)}; give {shape}")
 
 
-def _check_rigid_motions(asked: _Asked) -> None:
-    body, name, motions = asked.body, asked.name, as_dense(asked.body.rigid_motions(), asked.body.n_contact)
+def _check_rigid_motions(tested: _TestedBody) -> None:
+    body, name, motions = tested.body, tested.name, as_dense(tested.body.rigid_motions(), tested.body.n_contact)
     try:
-        asked.problem.respond(separated(body.n_contact))
+        tested.problem.respond(separated(body.n_contact))
         responds = True
     except SingularResponse:
         responds = False
@@ -143,33 +143,33 @@ def _check_rigid_motions(asked: _Asked) -> None:
         return
     rank = np.linalg.matrix_rank(motions.reshape(len(motions), -1))
     demand(rank == len(motions), f"{name}.rigid_motions are linearly dependent")
-    rest = asked.problem.sticking_state
-    forces = body.weights[:, None] * rest.traction
+    sticking = tested.problem.sticking_state
+    forces = body.weights[:, None] * sticking.traction
     for motion, load in zip(motions, body.rigid_load(), strict=True):
-        moved = rest.displacement + motion * asked.length / np.abs(motion).max()
-        shifted = ContactState(moved, rest.traction)
-        asked.demand_equal(asked.respond(stick(*moved.T)), shifted, "changes its tractions when it moves rigidly")
+        moved = sticking.displacement + motion * tested.length / np.abs(motion).max()
+        shifted = ContactState(moved, sticking.traction)
+        tested.demand_equal(tested.respond(stick(*moved.T)), shifted, "changes its tractions when it moves rigidly")
         work = float((forces * motion).sum()) + float(load)
-        size = asked.sizes(rest)[1] * float(body.weights @ np.abs(motion).sum(axis=1))
+        size = tested.sizes(sticking)[1] * float(body.weights @ np.abs(motion).sum(axis=1))
         complaint = f"{name}.rigid_load and the tractions of a held body do the work {work:.1e} on a rigid motion"
-        demand(abs(work) <= asked.tolerance * size, complaint)
+        demand(abs(work) <= tested.tolerance * size, complaint)
 
 
-def _check_eliminated_tangents(asked: _Asked) -> None:
-    if asked.body.tangent_is_eliminated.any():
-        none = np.zeros(asked.body.n_contact)
+def _check_eliminated_tangents(tested: _TestedBody) -> None:
+    if tested.body.tangent_is_eliminated.any():
+        none = np.zeros(tested.body.n_contact)
         with suppress(InputError):
-            asked.body.respond(stick(none, none))
-            demand(False, f"{asked.name} takes a tangential condition where it has eliminated the tangent")
+            tested.body.respond(stick(none, none))
+            demand(False, f"{tested.name} takes a tangential condition where it has eliminated the tangent")
 
 
-def _conditions(asked: _Asked, random: np.random.Generator) -> LinearConditions:
+def _conditions(tested: _TestedBody, random: np.random.Generator) -> LinearConditions:
     """Return conditions that hold the body: of every kind, mixed at random."""
-    n_contact, stiffness = asked.body.n_contact, asked.body.stiffness_scale
-    gap, origin = asked.length * random.normal(size=(2, n_contact))
-    bound = asked.length * stiffness * random.random(n_contact)
-    multiplier = asked.length * stiffness * random.normal(size=(n_contact, 2))
-    conditions = held = stick(gap, origin)
+    n_contact, stiffness = tested.body.n_contact, tested.body.stiffness_scale
+    gap, origin = tested.length * random.normal(size=(2, n_contact))
+    bound = tested.length * stiffness * random.random(n_contact)
+    multiplier = tested.length * stiffness * random.normal(size=(n_contact, 2))
+    conditions = sticking = stick(gap, origin)
     for kind in (
         separated(n_contact),
         slip(gap, random.choice(np.array([-1.0, 1.0]), n_contact), np.full(n_contact, -0.2), bound),
@@ -177,49 +177,49 @@ def _conditions(asked: _Asked, random: np.random.Generator) -> LinearConditions:
     ):
         rows = np.repeat(random.random((n_contact, 1)) < 0.25, 2, axis=1)
         conditions = conditions.replaced(rows, kind)
-    conditions = asked.problem.without_eliminated(conditions)
-    return (
-        held if len(conditions.free_motions(as_dense(asked.body.rigid_motions(), asked.body.n_contact))) else conditions
-    )
+    conditions = tested.problem.without_eliminated(conditions)
+    motions = as_dense(tested.body.rigid_motions(), tested.body.n_contact)
+    return sticking if len(conditions.free_motions(motions)) else conditions
 
 
-def _with_other_values(asked: _Asked, kind: LinearConditions, random: np.random.Generator) -> LinearConditions:
-    change = asked.length * (
-        kind.on_displacement.sum(axis=2) + asked.body.stiffness_scale * kind.on_traction.sum(axis=2)
+def _with_other_values(tested: _TestedBody, kind: LinearConditions, random: np.random.Generator) -> LinearConditions:
+    change = tested.length * (
+        kind.on_displacement.sum(axis=2) + tested.body.stiffness_scale * kind.on_traction.sum(axis=2)
     )
     return LinearConditions(
         kind.on_displacement, kind.on_traction, kind.value + change * random.normal(size=kind.value.shape)
     )
 
 
-def _check_balance(asked: _Asked, state: ContactState) -> None:
-    body, name = asked.body, asked.name
+def _check_balance(tested: _TestedBody, state: ContactState) -> None:
+    body, name = tested.body, tested.name
     imbalance = body.imbalance(state)
     complaint = f"{name}.imbalance of a response of its own is {imbalance.worst:.1e}"
-    demand(imbalance.is_below(asked.tolerance), complaint)
-    pushed = state.traction + asked.sizes(state)[1] * np.eye(2)[0]
+    demand(imbalance.is_below(tested.tolerance), complaint)
+    pushed = state.traction + tested.sizes(state)[1] * np.eye(2)[0]
     off = body.imbalance(ContactState(state.displacement, pushed)).force
-    # of tractions that are of the size of all others at every node
+    # the traction added at every node is as large as the largest one
     demand(off >= 1e-2, f"{name}.imbalance does not see tractions that hold no such displacements ({off:.1e})")
 
 
-def _check_reciprocity(asked: _Asked, states: list[ContactState]) -> None:
-    """Compare the works of two changes of the tractions, each on the displacements of the other."""
-    rest, one, other = states
+def _check_reciprocity(tested: _TestedBody, states: list[ContactState]) -> None:
+    """Compare the work of each of two changes of the tractions on the displacements of the other (Betti)."""
+    base, one, other = states
+    weights = tested.body.weights[:, None]
     works = [
-        float((asked.body.weights[:, None] * (a.traction - rest.traction) * (b.displacement - rest.displacement)).sum())
+        float((weights * (a.traction - base.traction) * (b.displacement - base.displacement)).sum())
         for a, b in ((one, other), (other, one))
     ]
-    displacement, traction = asked.sizes(*states)
-    off = abs(works[0] - works[1]) / (displacement * traction * float(asked.body.weights.sum()))
-    demand(off <= asked.tolerance, f"{asked.name} is not symmetric: the works of two states differ by {off:.1e}")
+    displacement, traction = tested.sizes(*states)
+    off = abs(works[0] - works[1]) / (displacement * traction * float(weights.sum()))
+    demand(off <= tested.tolerance, f"{tested.name} is not symmetric: the works of two states differ by {off:.1e}")
 
 
 def _check_reloaded(
-    asked: _Asked, reloaded: _Asked, conditions: list[LinearConditions], states: list[ContactState]
+    tested: _TestedBody, reloaded: _TestedBody, conditions: list[LinearConditions], states: list[ContactState]
 ) -> None:
     before, after = (
         ContactState(other.displacement - one.displacement, other.traction - one.traction)
         for one, other in (states, [reloaded.respond(each) for each in conditions])
     )
-    asked.demand_equal(before, after, "answers changes of the conditions otherwise under another load")
+    tested.demand_equal(before, after, "answers changes of the conditions otherwise under another load")

@@ -21,10 +21,10 @@ def demand(is_kept: bool, message: str) -> None:
 
 
 def evaluated(label: str, method: Callable[[FloatArray], FloatArray], places: FloatArray, shape: object) -> FloatArray:
-    """Return what a function says at some places, after demands that every function of places has to meet."""
-    given = places.copy()
+    """Return the values of a function at some places, after checks of shape, finiteness, purity and repeatability."""
+    before = places.copy()
     values = method(places)
-    demand(np.array_equal(places, given), f"{label} changes its argument")
+    demand(np.array_equal(places, before), f"{label} changes its argument")
     demand(
         np.shape(values) == shape, f"{label} returns the shape {np.shape(values)} for {places.size} points, not {shape}"
     )

@@ -77,12 +77,12 @@ def _check_values(law: FrictionLaw, name: str, sigma_n: FloatArray) -> None:
 def _check_derivative(law: FrictionLaw, name: str, sigma_n: FloatArray) -> None:
     """Compare with differences; at a corner any value between the two sides is right."""
     step = 1e-6 * np.abs(sigma_n)
-    here = law.bound(sigma_n)
-    before = (here - law.bound(sigma_n - step)) / step
-    after = (law.bound(sigma_n + step) - here) / step
+    bound = law.bound(sigma_n)
+    before = (bound - law.bound(sigma_n - step)) / step
+    after = (law.bound(sigma_n + step) - bound) / step
     derivative = law.bound_derivative(sigma_n)
     # Differences with a relative step of 1e-6 carry 1e-10 of round-off and 1e-6 of curvature.
-    slack = 1e-4 * (np.abs(before) + np.abs(after)) + 1e-9 * here / np.abs(sigma_n)
+    slack = 1e-4 * (np.abs(before) + np.abs(after)) + 1e-9 * bound / np.abs(sigma_n)
     low, high = np.minimum(before, after) - slack, np.maximum(before, after) + slack
     fits = (low <= derivative) & (derivative <= high)
     if not fits.all():

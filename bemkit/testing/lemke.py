@@ -1,7 +1,7 @@
-"""The referee: Lemke's algorithm on the linear complementarity problem of Coulomb friction.
+"""Lemke's algorithm on the linear complementarity problem of Coulomb friction: an independent check of the drivers.
 
-It shares no equation with the other drivers: no projections, no rho, no active sets, no Newton matrix. It sees the
-body's compliance and pivots in a tableau. Meant for small problems and for second opinions.
+It shares no equation with them: no projections, no rho, no active sets, no Newton matrix. It pivots in a tableau made
+of the compliance of the body, and is meant for small problems.
 """
 
 from dataclasses import dataclass, replace
@@ -15,12 +15,12 @@ from bemkit.contact.problem import ContactProblem, ContactState, LawError
 from bemkit.solvers.base import Iterate, Status, check_max_steps
 from bemkit.solvers.newton import spring_stiffness
 
-_WEAKER = 1e-2
-"""Springs on free rigid motions, in units of those of the other drivers: the body may have to slide far in a few steps,
-at the cost of that many digits."""
+_RELATIVE_STIFFNESS = 1e-2
+"""Stiffness of the springs on free rigid motions, relative to that of the other drivers. With weaker springs a body
+slides far in few steps; the result loses as many digits as they are weaker."""
 
 _ROUND_OFF = 1e-11
-"""Tableau entries smaller than this, relative to the largest of their column, are left-overs of eliminations."""
+"""Tableau entries smaller than this, relative to the largest of their column, are round-off of eliminations."""
 
 
 @dataclass(frozen=True)
@@ -90,9 +90,9 @@ class LemkePivoting:
         pressed, backward, forward, _ = unit_force * unknowns.reshape(4, -1)
         force = np.stack([-pressed, backward - forward], axis=1)
         displacement = free + compliance @ force.ravel()
-        # once more for what the inverse leaves, which loses as many digits as the springs are weak
-        missing = load + spring_load + force.ravel() - (stiffness + springs) @ displacement
-        displacement = (displacement + compliance @ missing).reshape(-1, 2)
+        # one step of iterative refinement: the inverse loses as many digits as the springs are weak
+        residual = load + spring_load + force.ravel() - (stiffness + springs) @ displacement
+        displacement = (displacement + compliance @ residual).reshape(-1, 2)
         displacement = problem.respond(stick(*displacement.T)).displacement  # eliminated tangents follow
         state = ContactState(displacement, force / problem.body.weights[:, None])
         return Iterate(state=state, linear_solves=spent, message=f"{n_pivots} pivots")
@@ -144,7 +144,7 @@ def lemke(matrix: FloatArray, vector: FloatArray, max_pivots: int | None = None)
 
 
 def _solved_anew(matrix: FloatArray, vector: FloatArray, found: FloatArray, basic: IntArray) -> FloatArray:
-    """Return the solution of the last basis without the round-off that the pivots have gathered."""
+    """Return the solution of the last basis from a new factorisation, without the round-off of the pivots."""
     result = np.zeros_like(found)
     try:
         result[basic] = np.linalg.solve(matrix[np.ix_(basic, basic)], -vector[basic])
@@ -216,7 +216,7 @@ def _springs(problem: ContactProblem, state: ContactState) -> tuple[FloatArray, 
     is_held = np.stack([np.ones(problem.n_contact), ~problem.body.tangent_is_eliminated], axis=1)
     motions = (motions * is_held).reshape(len(motions), -1)
     orthonormal = np.linalg.qr(motions.T)[0]
-    scale = _WEAKER * spring_stiffness(problem, state) * float(np.median(problem.body.weights))
+    scale = _RELATIVE_STIFFNESS * spring_stiffness(problem, state) * float(np.median(problem.body.weights))
     springs = scale * orthonormal @ orthonormal.T
     return springs, springs @ state.displacement.ravel()
 

@@ -35,16 +35,16 @@ def check_linear_solver(solver: LinearSolver, *, rtol: float = 1e-7, seed: int =
     exact = random.normal(size=(_ORDER, 3))
     exact[:, 2] = 0.0  # a right-hand side without forces
     right = matrix @ exact
-    given = right.copy()
+    right_before = right.copy()
 
     factor = solver.factor(matrix, name)
-    found = factor.solve(right)
+    solution = factor.solve(right)
     demand(np.array_equal(matrix, before), f"{name} changes the matrix")
-    demand(np.array_equal(right, given), f"{name} changes the right-hand sides")
-    demand(found.shape == right.shape, f"{name}: the solution has the shape {found.shape}, not {right.shape}")
-    worst = _energy_error(matrix, found, exact)
+    demand(np.array_equal(right, right_before), f"{name} changes the right-hand sides")
+    demand(solution.shape == right.shape, f"{name}: the solution has the shape {solution.shape}, not {right.shape}")
+    worst = _energy_error(matrix, solution, exact)
     demand(worst <= rtol, f"{name}: the solution errs by {worst:.3g} in the energy norm")
-    demand(not np.any(found[:, 2]), f"{name}: zero forces cause displacements of {np.abs(found[:, 2]).max():.3g}")
+    demand(not np.any(solution[:, 2]), f"{name}: zero forces cause displacements of {np.abs(solution[:, 2]).max():.3g}")
     single = factor.solve(right[:, 0])
     demand(single.shape == (_ORDER,), f"{name}: one right-hand side gives a solution of the shape {single.shape}")
     worst = _energy_error(matrix, single[:, None], exact[:, :1])
@@ -62,9 +62,9 @@ def _string(order: int) -> FloatArray:
     return result
 
 
-def _energy_error(matrix: FloatArray, found: FloatArray, exact: FloatArray) -> float:
+def _energy_error(matrix: FloatArray, solution: FloatArray, exact: FloatArray) -> float:
     """Return the largest error of a column in the energy norm, relative to the column; columns of zeros aside."""
-    error = found - exact
+    error = solution - exact
     squares = np.einsum("im,ij,jm->m", error, matrix, error), np.einsum("im,ij,jm->m", exact, matrix, exact)
     is_moved = squares[1] > 0.0
     return float(np.sqrt(np.max(np.abs(squares[0][is_moved]) / squares[1][is_moved])))

@@ -107,7 +107,7 @@ def _checked_matrix(operator: BoundaryOperator, name: str) -> FloatArray:
 def _check_products(
     operator: BoundaryOperator, name: str, matrix: FloatArray, rtol: float, random: np.random.Generator
 ) -> None:
-    """Check that the operator is the matrix for whoever knows it as a linear operator of scipy."""
+    """Check that products of the operator as a linear operator of scipy are those of its matrix."""
     demand(isinstance(operator, LinearOperator), f"{name} is not a scipy.sparse.linalg.LinearOperator")
     demand(operator.shape == matrix.shape, f"{name} has the shape {operator.shape}, its matrix {matrix.shape}")
     x, y = np.asarray(random.normal(size=(matrix.shape[1], 2))), np.asarray(random.normal(size=matrix.shape[0]))

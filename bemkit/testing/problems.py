@@ -40,7 +40,7 @@ def _known(
     weight: float = 1.0,
     motions: npt.ArrayLike = (),
 ) -> Callable[[], KnownProblem]:
-    """Return what makes a problem; gap, origin of slip and weight are those of every node."""
+    """Return a function that makes a problem; gap, origin of slip and weight are the same at all nodes."""
 
     def make() -> KnownProblem:
         n_contact = len(load) // 2

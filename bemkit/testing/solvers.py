@@ -40,30 +40,30 @@ def check_solver(solver: ContactSolver, *, problems: Iterable[str] | None = None
         known = KNOWN_PROBLEMS[title]()
         label = f"{name} on the problem {title!r}"
         if not known.solutions:
-            found = solve(known.problem, solver, throw=False, tolerance=tolerance)
-            demand(not found.is_converged, f"{label} claims a solution where there is none")
+            solution = solve(known.problem, solver, throw=False, tolerance=tolerance)
+            demand(not solution.is_converged, f"{label} claims a solution where there is none")
             continue
-        found = _solved(known, solver, label, tolerance)
+        solution = _solved(known, solver, label, tolerance)
         again = solve(known.problem, solver, throw=False, tolerance=tolerance)
-        is_same = np.array_equal(_as_array(again.state), _as_array(found.state)) and again.steps == found.steps
+        is_same = np.array_equal(_as_array(again.state), _as_array(solution.state)) and again.steps == solution.steps
         demand(is_same, f"{label} gives two answers to one question")
-        _check_units(known, solver, label, found, tolerance)
-        again = solve(known.problem, solver, start=found.state, throw=False, tolerance=tolerance)
+        _check_units(known, solver, label, solution, tolerance)
+        again = solve(known.problem, solver, start=solution.state, throw=False, tolerance=tolerance)
         ending = f"{again.steps} steps, {again.status.name}"
         demand(again.is_converged and again.steps == 0, f"{label} leaves its own solution as a start ({ending})")
         _check_purity(known, solver, label)
 
 
 def _solved(known: KnownProblem, solver: ContactSolver, label: str, tolerance: float) -> ContactSolution:
-    found = solve(known.problem, solver, throw=False, tolerance=tolerance)
-    demand(found.status is Status.CONVERGED, f"{label} ends with {found.status.name}: {found.message}")
-    state = _as_array(found.state)
+    solution = solve(known.problem, solver, throw=False, tolerance=tolerance)
+    demand(solution.status is Status.CONVERGED, f"{label} ends with {solution.status.name}: {solution.message}")
+    state = _as_array(solution.state)
     misses = [float(np.abs(state - answer).max()) for answer in known.solutions]
     # a certificate of 1e-9 leaves errors of that size times the condition number, here below 10
     demand(min(misses) <= 100.0 * tolerance, f"{label} misses every solution by {min(misses):.1e}")
-    counts = [record.linear_solves for record in found.history]
+    counts = [record.linear_solves for record in solution.history]
     demand(counts == sorted(counts), f"{label} takes linear solves back: {counts}")
-    return found
+    return solution
 
 
 def _check_units(

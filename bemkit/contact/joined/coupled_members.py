@@ -17,9 +17,9 @@ from bemkit.contact.joined.member import Member, Shape, blocks_of_members, defor
 from bemkit.errors import InputError
 
 _ROUNDS = 2
-"""Times that rigid motions are fitted: the normal equations leave two stiff bodies apart by the digits they lose."""
+"""Times that rigid motions are fitted: normal equations hold half of the digits, which is too few for stiff bodies."""
 _FEW_MOTIONS = 60
-"""Rigid motions up to which their shares in what is kept are weighed; of more, those that nothing holds are found."""
+"""Largest number of rigid motions that are treated as a dense array when eliminated tangents are taken back."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,13 +72,13 @@ class CoupledMembers:
         return self.modulus / float(np.median(self.weights))
 
     def recover(self, state: ContactState) -> tuple[FloatArray, FloatArray]:
-        """Return what the members do under the tractions of a state.
+        """Return the displacements of the members under the tractions of a state.
 
         Returns
         -------
         displacement : (n,) array [m]
-            Of all members, one after the other, rigid motions by least squares of what is missed, weighted by `moduli`:
-            what soft bodies miss is not laid upon two stiff ones.
+            Of all members, one after the other. Rigid motions make `missed` least, in the mean square weighted by
+            `moduli`, so that errors of soft bodies do not move stiff ones.
         missed : (2 n_contact,) array [m]
             Relative displacements of the state less those of the members.
         """
@@ -118,7 +118,7 @@ class CoupledMembers:
         return blocks_of_members(self.shapes, lambda shape: shape.motions)
 
     @cached_property
-    def felt_motions(self) -> sparse.csr_array:
+    def relative_motions(self) -> sparse.csr_array:
         """(n_motions, 2 n_contact) sparse array: relative displacements of the rigid motions."""
         return sparse.csr_array((self.relative @ self.motions).T)
 
@@ -154,13 +154,13 @@ class CoupledMembers:
 
     @cached_property
     def _motion_fit(self) -> Callable[[FloatArray], FloatArray]:
-        """The function that finds the motions (n_motions,) nearest to relative displacements (2 n_contact,)."""
-        felt = sparse.csc_array(self.felt_motions.T)
-        if not felt.shape[1]:
+        """The function that fits motions (n_motions,) to relative displacements (2 n_contact,) by least squares."""
+        columns = sparse.csc_array(self.relative_motions.T)
+        if not columns.shape[1]:
             return lambda missed: np.zeros(0)
-        weighted = sparse.csc_array(felt.T * (self.moduli / self.modulus))
+        weighted = sparse.csc_array(columns.T * (self.moduli / self.modulus))
         factors = sparse.linalg.splu(
-            sparse.csc_array(weighted @ felt), permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True}
+            sparse.csc_array(weighted @ columns), permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True}
         )
         return lambda missed: np.asarray(factors.solve(weighted @ missed))
 
@@ -169,14 +169,14 @@ class CoupledMembers:
         return self._named(self._is_moved(coefficients))
 
     def partners_of(self, coefficients: FloatArray) -> str:
-        """Name the members at rest that these may touch; without any there are obstacles, or they meet each other."""
+        """Name the members at rest that these touch; if there are none, the obstacle or each other."""
         is_moved = self._is_moved(coefficients)
-        meets = self.owners @ is_moved.astype(float) > 0.0
-        met = np.asarray(self.owners.T @ meets.astype(float)) > 0.0
-        if np.any(met & ~is_moved):
-            return self._named(met & ~is_moved)
-        is_alone = np.diff(self.owners.indptr) == 1
-        return "the obstacle" if np.any(meets & is_alone) else "each other"
+        has_moved_owner = self.owners @ is_moved.astype(float) > 0.0
+        is_partner = (np.asarray(self.owners.T @ has_moved_owner.astype(float)) > 0.0) & ~is_moved
+        if np.any(is_partner):
+            return self._named(is_partner)
+        has_one_owner = np.diff(self.owners.indptr) == 1
+        return "the obstacle" if np.any(has_moved_owner & has_one_owner) else "each other"
 
     def _is_moved(self, coefficients: FloatArray) -> BoolArray:
         """Return (n_members,) bool: the members that a combination (n_motions,) of the rigid motions moves."""
@@ -185,16 +185,16 @@ class CoupledMembers:
         is_moved[self.motion_owner[size > 1e-6 * size.max()]] = True
         return is_moved
 
-    def _named(self, is_meant: BoolArray) -> str:
-        meant = np.flatnonzero(is_meant)
-        names = [f"{self.members[k].name!r}" if self.members[k].name else f"number {k + 1}" for k in meant]
+    def _named(self, is_named: BoolArray) -> str:
+        numbers = np.flatnonzero(is_named)
+        names = [f"{self.members[k].name!r}" if self.members[k].name else f"number {k + 1}" for k in numbers]
         if len(names) == 1:
             return f"body {names[0]}"
         return f"bodies {', '.join(names[:4])}" + (f" and {len(names) - 4} more" if len(names) > 4 else "")
 
     def _check_held(self) -> None:
-        """Refuse members that neither supports nor all contacts together can hold."""
-        free = null_space(sparse.csr_array(self.felt_motions.T))
+        """Raise InputError if neither supports nor all contacts together can hold a member."""
+        free = null_space(sparse.csr_array(self.relative_motions.T))
         if not free.shape[0]:
             return
         names = self.moving_bodies(np.asarray(abs(free).sum(axis=0), dtype=float))
@@ -203,23 +203,23 @@ class CoupledMembers:
         )
 
     def _eliminated_tangents(self) -> BoolArray:
-        """Take back as many tangents as it needs to hold the members by what is kept."""
+        """Return the eliminated tangents without those that are needed to hold the members."""
         is_eliminated = np.array(self.tangent_is_eliminated, bool)
         if not is_eliminated.any():
             return is_eliminated
-        felt = sparse.csr_array(self.felt_motions.T)
-        if felt.shape[1] <= _FEW_MOTIONS:  # a round pin turns nearly unfelt, by the round-off of its normals
-            motions = felt.toarray().T.reshape(-1, self.n_contact, 2)
+        columns = sparse.csr_array(self.relative_motions.T)
+        if columns.shape[1] <= _FEW_MOTIONS:  # a round pin that turns moves its contact nodes by round-off only
+            motions = columns.toarray().T.reshape(-1, self.n_contact, 2)
             is_bound = ~np.any(motions[:, :, 1], axis=0)
             return is_eliminated & ~retained_tangents(motions, is_eliminated, is_bound)
         is_kept = np.ones((self.n_contact, 2), bool)
         is_kept[is_eliminated, 1] = False
-        free = null_space(sparse.csr_array(felt[is_kept.ravel()]))
+        free = null_space(sparse.csr_array(columns[is_kept.ravel()]))
         if free.shape[0]:
             from scipy.linalg import qr
 
             tangents = np.flatnonzero(is_eliminated)
-            along = (free @ felt[2 * tangents + 1].T).toarray()
-            _, order = qr(along, mode="r", pivoting=True)
+            tangential = (free @ columns[2 * tangents + 1].T).toarray()
+            _, order = qr(tangential, mode="r", pivoting=True)
             is_eliminated[tangents[order[: free.shape[0]]]] = False
         return is_eliminated

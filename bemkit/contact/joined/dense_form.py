@@ -1,4 +1,4 @@
-"""Few members: the dense stiffness of their relative displacements, found once."""
+"""Few members: the dense stiffness of their relative displacements, computed once."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _TIED = "the bodies tied to each other at all contact nodes (a tie that others i
 
 
 class RelativeStiffness:
-    """Forces at the contact nodes that go with relative displacements, whatever the loads.
+    """Stiffness of the contact nodes: forces by relative displacements. It does not depend on the loads.
 
     Parameters
     ----------
@@ -76,18 +76,18 @@ class RelativeStiffness:
         if not self._is_eliminated.any():
             return None
         n_kept = self._coupling.shape[0]
-        rest = joined.offset[~self._is_kept] + self._followers @ loaded
-        rest = rest + self._by_force @ at_rest[:n_kept] + self._following_motions @ at_rest[n_kept:]
-        return EliminatedTangents(np.flatnonzero(self._is_eliminated), self._following, rest)
+        displacement = joined.offset[~self._is_kept] + self._followers @ loaded
+        displacement = displacement + self._by_force @ at_rest[:n_kept] + self._following_motions @ at_rest[n_kept:]
+        return EliminatedTangents(np.flatnonzero(self._is_eliminated), self._following, displacement)
 
     @cached_property
     def _by_force(self) -> FloatArray:
-        """(n_eliminated, n_kept) array: what unit forces make eliminated tangents follow."""
+        """(n_eliminated, n_kept) array: displacements of eliminated tangents by unit forces."""
         return np.asarray(self._followers @ self._unit_deformation)
 
     @cached_property
     def _following(self) -> FloatArray:
-        """(n_eliminated, n_kept) array: how eliminated tangents follow the kept relative displacements."""
+        """(n_eliminated, n_kept) array: displacements of eliminated tangents by unit kept relative displacements."""
         n_kept = self._coupling.shape[0]
         by_motions = self._following_motions @ self._inverse[n_kept:, :n_kept]
         return np.asarray(self._by_force @ self._stiffness + by_motions)

@@ -18,19 +18,19 @@ from bemkit.contact.joined.sparse_form import Compliance, sparse_response
 from bemkit.operators.equilibrium import NOISE_FACTOR, Imbalance
 
 LIGHTEST = 1e-3
-"""Forces on a member below this share of the largest on any are measured by this share: one linear system finds them
-all, and leaves its round-off everywhere."""
+"""Forces on a member are measured by at least this share of the largest forces on any: one linear system solves for all
+of them, and its round-off is everywhere."""
 MOST_DENSE = 2500
-"""Contact components and rigid motions up to which the stiffness of relative displacements is formed."""
+"""Largest number of contact components and rigid motions for which a dense stiffness is formed."""
 
 _ROUND_OFF = 1e-12
-"""Share of the forces that those of missed relative displacements may have before a response is refined."""
+"""Forces of missed relative displacements, relative to all forces, from which on a response is refined."""
 
 _WITHOUT_LOAD = (
-    *("shapes", "motions", "felt_motions", "is_symmetric", "_compliance", "_relative_stiffness", "_motion_fit"),
+    *("shapes", "motions", "relative_motions", "is_symmetric", "_compliance", "_relative_stiffness", "_motion_fit"),
     *("owners", "moduli", "modulus", "stiffness_scale", "is_costly"),
 )
-"""What stays as it is under another load."""
+"""Cached values that do not depend on the load."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,7 +47,7 @@ class JoinedBodies(CoupledMembers, LinearBody):
         Relative displacements are ``w = relative @ u + offset``, with index ``2 node + component`` (n, t), of the
         displacements u of all members, one after the other; ``relative.T`` takes nodal forces to the members.
     offset : (2 n_contact,) array [m]
-        What displacements given by supports contribute.
+        Relative displacements that supports prescribe.
     weights : (n_contact,) array [m]
     tangent_is_eliminated : (n_contact,) bool array, optional
         Nodes without friction, or whose tangent supports hold: ``sigma_t = 0`` there. Where nothing else would hold
@@ -103,10 +103,10 @@ class JoinedBodies(CoupledMembers, LinearBody):
         return sparse_response(self, self._compliance, conditions)
 
     def _refined(self, conditions: LinearConditions, state: ContactState) -> ContactState:
-        """Return a response less what round-off of the dense stiffness has left: one step of iterative refinement.
+        """Return a response after one step of iterative refinement, against the round-off of the dense stiffness.
 
-        The bodies may travel many times as far as they are strained, and on the smallest elements round-off of the way
-        is a force.
+        Bodies may move many times as far as they deform, and on the smallest elements round-off of the motion causes
+        forces.
         """
         _, missed = self.recover(state)
         acting = max(np.abs(self.load).max(initial=0.0), (self.weights[:, None] * np.abs(state.traction)).max())
@@ -121,8 +121,8 @@ class JoinedBodies(CoupledMembers, LinearBody):
     def rigid_motions(self) -> RigidMotions:
         """Return the relative displacements of the rigid motions of each member that no support resists."""
         if self.is_costly:
-            return self.felt_motions
-        return self.felt_motions.toarray().reshape(-1, self.n_contact, 2)
+            return self.relative_motions
+        return self.relative_motions.toarray().reshape(-1, self.n_contact, 2)
 
     def rigid_load(self) -> FloatArray:
         """Return the work of the loads on these motions."""

@@ -1,4 +1,4 @@
-"""One elastic body among several, and what all copies of one shape share."""
+"""One elastic body among several, and the factors that all copies of one shape share."""
 
 from __future__ import annotations
 
@@ -14,7 +14,8 @@ from bemkit.arrays import FloatArray, IntArray, read_only
 from bemkit.errors import InputError
 
 _MOTIONS_ARE_FREE = 1e-6
-"""Share of its largest entry that a stiffness may leave of rigid motions: quadrature leaves less, a support more."""
+"""Forces of rigid motions, relative to the largest entry of the stiffness, up to which these are free: errors of
+quadrature are smaller, forces of supports larger."""
 _LARGEST_CONDITION = 1e13
 """Condition number of a held stiffness from which on it counts as singular."""
 
@@ -68,13 +69,13 @@ class Member:
 
     @property
     def title(self) -> str:
-        """How messages call it."""
+        """Name in messages."""
         return f"body {self.name!r}" if self.name else "a body without a name"
 
 
 @dataclass(frozen=True, eq=False)
 class Shape:
-    """What all copies of one member share.
+    """Rigid motions and flexibility that all copies of one member share.
 
     Parameters
     ----------
@@ -99,8 +100,7 @@ class Shape:
         InputError
             If the motions are linearly dependent, or the stiffness resists them.
         """
-        given = self.member.motions
-        basis, sizes, _ = np.linalg.svd(given.T, full_matrices=False)
+        basis, sizes, _ = np.linalg.svd(self.member.motions.T, full_matrices=False)
         if sizes.size and sizes[-1] < 1e-9 * sizes[0]:
             raise InputError(f"{self.member.title}: motions are linearly dependent; leave out those that are combined")
         stiffness = self.member.stiffness
@@ -117,7 +117,7 @@ class Shape:
         Raises
         ------
         InputError
-            If the stiffness leaves more free than the motions.
+            If the stiffness leaves further motions free.
         """
         stiffness, motions = self.member.stiffness, self.motions
         if not self.member.n_components:
@@ -145,7 +145,7 @@ class Shape:
 
 
 def shapes_of(members: Sequence[Member]) -> tuple[Shape, ...]:
-    """Return the different shapes of members that stand one after the other, each with its copies."""
+    """Return the different shapes of members, each with its copies."""
     first = np.cumsum([0, *(member.n_components for member in members)])
     copies: dict[tuple[int, int], list[int]] = {}
     for number, member in enumerate(members):
@@ -159,13 +159,13 @@ def shapes_of(members: Sequence[Member]) -> tuple[Shape, ...]:
 
 
 def blocks_of_members(shapes: Sequence[Shape], block: Callable[[Shape], FloatArray]) -> sparse.csr_array:
-    """Return blocks along the diagonal, one for each member in its order: that of its shape."""
-    of_member = {number: own for shape in shapes for own in [block(shape)] for number in shape.numbers}
+    """Return the sparse matrix with the block of its shape for each member along the diagonal."""
+    of_member = {number: array for shape in shapes for array in [block(shape)] for number in shape.numbers}
     return diagonal_blocks(of_member[number] for number in sorted(of_member))
 
 
 def deformation(shapes: Sequence[Shape], forces: FloatArray) -> FloatArray:
-    """Return the displacements under forces (n, ...) on the components of all members, springs on the rigid motions."""
+    """Return the displacements (n, ...) of all members under forces (n, ...), with springs on the rigid motions."""
     displacement = np.empty_like(forces)
     for shape in shapes:
         on_copies = forces[shape.rows]

@@ -33,15 +33,15 @@ _SMALLEST_RCOND = 1e-15
 _LARGEST_RESIDUAL = 1e-13
 """Residual, relative to its terms, from which on a factorisation counts as failed."""
 _PENALTIES = (1e-8, 1e-12)
-"""What stands on the diagonal of the motions while the matrix is factored, until refinement has taken it out again.
-Small beside what contact gives there, or that takes many rounds; the smaller, the more digits a round loses."""
+"""Diagonal entries of the motions in the factored matrix; refinement removes their influence. Large ones take more
+rounds, small ones cost more digits in each round."""
 _MOST_ROUNDS = 12
 """Rounds of refinement; three are usual."""
 _TINY = float(np.finfo(float).tiny)
 
 
 def sparse_solver_name() -> str:
-    """Say in a few words which solver factors sparse contact systems, and what would be faster."""
+    """Return the name of the solver that factors sparse contact systems, and of a faster one that is not installed."""
     return _pardiso()
 
 
@@ -52,7 +52,7 @@ def uses_pardiso() -> bool:
 
 @contextmanager
 def factored(matrix: sparse.csr_array) -> Iterator[Solve]:
-    """Factor a matrix along its diagonal, and lend the function that solves with it.
+    """Factor a matrix with pivots on its diagonal; yields the function that solves with it.
 
     Parameters
     ----------
@@ -120,19 +120,19 @@ def _pardiso() -> str:
 
 @dataclass(frozen=True, eq=False)
 class Compliance:
-    """Members seen from their contact nodes: forces p and motions a move them by ``by_force p + by_motion a``.
+    """Relative displacements of the contact nodes by forces p and rigid motions a: ``by_force p + by_motion a``.
 
-    Strain and motion stand apart: a body of large modulus that soft ones carry moves far and hardly deforms, and no
-    stiffness would tell the one from the other in the last digits.
+    Deformation and motion are separate terms: a body of large modulus between soft ones moves far and hardly deforms,
+    and a stiffness would lose the deformation in the round-off of the motion.
 
     Parameters
     ----------
     by_force : (2 n_contact, 2 n_contact) sparse array [1/Pa]
     by_motion : (2 n_contact, n_motions) sparse array [-]
     force_unit : (2 n_contact,) array [Pa]
-        E' of the partner that yields more: what makes the first array one of size one.
+        E' of the partner that yields more; ``by_force`` times this is of size one.
     motion_unit : (n_motions,) array [1/Pa]
-        One by the E' of the member that moves.
+        1 / E' of the member that moves.
     """
 
     by_force: sparse.csr_array
@@ -147,7 +147,7 @@ class Compliance:
         moduli = np.array([member.modulus for member in joined.members])
         return cls(
             sparse.csr_array(joined.relative @ of_members @ joined.relative.T),
-            sparse.csr_array(joined.felt_motions.T),
+            sparse.csr_array(joined.relative_motions.T),
             joined.moduli,
             1.0 / moduli[joined.motion_owner],
         )
@@ -195,8 +195,8 @@ def sparse_response(joined: CoupledMembers, compliance: Compliance, conditions: 
     blocks = [[ties, moved], [balance, sparse.csr_array((motion.size, motion.size))]]
     matrix = sparse.block_array([[sparse.csr_array(block) for block in row] for row in blocks], format="csr")
     values = row * (conditions.value.ravel()[kept] - on_displacement @ at_rest - on_force @ given.at_rest)
-    rest = motion * -(joined.motions.T @ joined.load + compliance.by_motion.T @ given.at_rest)
-    solution = _solved(matrix, np.append(values, rest), n_motions=motion.size)
+    work = motion * -(joined.motions.T @ joined.load + compliance.by_motion.T @ given.at_rest)
+    solution = _solved(matrix, np.append(values, work), n_motions=motion.size)
     force = given.by_kept @ (row * solution[: kept.size])
     displacement = at_rest + compliance.by_force @ force + compliance.by_motion @ (motion * solution[kept.size :])
     traction = (force + given.at_rest).reshape(n, 2) / joined.weights[:, None]
@@ -213,19 +213,19 @@ class _Given:
     @classmethod
     def by(cls, conditions: LinearConditions, weights: FloatArray) -> _Given:
         is_given = ~np.any(conditions.on_displacement != 0.0, axis=2)
-        own = np.einsum("nii->ni", conditions.on_traction)
-        other = np.stack([conditions.on_traction[:, 0, 1], conditions.on_traction[:, 1, 0]], axis=1)
+        factor = np.einsum("nii->ni", conditions.on_traction)
+        other_factor = np.stack([conditions.on_traction[:, 0, 1], conditions.on_traction[:, 1, 0]], axis=1)
         both, alone = is_given.all(axis=1), is_given & ~is_given.all(axis=1, keepdims=True)
-        if np.any(alone & (own == 0.0)) or np.any(np.linalg.det(conditions.on_traction[both]) == 0.0):
+        if np.any(alone & (factor == 0.0)) or np.any(np.linalg.det(conditions.on_traction[both]) == 0.0):
             raise SingularResponse("a condition at a contact node involves neither displacement nor traction")
         at_rest = np.zeros_like(conditions.value)
-        at_rest[alone] = conditions.value[alone] / own[alone]
+        at_rest[alone] = conditions.value[alone] / factor[alone]
         at_rest[both] = np.linalg.solve(conditions.on_traction[both], conditions.value[both][:, :, None])[:, :, 0]
         number = (np.cumsum(~is_given) - 1).reshape(is_given.shape)
         node, component = np.nonzero(alone)
         rows = np.append(np.flatnonzero(~is_given), 2 * node + component)
         columns = np.append(number[~is_given], number[node, 1 - component])
-        factors = np.append(np.ones(np.count_nonzero(~is_given)), -other[alone] / own[alone])
+        factors = np.append(np.ones(np.count_nonzero(~is_given)), -other_factor[alone] / factor[alone])
         shape = (is_given.size, np.count_nonzero(~is_given))
         by_kept = sparse.csr_array((factors, (rows, columns)), shape)
         by_kept.eliminate_zeros()
@@ -266,9 +266,9 @@ def _solved(matrix: sparse.csr_array, right_side: FloatArray, n_motions: int) ->
 def _refined(
     matrix: sparse.csr_array, terms: sparse.csr_array, right_sides: FloatArray, penalty: FloatArray
 ) -> tuple[FloatArray, float]:
-    """Solve with the factors of a matrix with a penalty until residuals fall no more; return the largest one.
+    """Solve by iterative refinement with the factors of a matrix with a penalty; return also the largest residual.
 
-    The terms are the sizes of its entries.
+    `terms` are the absolute values of the entries; residuals are relative to them.
     """
     solutions, before = np.zeros_like(right_sides), np.inf
     try:
@@ -278,8 +278,8 @@ def _refined(
                 if not np.isfinite(following).all():
                     break
                 sizes = (terms @ np.abs(following) + np.abs(right_sides)).max(axis=0)
-                missed = np.abs(right_sides - matrix @ following).max(axis=0)
-                residual = float((missed / np.maximum(sizes, _TINY)).max())
+                residuals = np.abs(right_sides - matrix @ following).max(axis=0)
+                residual = float((residuals / np.maximum(sizes, _TINY)).max())
                 if residual < before:
                     solutions = following
                 if residual > 0.5 * before or residual == 0.0:

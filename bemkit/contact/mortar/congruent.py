@@ -1,4 +1,4 @@
-"""Couplings of pairs of sides that stand to each other as other pairs do: courses of a wall repeat few of them."""
+"""Couplings of sides, computed once for all pairs in the same relative position: a wall of blocks has few of them."""
 
 from __future__ import annotations
 
@@ -16,21 +16,21 @@ from bemkit.geometry.placement import Placement
 _DIGITS = 12
 """Decimals of distances, relative to the coordinates of the pair, to which congruent pairs agree."""
 _DIGITS_OF_SUMS = 9
-"""The same of sums that tell meshes apart that somebody has made of one array of elements."""
+"""The same for sums that tell meshes with one array of elements and different nodes apart."""
 _FAR = 4.0
-"""Sizes of a pair within which both bodies are."""
+"""Reach, in sizes of a pair, beyond which it makes no difference."""
 
 
 @dataclass(frozen=True, eq=False)
 class PlacedSide:
-    """A side of a body, and where that stands.
+    """A side of a body and the placement of the body.
 
     Parameters
     ----------
     side : ContactSide
-        In its place; copies have the array of elements in common.
+        In the coordinates of the scene; copies share the array of elements.
     placement : Placement
-        Where its mesh was brought from where it was drawn.
+        From the coordinates of the shape to those of the scene.
     """
 
     side: ContactSide
@@ -39,7 +39,7 @@ class PlacedSide:
 
 @dataclass(frozen=True)
 class CongruentCouplings:
-    """Couples sides, and remembers couplings for pairs of the same meshes that stand to each other alike."""
+    """Couples sides, and keeps couplings for pairs of the same meshes in the same relative position."""
 
     _known: dict[Hashable, tuple[Placement, MortarCoupling]] = field(default_factory=dict)
 
@@ -55,18 +55,18 @@ class CongruentCouplings:
 
 
 def _key(non_mortar: PlacedSide, mortar: PlacedSide, without: IntArray, reach: float) -> Hashable:
-    one, two = ((each.side.mesh, each.placement) for each in (non_mortar, mortar))
+    one, two = ((placed.side.mesh, placed.placement) for placed in (non_mortar, mortar))
     sides = (non_mortar.side.elements.tobytes(), mortar.side.elements.tobytes())
     return (stand_alike(one, two, reach), sides, without.tobytes())
 
 
 def stand_alike(one: tuple[BoundaryMesh, Placement], two: tuple[BoundaryMesh, Placement], reach: float) -> Hashable:
-    """Return a key that pairs of meshes have in common that are copies of each other, moved as a whole.
+    """Return a key that is equal for pairs of meshes that are copies of each other, moved as a whole.
 
     Parameters
     ----------
     one, two : (BoundaryMesh, Placement)
-        In their places, and where they were brought from where they were drawn.
+        In the coordinates of the scene, and the placements that brought them there.
     reach : float [m]
         A distance that has to be the same as well.
     """
@@ -79,7 +79,7 @@ def stand_alike(one: tuple[BoundaryMesh, Placement], two: tuple[BoundaryMesh, Pl
 
 
 def _shape(mesh: BoundaryMesh, placement: Placement, size: float) -> tuple[float, ...]:
-    """Return what copies of a mesh share: the array of elements, and weighted sums of places in their own axes."""
+    """Return a key of copies of a mesh: the identity of the array of elements, and weighted sums of its points."""
     points = np.concatenate([mesh.start, mesh.centres])
     weights = spread_fractions(len(points))
     sums = placement.turned_back(weights @ (points - points[0]))

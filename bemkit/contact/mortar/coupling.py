@@ -5,13 +5,13 @@ carry multipliers, they are the dual basis [Wohlmuth2000]: ``int psi_i phi_j = d
 of the degree of the displacements. Their integrals are those of the displacements' basis, which at Gauss-Lobatto points
 are positive for every degree.
 
-On any other element the multipliers have to see the covered part alone [CichoszBischoff2011], and there the dual basis
-would do harm: the integrals of quadratic and higher basis functions over a part may be negative, and a node far from a
-short part would rest on an extrapolation. Instead the nodes that lie in the covered part and may carry a multiplier
-share it by hat functions: linear between these nodes, constant beyond the last of them. If there is no such node, the
-nearest one takes the part alone. Hats are not negative, so that the weights stay positive, and they sum to one like the
-dual basis, so that uniform tractions are transmitted exactly. No combination of them is orthogonal to all polynomials
-of the displacements, so that no constraint repeats another one.
+On any other element the multipliers are integrated over the covered part alone [CichoszBischoff2011], where the dual
+basis does not work: the integrals of quadratic and higher basis functions over a part may be negative, and a node far
+from a short part would depend on an extrapolation. Instead the nodes in the covered part that may carry a multiplier
+have hat functions: linear between these nodes, constant beyond the last of them. If there is no such node, the nearest
+one takes the whole part. Hats are not negative, so that weights are positive. They sum to one like the dual basis, so
+that uniform tractions are transmitted exactly. No combination of them is orthogonal to all polynomials of the
+displacements, so that constraints are independent.
 """
 
 from __future__ import annotations
@@ -33,9 +33,9 @@ if TYPE_CHECKING:
     from scipy.sparse import csr_matrix
 
 _AT_THE_EDGE = 1e-9
-"""A node this far, in local coordinates, outside of the covered part counts as covered."""
+"""Distance from the covered part, in local coordinates, up to which a node counts as covered."""
 _LEAST_SHARE = 0.01
-"""Of the integral of its basis function: a node whose weight is less is handed over to its neighbours."""
+"""Weight of a node, relative to the integral of its basis function, below which its neighbours take it over."""
 
 
 def modified_rows(segments: Segments, may_carry: BoolArray) -> BoolArray:
@@ -113,12 +113,12 @@ def carrying_nodes(nodes: FloatArray, may_carry: BoolArray, low: FloatArray, hig
     Returns
     -------
     (n_local,) bool array
-        None if no node may carry one.
+        All False if no node may carry one.
     """
-    apart = np.maximum(low - nodes[:, None], nodes[:, None] - high).min(axis=1)
-    carries = may_carry & (apart <= _AT_THE_EDGE)
+    distance = np.maximum(low - nodes[:, None], nodes[:, None] - high).min(axis=1)
+    carries = may_carry & (distance <= _AT_THE_EDGE)
     if may_carry.any() and not carries.any():
-        carries[np.argmin(np.where(may_carry, apart, np.inf))] = True
+        carries[np.argmin(np.where(may_carry, distance, np.inf))] = True
     return np.asarray(carries)
 
 
@@ -130,8 +130,8 @@ def hats(nodes: FloatArray, carries: BoolArray, xi: FloatArray) -> FloatArray:
     values = np.zeros((len(xi), nodes.size, xi.shape[1]))
     marked = np.flatnonzero(carries)
     marked = marked[np.argsort(nodes[marked])]
-    for own, unit in zip(marked, np.eye(marked.size), strict=True):
-        values[:, own] = np.interp(xi, nodes[marked], unit)
+    for node, unit in zip(marked, np.eye(marked.size), strict=True):
+        values[:, node] = np.interp(xi, nodes[marked], unit)
     return values
 
 

@@ -14,9 +14,9 @@ from bemkit.geometry.vectors import cross, norms, turned_right
 _LEAST_OPPOSITION = 0.5
 """Cosine of the angle, 60 degrees, between one normal and the other one reversed, below which elements do not face."""
 _LEAST_COVER = 0.01
-"""Of an average element of the finer side: sides that share less only touch at a corner."""
+"""Shared length, relative to an average element of the finer side, below which sides only touch at a corner."""
 _WHOLE = 1.0 - 1e-6
-"""Share from which on a side counts as wholly covered: round-off of coordinates and chords of curved elements."""
+"""Share from which on a side counts as wholly covered, because of round-off and chords of curved elements."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,9 +53,9 @@ def find_facing(
     sides : sequence of ContactSide
         Of many bodies in place.
     distance : float [m]
-        Sides face each other where they are not farther apart than this, or overlap by no more.
+        Largest distance or overlap of sides that face each other.
     owners : sequence of int, optional
-        The body of each side; sides of one body make no pair. Each side is a body of its own if left out.
+        The body of each side; sides of one body are no pair. By default each side is a body of its own.
 
     Returns
     -------
@@ -101,9 +101,9 @@ def is_non_mortar(one: ContactSide, two: ContactSide, distance: float = np.inf) 
 
     Notes
     -----
-    A side that is wholly covered has multipliers of full size at all nodes, and fine multipliers see what happens on
-    both sides [Wohlmuth2000]. How stiff the bodies are is not known here: where a stiff body with the finer mesh
-    presses a soft one, the side of the soft one is the better choice.
+    A side that is wholly covered has multipliers of full size at all nodes, and fine multipliers resolve both sides
+    [Wohlmuth2000]. The stiffness of the bodies does not count: where a stiff body with the finer mesh presses a soft
+    one, the side of the soft one would be the better choice.
     """
     _, _, cover = _facing_elements(_Elements.of([one, two], [0, 1]), distance)
     return _is_first_non_mortar(one, two, float(cover.sum()))
@@ -152,7 +152,7 @@ def _facing_elements(elements: _Elements, distance: float) -> tuple[IntArray, In
     is_near = (high > low) & (nearest <= distance + slack)
     middle = origin + at.mean(axis=0)[:, None] * tangent
     middle += 0.5 * (ahead1 + ahead2).mean(axis=0)[:, None] * turned_right(tangent)
-    # few pairs lie behind each other, and those one by one
+    # sides that seem to overlap may face away from each other; they are few, and examined one by one
     depth, sides = gaps.mean(axis=0), np.stack([elements.side[first], elements.side[second]], axis=1)
     behind = np.flatnonzero(is_near & (depth < -2.0 * slack))
     for one, two in np.unique(sides[behind], axis=0):
@@ -164,7 +164,7 @@ def _facing_elements(elements: _Elements, distance: float) -> tuple[IntArray, In
 
 
 def _near_elements(elements: _Elements, distance: float) -> tuple[IntArray, IntArray]:
-    """Return all pairs of elements whose circles come nearer than a distance.
+    """Return all pairs of elements whose circumscribed circles are nearer than a distance.
 
     Notes
     -----
@@ -175,19 +175,19 @@ def _near_elements(elements: _Elements, distance: float) -> tuple[IntArray, IntA
 
     centre = 0.5 * (elements.start + elements.end)
     radius = 0.5 * norms(elements.end - elements.start) + elements.sagitta
-    distance = min(distance, float(norms(np.ptp(centre, axis=0))))  # farther than that is nothing
+    distance = min(distance, float(norms(np.ptp(centre, axis=0))))  # no two elements are farther apart
     octave = np.frexp(radius)[1]
     members = [np.flatnonzero(octave == size) for size in np.unique(octave)]
     trees = [cKDTree(centre[member]) for member in members]
-    found = [np.zeros((0, 2), np.intp)]
+    blocks = [np.zeros((0, 2), np.intp)]
     for large, (member, tree) in enumerate(zip(members, trees, strict=True)):
         largest = radius[member].max() + distance
         inside = tree.query_pairs(2.0 * largest - distance, output_type="ndarray")
-        found.append(member[inside])
+        blocks.append(member[inside])
         for other, smaller in zip(members[:large], trees[:large], strict=True):
             near = tree.sparse_distance_matrix(smaller, largest + radius[other].max(), output_type="ndarray")
-            found.append(np.stack([member[near["i"]], other[near["j"]]], axis=1))
-    pairs = np.concatenate(found)
-    apart = norms(centre[pairs[:, 0]] - centre[pairs[:, 1]])
-    pairs = pairs[apart <= radius[pairs].sum(axis=1) + distance]
+            blocks.append(np.stack([member[near["i"]], other[near["j"]]], axis=1))
+    pairs = np.concatenate(blocks)
+    separation = norms(centre[pairs[:, 0]] - centre[pairs[:, 1]])
+    pairs = pairs[separation <= radius[pairs].sum(axis=1) + distance]
     return pairs[:, 0], pairs[:, 1]

@@ -12,9 +12,9 @@ from bemkit.geometry.vectors import angles_between, cross, norms, turned_left
 
 _MOST_STEPS = 100
 _MOST_PASSES = 8
-"""From the second pass on the projection follows the mean direction instead of the normal of the one side."""
+"""Passes of `mean_directions`: the first projects along normals, the others along the mean directions of the last."""
 _SETTLED = 1e-13
-"""Change of a direction [rad] from one pass to the next that needs no further one."""
+"""Change of directions [rad] from one pass to the next below which there is no further pass."""
 
 
 def bracketed_roots(function: Callable[[FloatArray], FloatArray], n_roots: int, tolerance: float) -> FloatArray:
@@ -36,11 +36,10 @@ def bracketed_roots(function: Callable[[FloatArray], FloatArray], n_roots: int, 
     a, b = np.full(n_roots, -1.0), np.full(n_roots, 1.0)
     f_a, f_b = function(a), function(b)
     # without a change of sign both ends of the bracket become the nearer one
-    stays = f_a * f_b > 0.0
-    ends, values = np.where(np.abs(f_a) < np.abs(f_b), (a, f_a), (b, f_b))
-    a, b, f_a, f_b = (
-        np.where(stays, own, other) for own, other in ((ends, a), (ends, b), (values, f_a), (values, f_b))
-    )
+    has_no_root = f_a * f_b > 0.0
+    nearer, f_nearer = np.where(np.abs(f_a) < np.abs(f_b), (a, f_a), (b, f_b))
+    a, b = np.where(has_no_root, nearer, a), np.where(has_no_root, nearer, b)
+    f_a, f_b = np.where(has_no_root, f_nearer, f_a), np.where(has_no_root, f_nearer, f_b)
     for _ in range(_MOST_STEPS):
         slope = f_b - f_a
         c = np.clip(b - f_b * (b - a) / np.where(slope == 0.0, 1.0, slope), -1.0, 1.0)
@@ -83,13 +82,13 @@ def project(
     ahead, ahead_at_end = ((directions[:, None] * to).sum(axis=-1) for to in (to_start, to_end))
     distance = np.abs((1.0 - share) * ahead + share * ahead_at_end)
     is_near = distance <= reach
-    rows, each = np.argmin(np.where(is_near & (beside == 0.0), distance, np.inf), axis=1), np.arange(len(points))
-    missed = np.flatnonzero(~is_near[each, rows] | (beside[each, rows] > 0.0))
+    rows, all_points = np.argmin(np.where(is_near & (beside == 0.0), distance, np.inf), axis=1), np.arange(len(points))
+    missed = np.flatnonzero(~is_near[all_points, rows] | (beside[all_points, rows] > 0.0))
     beside = np.where(is_near, beside, np.inf)[missed]
     rows[missed] = np.where(beside.min(axis=1) <= slack, np.argmin(beside, axis=1), -1)
-    found = np.flatnonzero(rows >= 0)
+    hits = np.flatnonzero(rows >= 0)
     xi = np.zeros(len(points))
-    xi[found] = meeting_points(points[found], directions[found], side, rows[found])
+    xi[hits] = meeting_points(points[hits], directions[hits], side, rows[hits])
     return rows, xi
 
 
@@ -130,16 +129,16 @@ def mean_directions(non_mortar: ContactSide, mortar: ContactSide, reach: float) 
     normals = directions = non_mortar.normals
     # the end of a side is met from its end, whatever small angle the first directions are off
     slack = float(max(non_mortar.lengths.mean(), mortar.lengths.mean()))
-    each, half = np.arange(rows.size), np.zeros(rows.size)
+    knots, half_angle = np.arange(rows.size), np.zeros(rows.size)
     for _ in range(_MOST_PASSES):
         partner, eta = project(points, directions, mortar, reach, slack)
-        met = np.flatnonzero(partner >= 0)
-        if not met.size:
+        hits = np.flatnonzero(partner >= 0)
+        if not hits.size:
             break
-        opposite = -mortar.smooth_normals(partner[met], eta[met])
-        before, half = half, np.interp(each, met, 0.5 * angles_between(normals[met], opposite))
-        if np.abs(half - before).max() <= _SETTLED:
+        opposite = -mortar.smooth_normals(partner[hits], eta[hits])
+        before, half_angle = half_angle, np.interp(knots, hits, 0.5 * angles_between(normals[hits], opposite))
+        if np.abs(half_angle - before).max() <= _SETTLED:
             break
-        cosine, sine = np.cos(half)[:, None], np.sin(half)[:, None]
+        cosine, sine = np.cos(half_angle)[:, None], np.sin(half_angle)[:, None]
         directions = cosine * normals + sine * turned_left(normals)
     return directions

@@ -29,7 +29,7 @@ from bemkit.solvers.base import ContactSolver
 
 @dataclass(frozen=True, eq=False)
 class AssembledModel:
-    """An assembly made ready to solve.
+    """A prepared assembly with the maps of its bodies, condensed and joined, and its contact problem.
 
     Parameters
     ----------
@@ -59,18 +59,18 @@ class AssembledModel:
             From `PreparedAssembly.under` of this model's.
         """
         condensed = tuple(
-            each if _is_loaded_alike(prepared, self.prepared, number) else _under(each, prepared, number)
-            for number, each in enumerate(self.condensed)
+            map_ if _is_loaded_alike(prepared, self.prepared, number) else _under(map_, prepared, number)
+            for number, map_ in enumerate(self.condensed)
         )
-        maps = [each.weightless if isinstance(each, HeavyElasticity) else each for each in self.elastic]
+        maps = [map_.weightless if isinstance(map_, HeavyElasticity) else map_ for map_ in self.elastic]
         elastic = _loaded(maps, prepared.insides)
         offset, is_eliminated = _offset(prepared), prepared.tangent_is_eliminated
-        loads = [*(each.load for each in condensed), *(member.load for member in rigid_members(prepared))]
+        loads = [*(map_.load for map_ in condensed), *(member.load for member in rigid_members(prepared))]
         body = self.body.under(loads, offset)
         if not np.array_equal(is_eliminated, self.prepared.tangent_is_eliminated):
             body = replace(body, tangent_is_eliminated=is_eliminated)
-        spent = sum((condensed[group[0]].work for group in groups(prepared.bodies)), OperationCounts())
-        return AssembledModel(prepared, elastic, condensed, body, _problem(prepared, body), self.work + spent)
+        added = sum((condensed[group[0]].work for group in groups(prepared.bodies)), OperationCounts())
+        return AssembledModel(prepared, elastic, condensed, body, _problem(prepared, body), self.work + added)
 
     @property
     def units(self) -> Units:
@@ -92,8 +92,8 @@ class AssembledModel:
 
         Notes
         -----
-        Condensed loads, relative displacements that supports prescribe, and gaps are affine in what is given, so that
-        these are interpolated, and no formula.
+        Condensed loads, relative displacements that supports prescribe, and gaps are affine in the data. So these are
+        interpolated, and formulas are not evaluated again.
         """
         if share == 1.0:
             return self.problem
@@ -112,9 +112,9 @@ class AssembledModel:
         bodies = zip(
             self._contact_forces(state), prepared.conditions, prepared.forces, self.condensed, unknowns, strict=True
         )
-        for of_contact, conditions, given, condensed, own in bodies:
-            displacement, force = condensed.recover(own)
-            forces.append(supporting_forces(conditions, given, force - of_contact) * prepared.force_unit)
+        for of_contact, conditions, given_force, condensed, retained in bodies:
+            displacement, force = condensed.recover(retained)
+            forces.append(supporting_forces(conditions, given_force, force - of_contact) * prepared.force_unit)
             displacements.append(displacement.ravel() * prepared.units.displacement)
         rigid = self.rigid_bodies(state)
         forces += [reaction for _, reaction in rigid]
@@ -140,8 +140,8 @@ class AssembledModel:
         bodies = self.prepared.bodies
         in_place = _coupling(self.prepared).T @ (self.body.weights[:, None] * state.traction).ravel()
         ends = np.cumsum([body.space.n_dofs for body in bodies])[:-1]
-        each = np.split(in_place, ends)
-        return [body.turn.turned_back(own.reshape(-1, 2)) for body, own in zip(bodies, each, strict=True)]
+        by_body = np.split(in_place, ends)
+        return [body.turn.turned_back(force.reshape(-1, 2)) for body, force in zip(bodies, by_body, strict=True)]
 
     def boundary_fields(self, state: ContactState) -> list[tuple[FloatArray, FloatArray, float]]:
         """Return the physical fields of a contact state on the boundary of each body.
@@ -159,8 +159,9 @@ class AssembledModel:
             of_contacts[number].append((elements, values))
         fields: list[tuple[FloatArray, FloatArray, float]] = []
         unknowns = self.body.member_displacements(state)[: len(self.condensed)]
-        for body, elastic, condensed, own in zip(prepared.bodies, self.elastic, self.condensed, unknowns, strict=True):
-            displacement, force = condensed.recover(own)
+        bodies = zip(prepared.bodies, self.elastic, self.condensed, unknowns, strict=True)
+        for body, elastic, condensed, retained in bodies:
+            displacement, force = condensed.recover(retained)
             traction = elastic.element_tractions(displacement, force) * (prepared.force_unit / body.own_mesh.diameter)
             traction = np.array(body.turn.turned(traction))
             traction_space = body.scene.discretisation.traction_space(body.mesh)
@@ -176,8 +177,8 @@ class AssembledModel:
     def rigid_bodies(self, state: ContactState) -> list[tuple[FloatArray, FloatArray]]:
         """Return motion (3,) [m, m, rad] and reaction (3,) [N/m, N/m, N m/m] of each rigid body in a contact state.
 
-        The reaction is what acts on it besides its contacts, about its centre: the load that is given, or what it takes
-        to move it as it is told.
+        The reaction is all that acts on it besides its contacts, about its centre: the given load, or the load that
+        causes the given motion.
         """
         prepared, units = self.prepared, self.prepared.units
         unknowns = iter(self.body.member_displacements(state)[len(prepared.bodies) :])
@@ -185,17 +186,17 @@ class AssembledModel:
         reactions = np.zeros((len(prepared.assembly.rigid), 3))
         for rows in prepared.rows:
             if isinstance(rows.on_other, np.ndarray):
-                own = traction[begin : begin + rows.n_contact]
-                forces = rows.weights[:, None] * np.einsum("nk,nkc->nc", own, rows.frame)
+                tractions = traction[begin : begin + rows.n_contact]
+                forces = rows.weights[:, None] * np.einsum("nk,nkc->nc", tractions, rows.frame)
                 reactions[rows.other - len(prepared.bodies)] += np.einsum("nc,ncm->m", forces, rows.on_other)
             begin += rows.n_contact
-        found = []
+        bodies = []
         for body, reaction in zip(prepared.assembly.rigid, reactions, strict=True):
             motion, is_driven = body.motion, body.is_driven
             if is_driven.any():
                 motion[is_driven] = next(unknowns) * units.displacement / motion_units(units)[is_driven]
-            found.append((motion, reaction))
-        return found
+            bodies.append((motion, reaction))
+        return bodies
 
 
 def build_assembled_model(prepared: PreparedAssembly, executor: Executor | None = None) -> AssembledModel:
@@ -205,7 +206,8 @@ def build_assembled_model(prepared: PreparedAssembly, executor: Executor | None 
     ----------
     prepared : PreparedAssembly
     executor : Executor, optional
-        Where to do so, copies once; its results, factors among them, come back whole. By default here, in turn.
+        Where bodies are assembled and factored, copies once; the factors are sent back. By default in this process, in
+        turn.
 
     Raises
     ------
@@ -232,12 +234,12 @@ def build_assembled_model(prepared: PreparedAssembly, executor: Executor | None 
     members = tuple(
         Member(
             stiffness=condensed[first].stiffness,
-            load=each.load,
+            load=map_.load,
             motions=motions[first],
             modulus=body.material.plane_modulus / prepared.units.modulus,
             name=body.name,
         )
-        for each, body, first in zip(condensed, bodies, firsts, strict=True)
+        for map_, body, first in zip(condensed, bodies, firsts, strict=True)
     )
     joined = JoinedBodies(
         members=(*members, *rigid_members(prepared)),
@@ -253,7 +255,7 @@ def build_assembled_model(prepared: PreparedAssembly, executor: Executor | None 
 
 
 def _loaded(maps: Sequence[SteklovPoincare], insides: Sequence[ForcesInside | None]) -> tuple[SteklovPoincare, ...]:
-    """Return the maps under what acts inside their bodies; copies alike share theirs, and what it finds out."""
+    """Return the maps with the body forces of their bodies; copies under equal forces share one."""
     shared: dict[tuple[int, int], SteklovPoincare] = {}
     return tuple(
         shared.setdefault((id(map_), id(inside)), map_ if inside is None else HeavyElasticity(map_, inside))
@@ -269,8 +271,8 @@ def _under(condensed: CondensedMap, prepared: PreparedAssembly, number: int) -> 
 
 def _firsts(bodies: Sequence[PlacedBody]) -> list[int]:
     """Return for each body the first one that shares its mesh."""
-    known: dict[int, int] = {}
-    return [known.setdefault(id(body.own_mesh), number) for number, body in enumerate(bodies)]
+    first_of: dict[int, int] = {}
+    return [first_of.setdefault(id(body.own_mesh), number) for number, body in enumerate(bodies)]
 
 
 def _problem(prepared: PreparedAssembly, body: JoinedBodies) -> ContactProblem:
@@ -297,14 +299,14 @@ def _nodal(body: PlacedBody, conditions: NodalConditions) -> sparse.csr_array:
     return sparse.csr_array((vectors.ravel(), (rows.ravel(), columns.ravel())), shape)
 
 
-def _given(body: PlacedBody, conditions: NodalConditions) -> FloatArray:
+def _prescribed(body: PlacedBody, conditions: NodalConditions) -> FloatArray:
     """Return the displacements (2 n_nodes,) that supports prescribe, in the axes of the scene."""
     fixed = np.where(conditions.is_fixed, conditions.displacement, 0.0)
     return np.asarray(np.einsum("nkc,nk->nc", body.turn.turned(conditions.frame), fixed)).ravel()
 
 
 def _frames(prepared: PreparedAssembly) -> sparse.csr_array:
-    """Return what takes displacements in x and y at the contact nodes to (n, t) components."""
+    """Return the matrix from displacements in x and y at the contact nodes to (n, t) components."""
     n = prepared.n_contact
     return sparse.csr_array(sparse.bsr_array((prepared.frame, np.arange(n), np.arange(n + 1)), shape=(2 * n, 2 * n)))
 
@@ -332,8 +334,8 @@ def _rigid_coupling(prepared: PreparedAssembly) -> sparse.csr_array:
     by_motions, begin = np.zeros((prepared.n_contact, 2, n_rigid, 3)), 0
     for rows in prepared.rows:
         if isinstance(rows.on_other, np.ndarray):
-            own = rows.on_other / motion_units(prepared.units)
-            by_motions[begin : begin + rows.n_contact, :, rows.other - n_elastic] = -own
+            dimensionless = rows.on_other / motion_units(prepared.units)
+            by_motions[begin : begin + rows.n_contact, :, rows.other - n_elastic] = -dimensionless
         begin += rows.n_contact
     return sparse.csr_array(_frames(prepared) @ sparse.csr_array(by_motions.reshape(2 * begin, 3 * n_rigid)))
 
@@ -353,9 +355,9 @@ def _relative(prepared: PreparedAssembly) -> sparse.csr_array:
 def _offset(prepared: PreparedAssembly) -> FloatArray:
     """Return the relative displacements (2 n_contact,) that supports and motions of rigid bodies prescribe."""
     offset = np.zeros(2 * prepared.n_contact)
-    given = [_given(*pair) for pair in zip(prepared.bodies, prepared.conditions, strict=True)]
-    if any(each.any() for each in given):
-        offset += _coupling(prepared) @ np.concatenate(given)
+    prescribed = [_prescribed(*pair) for pair in zip(prepared.bodies, prepared.conditions, strict=True)]
+    if any(displacement.any() for displacement in prescribed):
+        offset += _coupling(prepared) @ np.concatenate(prescribed)
     if prepared.assembly.rigid:
         motions = [rigid_motions(body, prepared.units)[1] for body in prepared.assembly.rigid]
         offset += _rigid_coupling(prepared) @ np.concatenate(motions)
@@ -363,8 +365,8 @@ def _offset(prepared: PreparedAssembly) -> FloatArray:
 
 
 def _is_loaded_alike(prepared: PreparedAssembly, other: PreparedAssembly, number: int) -> bool:
-    """Tell whether all that acts on a body is the same object in two steps."""
-    given, before = (
-        (each.forces[number], each.insides[number], each.conditions[number].displacement) for each in (prepared, other)
+    """Tell whether loads, body forces and prescribed displacements of a body are the same objects in two steps."""
+    data, other_data = (
+        (step.forces[number], step.insides[number], step.conditions[number].displacement) for step in (prepared, other)
     )
-    return all(one is two for one, two in zip(given, before, strict=True))
+    return all(one is two for one, two in zip(data, other_data, strict=True))

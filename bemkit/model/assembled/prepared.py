@@ -34,7 +34,7 @@ from bemkit.scene.plane_motion import RigidBody
 
 @dataclass(frozen=True, eq=False)
 class PreparedAssembly:
-    """What an assembly says on meshes.
+    """An assembly on meshes: placed bodies, conditions at nodes, forces and contact rows.
 
     Parameters
     ----------
@@ -49,7 +49,7 @@ class PreparedAssembly:
         Given nodal forces of each body, in the axes of its own mesh.
     rows : tuple of ContactRows
     insides : tuple of ForcesInside or None
-        What acts inside each body, in the axes of its own mesh; None where nothing does.
+        Body forces of each body, in the axes of its own mesh; None where there are none.
     """
 
     assembly: Assembly
@@ -87,7 +87,7 @@ class PreparedAssembly:
 
     @cached_property
     def spread(self) -> ContactSpread:
-        """How forces of contact nodes become tractions of elements."""
+        """The map from forces of contact nodes to tractions of elements."""
         return ContactSpread.of(self.bodies, self.rows)
 
     @cached_property
@@ -120,10 +120,10 @@ class PreparedAssembly:
                     continue
                 is_uniform = isinstance(law, LawOfCoefficients) and law.is_uniform
                 try:
-                    own = law if is_uniform else law.at(rows.points[chosen])
+                    evaluated = law if is_uniform else law.at(rows.points[chosen])
                 except ValueError as error:
                     raise LawError(f"contact {rows.name!r}: friction law: {error}") from error
-                laws.setdefault(law if is_uniform else first, (own, []))[1].append(numbers[chosen])
+                laws.setdefault(law if is_uniform else first, (evaluated, []))[1].append(numbers[chosen])
         if len(laws) < 2:
             return next((law for law, _ in laws.values()), Frictionless())
         return PiecewiseLaw(*zip(*((law, np.concatenate(nodes)) for law, nodes in laws.values()), strict=True))
@@ -140,7 +140,7 @@ class PreparedAssembly:
     def under(self, assembly: Assembly) -> PreparedAssembly:
         """Return the same bodies under the loads, gaps and laws of another assembly, in the same units.
 
-        What acts on a body is worked out anew only if its parts or body forces are other objects than before.
+        Loads on a body are integrated again only if its parts or body forces are other objects than before.
 
         Parameters
         ----------
@@ -180,9 +180,9 @@ def _first_of(names: Sequence[str]) -> str:
 def prepare_assembly_steps(
     assemblies: Sequence[Assembly], meshes: Mapping[str, BoundaryMesh] | None = None
 ) -> tuple[PreparedAssembly, ...]:
-    """Work out what assemblies that follow each other in time say, in the units of the largest load.
+    """Prepare assemblies that follow each other in time, in the units of the largest load.
 
-    All take the contacts that are found in the first one.
+    All have the contacts that are found in the first one.
 
     Parameters
     ----------
@@ -202,7 +202,7 @@ def prepare_assembly_steps(
     """
     bodies = place(assemblies[0], meshes)
     contacts = listed_contacts(assemblies[0], bodies)
-    steps = [each.with_contacts(contacts) if each.touching else each for each in assemblies]
+    steps = [step.with_contacts(contacts) if step.touching else step for step in assemblies]
     for step in steps[1:]:
         _check_rigid(steps[0], step)
     units = max((find_common_units(step, _under(step, bodies)) for step in steps), key=lambda units: units.stress)
@@ -233,8 +233,8 @@ def find_common_units(assembly: Assembly, bodies: Sequence[PlacedBody]) -> Units
 
 
 def _under(assembly: Assembly, bodies: Sequence[PlacedBody]) -> tuple[PlacedBody, ...]:
-    """Return placed bodies with what another assembly says of them; refuse bodies of other names."""
-    names, others = ([body.name for body in each] for each in (bodies, assembly.placed_bodies))
+    """Return placed bodies under the conditions of another assembly; InputError if it has bodies of other names."""
+    names, others = ([body.name for body in some] for some in (bodies, assembly.placed_bodies))
     if names != others:
         raise InputError(
             f"the bodies are {_first_of(others)}, and those of the step before {_first_of(names)}: change numbers of "
@@ -247,7 +247,7 @@ def _under(assembly: Assembly, bodies: Sequence[PlacedBody]) -> tuple[PlacedBody
 def _prepared(
     assembly: Assembly, bodies: tuple[PlacedBody, ...], units: Units, before: PreparedAssembly | None = None
 ) -> PreparedAssembly:
-    """Prepare placed bodies; what is as it was in the same units before is taken over."""
+    """Prepare placed bodies; bodies whose loads have not changed keep their conditions and forces."""
     force_unit = units.stress * units.length
     conditions: list[NodalConditions] = []
     forces: list[FloatArray] = []
@@ -256,8 +256,8 @@ def _prepared(
             conditions.append(before.conditions[number])
             forces.append(before.forces[number])
             continue
-        own = body.units(units.modulus, force_unit)
-        supports = supports_on(body.scene, body.own_mesh, own, body.own_space)
+        own_units = body.units(units.modulus, force_unit)
+        supports = supports_on(body.scene, body.own_mesh, own_units, body.own_space)
         conditions.append(supported(body.own_space, supports))
         in_place = body.units(units.modulus, force_unit, body.mesh)
         forces.append(body.turn.turned_back(nodal_forces(body.scene, body.mesh, body.space_in_place, in_place)))
@@ -271,7 +271,7 @@ def _prepared(
 
 
 def _check_rigid(first: Assembly, other: Assembly) -> None:
-    """Refuse a load step whose rigid bodies are others than those of the first one."""
+    """Check that a load step has the rigid bodies of the first one."""
     for body, changed in zip_longest(first.rigid, other.rigid):
         if body is None or changed is None or _layout(body) != _layout(changed):
             raise InputError(
@@ -287,8 +287,8 @@ def _layout(body: RigidBody) -> tuple[object, ...]:
 def _insides(
     bodies: Sequence[PlacedBody], units: Units, before: PreparedAssembly | None
 ) -> tuple[ForcesInside | None, ...]:
-    """Return what acts inside each body; copies that are turned alike share it."""
-    found: dict[tuple[int, tuple[BodyForce, ...]], ForcesInside | None] = {}
+    """Return the body forces of each body; copies with the same rotation share them."""
+    known: dict[tuple[int, tuple[BodyForce, ...]], ForcesInside | None] = {}
     insides = []
     for number, body in enumerate(bodies):
         if before is not None and body.is_loaded_like(before.bodies[number]):
@@ -296,14 +296,14 @@ def _insides(
             continue
         forces = tuple(seen_from(force, body.turn) for force in body.body.body_forces)
         key = (id(body.own_mesh), forces)
-        if key not in found:
-            own = body.units(units.modulus, units.stress * units.length)
-            found[key] = None
+        if key not in known:
+            own_units = body.units(units.modulus, units.stress * units.length)
+            known[key] = None
             if forces:
                 scene = replace(body.scene, body_forces=forces)
-                solution = particular_solution(scene, body.own_mesh, own.modulus, own.stress)
-                found[key] = ForcesInside.of(solution, body.own_space)
-        insides.append(found[key])
+                solution = particular_solution(scene, body.own_mesh, own_units.modulus, own_units.stress)
+                known[key] = ForcesInside.of(solution, body.own_space)
+        insides.append(known[key])
     return tuple(insides)
 
 
@@ -320,9 +320,8 @@ def _retained(
         union = np.any([touched[number] for number in group], axis=0)
         for number in group.tolist():
             touched[number] = union
-    return tuple(
-        replace(each, is_retained=own[:, None] & ~each.is_fixed) for each, own in zip(conditions, touched, strict=True)
-    )
+    pairs = zip(conditions, touched, strict=True)
+    return tuple(replace(of_body, is_retained=nodes[:, None] & ~of_body.is_fixed) for of_body, nodes in pairs)
 
 
 def linear_solver(prepared: PreparedAssembly, number: int) -> ChosenLinearSolver:

@@ -12,11 +12,11 @@ from bemkit.operators.linear.dense import Cholesky
 
 
 class Factor(Protocol):
-    """A matrix made ready to solve with."""
+    """A factored matrix A."""
 
     @property
     def factorisations(self) -> tuple[Factorisation, ...]:
-        """What it took."""
+        """Sizes of the factorisations, for the counts of a run."""
 
     def solve(self, right: FloatArray) -> FloatArray:
         """Return A^-1 right for (order,) or (order, m) arrays."""
@@ -26,25 +26,25 @@ class LinearSolver(Protocol):
     """A way to solve for the free displacements of a body whose matrix is formed."""
 
     def factor(self, matrix: FloatArray, name: str) -> Factor:
-        """Make a matrix ready to solve with.
+        """Factor a matrix.
 
         Parameters
         ----------
         matrix : (order, order) array
             Symmetric positive definite; not changed.
         name : str
-            What it stands for, for messages.
+            Its name in messages.
 
         Raises
         ------
         SingularMatrixError
-            If it turns out not to be positive definite, at the latest when it is solved with.
+            If it is not positive definite; raised here or by `Factor.solve`.
         """
 
 
 @dataclass(frozen=True)
 class DenseCholesky:
-    """Factor the matrix."""
+    """Cholesky factorisation of the dense matrix."""
 
     def factor(self, matrix: FloatArray, name: str) -> Cholesky:
         """Return the Cholesky factor."""
@@ -58,15 +58,15 @@ class Automatic:
 
 @dataclass(frozen=True)
 class Hierarchical:
-    """Boundary equations compressed over a tree and factored there: time and memory grow like the number of elements.
+    """Boundary equations compressed over a tree and factored: time and memory grow like the number of elements.
 
-    For constant collocation, and for Galerkin's method of degree 1 and 2; elsewhere what `Automatic` takes is taken,
-    and the plan says why.
+    For constant collocation, and for Galerkin's method of degree 1 and 2. Other equations are solved as by `Automatic`;
+    the plan says why.
 
     Parameters
     ----------
     tolerance : float
-        Of the compression; tractions and displacements err by a few times that.
+        Relative error of the compression; errors of tractions and displacements are a few times as large.
 
     Raises
     ------
@@ -95,7 +95,7 @@ class Hierarchical:
 class MatrixFree:
     """Boundary equations solved by iteration, with products by the fast multipole method: a fraction of the memory.
 
-    For constant collocation on straight elements; elsewhere what `Automatic` takes is taken, and the plan says why.
+    For constant collocation on straight elements. Other equations are solved as by `Automatic`; the plan says why.
     Every response takes up to about seventeen products, whatever the number of elements.
 
     Parameters
@@ -127,7 +127,7 @@ class MatrixFree:
     def accuracy(self) -> float:
         """Largest error of tractions and displacements that is expected: a hundred times the tolerance.
 
-        That is by how much tractions where contact changes err more than those in the mean.
+        The error of tractions where the contact status changes is that much larger than the mean error.
         """
         return 100.0 * self.tolerance
 
@@ -163,7 +163,7 @@ def choose_linear_solver(requested: LinearSolverChoice) -> ChosenLinearSolver:
     Returns
     -------
     ChosenLinearSolver
-        A linear solver that was asked for, else Cholesky.
+        The linear solver if one is requested, else Cholesky.
     """
     if not isinstance(requested, Automatic | Hierarchical | MatrixFree):
         return ChosenLinearSolver(requested, "asked for")
