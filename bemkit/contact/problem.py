@@ -332,10 +332,10 @@ class _Scales(NamedTuple):
 def _scales(problem: ContactProblem, state: ContactState) -> _Scales:
     weights, modulus = problem.body.weights, problem.modulus
     furthest = float(np.abs(state.displacement).max())
-    # friction without pressure is a traction to be met as well, however small beside those of the sticking state
-    resisted = problem.cohesion
     present, sticking = (np.abs(held.traction).max(axis=1) for held in (state, problem.sticking_state))
-    at_hand = np.maximum(present, resisted)
+    # Without any traction friction without pressure is one to be met, however small beside those of the sticking state.
+    # Tractions that are there are no smaller than they are because a law would allow more.
+    at_hand = present if present.max() > _ROUND_OFF * sticking.max() else np.maximum(present, problem.cohesion)
     if at_hand.max() > _ROUND_OFF * sticking.max() and max(present.max(), sticking.max()) > 0.0:
         # Holding a nearly incompressible body may take a million times the tractions of the answer, which these must
         # not excuse.
