@@ -39,7 +39,24 @@ def test_a_load_that_turns_a_round_body_is_not_held_by_its_mesh(discretisation: 
     solution = bk.run(replace(TWISTED, discretisation=discretisation))
     assert solution.status is bk.Status.UNSOLVABLE_LOAD
     # 2 pi 0.7^2 0.1; around a hole the boundary runs clockwise
-    assert "turns body 'lining' clockwise about (0, 0) with 0.3079, and its contacts" in solution.message
+    assert "turns body 'lining' clockwise about (0, 0) with 0.3079, and contacts that are round" in solution.message
+
+
+def test_bodies_that_friction_joins_turn_together() -> None:
+    """A torque on a shaft that is pressed into a ring, which lies in the hole without friction."""
+    inside = bk.Part("in", bk.Pressure(1.0, 0.1), sides=tuple(f"inner-{k}" for k in range(1, 5)))
+    seat = bk.Part("seat", bk.Free(), sides=tuple(f"inner-{k}" for k in range(1, 5)))
+    shaft = bk.Body(
+        name="shaft", shape=bk.Ring(0.4, 0.7), material=STEEL, parts=(inside, OUTSIDE), mesh=bk.MeshOptions(18)
+    )
+    ring = bk.Body(name="ring", shape=bk.Ring(0.7, 1.0), material=STEEL, parts=(seat, OUTSIDE), mesh=bk.MeshOptions(22))
+    fit = bk.ContactPair(("shaft.out", "ring.seat"), law=bk.Coulomb(0.5), gap=-1e-3)
+    contacts = (fit, bk.ContactPair(("rock.wall", "ring.out")))
+    assembly = replace(TWISTED, bodies=(ROCK, shaft, ring), contacts=contacts)
+    solution = bk.run(assembly)
+    assert solution.status is bk.Status.UNSOLVABLE_LOAD
+    assert "turns bodies 'shaft' and 'ring' clockwise about (0, 0) with 0.1005" in solution.message  # 2 pi 0.4^2 0.1
+    assert bk.run(replace(assembly, law=bk.Coulomb(0.5))).is_converged
 
 
 @pytest.mark.parametrize(
