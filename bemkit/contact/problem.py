@@ -365,8 +365,9 @@ def _scales(problem: ContactProblem, state: ContactState) -> _Scales:
     weights, modulus = problem.body.weights, problem.modulus
     largest_displacement = float(np.abs(state.displacement).max())
     present, sticking = (np.abs(each.traction).max(axis=1) for each in (state, problem.sticking_state))
-    # friction without pressure is a traction to be met as well, however small beside those of the sticking state
-    required = np.maximum(present, problem.cohesion)
+    # Without tractions, friction that needs no pressure is one to be met, however small beside those of the sticking
+    # state. Tractions that are there are no larger because a law would allow more.
+    required = present if present.max() > _ROUND_OFF * sticking.max() else np.maximum(present, problem.cohesion)
     if required.max() > _ROUND_OFF * sticking.max() and max(present.max(), sticking.max()) > 0.0:
         # Holding a nearly incompressible body may take a million times the tractions of the solution. Measured by
         # those, errors of the solution would not be seen.

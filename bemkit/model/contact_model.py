@@ -256,8 +256,12 @@ def elastic_energy(
     of_map, map_force = map_fields(elastic, displacement, force)
     # the forces are in equilibrium: on a rigid motion, which may be huge, they would only do the work of round-off
     strained = without_motion(space.mesh, dof_points(space), of_map)
-    beyond = elastic.energy_beyond(displacement, force) if isinstance(elastic, HeavyElasticity) else 0.0
-    return 0.5 * float(np.sum(strained * map_force)) + beyond
+    return 0.5 * float(np.sum(strained * map_force)) + float(energy_beyond(elastic, of_map, map_force).sum())
+
+
+def energy_beyond(elastic: SteklovPoincare, displacement: FloatArray, force: FloatArray) -> FloatArray:
+    """Return the parts of the energy that what acts inside adds to that of `map_fields`; see `HeavyElasticity`."""
+    return elastic.energy_beyond(displacement, force) if isinstance(elastic, HeavyElasticity) else np.zeros(0)
 
 
 def build_model(prepared: Prepared) -> Model:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -12,6 +13,7 @@ from bemkit.errors import InputError
 from bemkit.formulas import Expression
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.spaces import BoundarySpace
+from bemkit.geometry.vectors import norms
 from bemkit.operators.material import Material, Plane
 from bemkit.operators.particular_solutions import (
     CentrifugalForce,
@@ -70,11 +72,11 @@ def harmonic_sources(
     size = float(np.abs(values).max())
     if size == 0.0:
         return ()
-    centres = _hole_centres(mesh)
-    for holes in ((), tuple(centres)) if len(centres) == 1 else ((),):
+    ring = _ring_around_hole(mesh)
+    for hole in (None,) if ring is None else (None, ring):
         best, sources = np.inf, tuple[Source, ...]()
         for degree in range(HIGHEST_DEGREE + 1):
-            miss, found = _fitted(values, z, degree, holes)
+            miss, found = _fitted(values, z, degree, hole)
             if miss < best:
                 best, sources = miss, found
             if best <= max(_GOOD_ENOUGH, round_off) * size:
@@ -84,19 +86,16 @@ def harmonic_sources(
     raise TemperatureError(_reason(field, mesh, points, size, best / size, ACCURACY + round_off))
 
 
-def _fitted(
-    values: FloatArray, z: ComplexArray, degree: int, centres: tuple[complex, ...]
-) -> tuple[float, tuple[Source, ...]]:
+def _fitted(values: FloatArray, z: ComplexArray, degree: int, hole: _Ring | None) -> tuple[float, tuple[Source, ...]]:
     """Return the largest difference of the least-squares fit, and its sources."""
     powers = (2.0 * z[:, None]) ** np.arange(degree + 1)
-    logs = np.log(np.abs(z[:, None] - np.array(centres, complex)))
+    logs = np.log(np.abs(z[:, None] - np.array([] if hole is None else [hole.centre])))
     columns = np.column_stack([powers.real, -powers[:, 1:].imag, logs])
     coefficients = np.linalg.lstsq(columns, values, rcond=None)[0]
     along, across = coefficients[: degree + 1], np.append(0.0, coefficients[degree + 1 : 2 * degree + 1])
     polynomial = HarmonicExpansion(tuple(((along + 1j * across) * 2.0 ** np.arange(degree + 1)).tolist()))
-    strengths = zip(coefficients[2 * degree + 1 :].tolist(), centres, strict=True)
-    logarithms = tuple(LogarithmicExpansion(strength, centre) for strength, centre in strengths)
-    return float(np.abs(columns @ coefficients - values).max()), (polynomial, *logarithms)
+    logarithm = () if hole is None else (LogarithmicExpansion(float(coefficients[-1]), *hole),)
+    return float(np.abs(columns @ coefficients - values).max()), (polynomial, *logarithm)
 
 
 def _sample_points(mesh: BoundaryMesh) -> FloatArray:
@@ -112,18 +111,26 @@ def _sample_points(mesh: BoundaryMesh) -> FloatArray:
     return np.concatenate([boundary.reshape(-1, 2), inside[Locator(whole).locate(inside).is_inside]])
 
 
-def _hole_centres(mesh: BoundaryMesh) -> list[complex]:
-    """Return the centres of area of the holes."""
+class _Ring(NamedTuple):
+    """The centre of area of a hole, and its distances from the nearest points of the hole and of the outside."""
+
+    centre: complex
+    radii: tuple[float, float]
+
+
+def _ring_around_hole(mesh: BoundaryMesh) -> _Ring | None:
+    """Return that of the only hole; None of a body without holes or with several."""
     whole = mesh.whole
+    if len(whole.loops) != 2:
+        return None
+    hole, outside = (whole.loops[k] for k in np.argsort(whole.loop_areas))
     xi, weights = np.polynomial.legendre.leggauss(12)
-    centres = []
-    for loop, area in zip(whole.loops, whole.loop_areas, strict=True):
-        if area < 0.0:
-            points, normals = whole.points(loop, xi), whole.normals_at(loop, xi)
-            measure = whole.jacobian(loop, xi) * weights
-            first, second = (float(np.sum(points[..., k] ** 2 * normals[..., k] * measure)) for k in range(2))
-            centres.append(complex(first, second) / (2.0 * float(area)))
-    return centres
+    points, normals = whole.points(hole, xi), whole.normals_at(hole, xi)
+    measure = whole.jacobian(hole, xi) * weights
+    moments = np.einsum("epk,epk,ep->k", points**2, normals, measure)
+    centre = moments / (2.0 * float(whole.loop_areas.min()))
+    inner, outer = (float(norms(at - centre).min()) for at in (points, whole.points(outside, xi)))
+    return _Ring(complex(*centre), (inner, outer))
 
 
 def _reason(

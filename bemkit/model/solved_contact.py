@@ -21,7 +21,7 @@ import numpy as np
 from bemkit.arrays import FloatArray, IntArray
 from bemkit.contact.body import ContactState, SlipHistory
 from bemkit.geometry.spaces import BoundarySpace, dof_points
-from bemkit.model.contact_model import Model, map_fields
+from bemkit.model.contact_model import Model, energy_beyond, map_fields
 from bemkit.operators.equilibrium import NOISE_FACTOR, round_off_of
 from bemkit.operators.rigid_modes import traction_free_modes
 from bemkit.operators.steklov_poincare import CondensedMap, SteklovPoincare
@@ -151,7 +151,7 @@ def with_energy_checked(model: Model, result: ContactSolution) -> ContactSolutio
     space = model.prepared.space
     if model.body.condensed is None:  # the work of the solution alone tells
         sensitivity = np.full(displacement.shape, model.elastic.material.plane_modulus)
-        doubt = _negative_work(displacement, force, space, sensitivity)
+        doubt = _negative_work(model.elastic, displacement, force, space, sensitivity)
     else:
         is_symmetric = model.scene.discretisation.is_symmetric
         doubt = _doubt_of(model.body.condensed, model.elastic, space, is_symmetric, (displacement, force))
@@ -202,18 +202,30 @@ def _doubt_of(
     # a symmetric map is negative in no direction but for round-off, which the work of the solution tells
     if not is_symmetric and is_indefinite(condensed.stiffness, sensitivity):
         return "the stiffness that the contact boundary sees is negative in some direction"
-    return _negative_work(displacement, force, space, sensitivity)
+    return _negative_work(elastic, displacement, force, space, sensitivity)
 
 
-def _negative_work(displacement: FloatArray, force: FloatArray, space: BoundarySpace, sensitivity: FloatArray) -> str:
-    """Say how negative the work of all forces is; empty if it is not."""
+def _negative_work(
+    elastic: SteklovPoincare,
+    displacement: FloatArray,
+    force: FloatArray,
+    space: BoundarySpace,
+    sensitivity: FloatArray,
+) -> str:
+    """Say how negative the work of all forces is, without those inside or with them; empty if neither is."""
     motions = traction_free_modes(space.mesh, dof_points(space))
     share = negative_share(displacement, force, motions, sensitivity)
+    if not share and (beyond := energy_beyond(elastic, displacement, force)).any():
+        share = negative_share(displacement, force, motions, sensitivity, 2.0 * beyond)
     return f"it is {-share:.1e} times the work of all forces, each taken by its size" if share else ""
 
 
 def negative_share(
-    displacement: FloatArray, force: FloatArray, motions: FloatArray, sensitivity: FloatArray | None
+    displacement: FloatArray,
+    force: FloatArray,
+    motions: FloatArray,
+    sensitivity: FloatArray | None,
+    beyond: FloatArray | None = None,
 ) -> float:
     """Return how negative the work of all forces is, relative to the sum of the sizes of its parts.
 
@@ -224,6 +236,8 @@ def negative_share(
         Rigid motions that cost no energy: balanced forces do no work on them, but for round-off.
     sensitivity : (n_nodes, 2) array or None
         See `CondensedMap`.
+    beyond : (n,) array [J/m], optional
+        Further parts of the work.
 
     Returns
     -------
@@ -231,7 +245,7 @@ def negative_share(
         Zero for a work that is positive, or negative by no more than round-off.
     """
     strained = displacement - (motions @ np.linalg.lstsq(motions, displacement.ravel(), rcond=None)[0]).reshape(-1, 2)
-    parts = strained * force
+    parts = np.append(strained * force, [] if beyond is None else beyond)
     size = float(np.abs(parts).sum())
     # a body that only moves has strains of round-off alone, and these are known no better than that
     farthest = max(

@@ -5,11 +5,12 @@ With z = x + i y, complex displacements u = u_x + i u_y, forces b = b_x + i b_y,
     uniform force b              u = -beta conj(b) z^2 / 2,       sigma = -Re(conj(b) z) I
     centrifugal force q z        u = C |z|^2 z,                   C = -q beta / (8 (1 - nu))
     expansion Re f(z)            u = int f dz,                    sigma = 0
-    expansion s log |z|          u = m z (log |z| - 1/2) / 2,     m = s / (1 - nu)
+    expansion s log |z|          u = m z (log |z| - 1/2) / 2 + beta p z + c / conj(z),    m = s / (1 - nu)
 
 Nothing is divided by 1 - 2 nu, so that they hold for incompressible bodies, too. The first is a state of hydrostatic
 pressure, the third says that a harmonic temperature leaves a body without holes and supports free of stress, the last
-is the gradient of a thermoelastic potential [TimoshenkoGoodier1970].
+is the gradient of a thermoelastic potential [TimoshenkoGoodier1970]. There p and c take the tractions off two circles:
+without them the energy of a thin ring would be a small difference of large ones.
 """
 
 from __future__ import annotations
@@ -23,6 +24,7 @@ import numpy as np
 from bemkit.arrays import ComplexArray, FloatArray
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.quadrature import gauss_legendre
+from bemkit.geometry.vectors import norms
 from bemkit.operators.material import Material
 from bemkit.operators.somigliana.stress import gradient_of, stress_of
 
@@ -107,20 +109,35 @@ class HarmonicExpansion:
 
 @dataclass(frozen=True)
 class LogarithmicExpansion:
-    """The thermal strain s log |z - centre| around a centre that lies in a hole of the body."""
+    """The thermal strain s log |z - centre| around a centre that lies in a hole of the body.
+
+    Parameters
+    ----------
+    strength : float [-]
+    centre : complex [m]
+    radii : two floats [m]
+        Of the circles around the centre, the inner first, that its state leaves free of traction.
+    """
 
     strength: float
     centre: complex
+    radii: tuple[float, float]
     is_expansion = True
 
     def state(self, z: ComplexArray, material: Material) -> ComplexState:
-        """Return the state of the thermoelastic potential, single-valued around the hole; see `Source.state`."""
-        arm = z - self.centre
-        log, m = np.log(np.abs(arm)), self.strength / (1.0 - material.effective_poisson_ratio)
-        across = 0.25 * m * arm / arm.conj()
-        mean = -material.shear_modulus * m * log
-        along = (0.5 * m * log).astype(complex)
-        return ComplexState(0.5 * m * arm * (log - 0.5), along, across, mean, self.strength * log)
+        """Return the state of a free ring between the radii, single-valued around the hole; see `Source.state`."""
+        (inner, outer), arm = self.radii, z - self.centre
+        distance, m = np.abs(arm), self.strength / (1.0 - material.effective_poisson_ratio)
+        log, release = np.log(distance), 0.5 * np.log(outer / inner) / (1.0 - (inner / outer) ** 2)
+        pressure = material.shear_modulus * m * (np.log(inner) - 0.5 + 2.0 * release)
+        stretch = material.plane_compressibility * pressure
+        inverse = m * release * inner**2 / arm.conj()
+        across = 0.25 * m * arm / arm.conj() - inverse / arm.conj()
+        along = (0.5 * m * log + stretch).astype(complex)
+        displacement = (0.5 * m * (log - 0.5) + stretch) * arm + inverse
+        return ComplexState(
+            displacement, along, across, pressure - material.shear_modulus * m * log, self.strength * log
+        )
 
 
 @dataclass(frozen=True)
@@ -171,18 +188,23 @@ class ParticularSolution:
 
     def energy(self, mesh: BoundaryMesh) -> float:
         """Return the elastic energy [J/m] in a body, by integrals along rays from the centre of the expansions."""
-        z = next((complex(source.centre) for source in self.sources if isinstance(source, LogarithmicExpansion)), 0j)
-        origin = np.array([z.real, z.imag])
+        log = next((source for source in self.sources if isinstance(source, LogarithmicExpansion)), None)
+        origin = np.zeros(2) if log is None else np.array([log.centre.real, log.centre.imag])
         xi, weights = gauss_legendre(_POINTS_ON_ELEMENTS)
         elements = np.arange(mesh.n_elements)
         arms, normals = mesh.points(elements, xi) - origin, mesh.normals_at(elements, xi)
         swept = np.sum(arms * normals, axis=2) * mesh.jacobian(elements, xi) * weights
         total = 0.0
-        # the distance from the origin is s^4, which makes powers of its logarithm smooth
         for place, weight in zip(*gauss_legendre(_POINTS_ON_RAYS), strict=True):
-            s = 0.5 * (1.0 + float(place))
-            density = self._energy_density((origin + s**4 * arms).reshape(-1, 2)).reshape(swept.shape)
-            total += 0.5 * float(weight) * 4.0 * s**7 * float(np.sum(swept * density))
+            share = measure = np.full(swept.shape, 0.5 * (1.0 + float(place)))
+            if log is not None:
+                # rays begin on a circle around the centre, where a state may have no end: its parts on all of them
+                # cancel. Powers of the distance and of its logarithm are smooth along the logarithm.
+                depth = np.log(norms(arms) / log.radii[0])
+                share = np.exp((share - 1.0) * depth)
+                measure = share**2 * depth
+            density = self._energy_density((origin + share[..., None] * arms).reshape(-1, 2)).reshape(swept.shape)
+            total += 0.5 * float(weight) * float(np.sum(swept * measure * density))
         return total
 
     def _energy_density(self, points: FloatArray) -> FloatArray:

@@ -216,7 +216,7 @@ def violations_at(values: PointsBetween, law: FrictionLaw, stress: float, length
     # friction given across the gap is no sign of contact
     shear = 0.0 if law.acts_across_gap else np.abs(values.sigma_t)
     traction = np.maximum(np.abs(values.sigma_n), shear) / stress
-    depth = _largest(-values.clearance)
+    depth = _deepest(values)
     depth = 0.0 if depth <= _ROUND_OFF * _largest(np.abs(values.points)) else depth
     return BetweenNodes(
         penetration=depth / length,
@@ -225,6 +225,24 @@ def violations_at(values: PointsBetween, law: FrictionLaw, stress: float, length
         cone_excess=_largest(np.abs(values.sigma_t) - bound) / stress,
         penetration_depth=depth,
     )
+
+
+def _deepest(values: PointsBetween) -> float:
+    """Return the largest penetration [m]: where the parabola through the deepest point and those beside it has its end.
+
+    The points know a polynomial to some per cent of its range on an element. That may be all of a penetration where it
+    crosses zero there.
+    """
+    deepest = _largest(-values.clearance)
+    k = int(np.argmin(values.clearance)) if values.clearance.size else 0
+    if not deepest > 0.0 or not 0 < k < values.clearance.size - 1:
+        return deepest
+    (before, after), clearance = np.diff(values.s[k - 1 : k + 2]), values.clearance[k - 1 : k + 2]
+    if not min(before, after) > 0.0:  # the end of an element
+        return deepest
+    fall, rise = -np.diff(clearance) / (before, after)
+    curvature, slope = (rise - fall) / (before + after), (fall * after + rise * before) / (before + after)
+    return deepest - float(0.25 * slope**2 / curvature) if curvature < 0.0 else deepest
 
 
 def points_between(degree: int) -> FloatArray:

@@ -288,7 +288,7 @@ def _distance_to_zero(s: FloatArray, field: FloatArray) -> float | None:
     share = (field[0] / field[1]) ** (2.0 / 3.0)
     distance = float(s[1] * share / (1.0 - share))
     fitted = slice(_FIRST_FITTED, int(np.searchsorted(s, _POWER_LAW_RANGE * s[-1])))
-    if s[fitted].size < _LEAST_FITTED or not np.all(field[fitted] > 0.0):
+    if s[fitted].size < _LEAST_FITTED or not np.all((field[fitted] > 0.0) & np.isfinite(field[fitted])):
         return distance
     place, power = _fitted_power_law(s[fitted], field[fitted], distance)
     is_likely = _POWERS[0] <= power <= _POWERS[1] and abs(place - distance) <= s[_FIRST_FITTED]

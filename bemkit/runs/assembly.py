@@ -18,6 +18,7 @@ from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.spaces import dof_points
 from bemkit.model.assembled.model import AssembledModel, build_assembled_model
 from bemkit.model.assembled.prepared import PreparedAssembly, prepare_assembly_steps
+from bemkit.model.assembled.turning import with_turning_checked
 from bemkit.model.solved_contact import SLIP_TOLERANCE, with_energies_checked
 from bemkit.operators.stopwatch import Stage, StageClock
 from bemkit.plan import Plan
@@ -116,6 +117,10 @@ def _prepared(
     return prepared, plan_assembly(prepared)
 
 
+def _checked(model: AssembledModel, result: ContactSolution) -> ContactSolution:
+    return with_turning_checked(model, with_energies_checked(model, result))
+
+
 def _explained(model: AssembledModel, load: UnsolvableLoad) -> str:
     return f"{load.description}: hold what moves by a support, raise the friction, or change the loads"
 
@@ -210,7 +215,7 @@ def _contact_table(model: AssembledModel, state: ContactState, node_status: IntA
 def several_bodies(executor: Executor | None = None) -> Kind[AssembledModel, AssemblySolution]:
     """Return how several bodies are solved, assembled and factored on an executor if one is given."""
     build = partial(build_assembled_model, executor=executor)
-    return Kind(_prepared, build, with_energies_checked, assembly_solution, _explained)
+    return Kind(_prepared, build, _checked, assembly_solution, _explained)
 
 
 SEVERAL_BODIES = several_bodies()

@@ -46,7 +46,8 @@ class Kind(Generic[AnyModel, AnySolution]):
     model : callable
         What the first step says -> the model; operators are assembled and the bodies condensed.
     checked : callable
-        Model and outcome -> the outcome, with another status if the energy of a body is negative.
+        Model and outcome -> the outcome, with another status if the energy of a body is negative, or if only
+        its mesh keeps one from turning.
     solution : callable
         Model, outcome, plan, clock and slip -> the fields.
     explained : callable
@@ -220,9 +221,9 @@ def solve_steps(
         result = kind.checked(model, reached.result)
         clock = clock.closed(Stage.SOLVE)
         if before is not None and not result.is_converged:
-            words = result.message
-            if result.status is Status.UNSOLVABLE_LOAD:
-                words = f"{result.status.value} {kind.why_not(model, result)}."
+            words, why = result.message, kind.why_not(model, result)
+            if why != words:
+                words = f"{result.status.value} {why}."
             solutions.append(_not_reached(solutions[-1] if solutions else whole, replace(result, message=words), clock))
             break
         with np.errstate(over="ignore", invalid="ignore"):  # the status says what is not finite

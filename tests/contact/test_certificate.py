@@ -165,3 +165,14 @@ def test_friction_without_pressure_is_not_excused_by_the_tractions_that_would_ho
     assert certify(problem, state).worst < 1e-12
     resisted = problem.with_law(Tresca(1e-10 * sticking))
     assert certify(resisted, state).slip_opposition == pytest.approx(1e-2)
+
+
+def test_tractions_are_not_excused_by_the_friction_that_cohesion_would_allow():
+    """Two nodes that carry a millionth of their cohesion, under a load that would hold the body by far more."""
+    body = DenseBody(np.eye(4), np.array([-1e3, 1e3, -1e3, -1e3]), np.ones(2))
+    state = ContactState(np.array([[0.0, 1e-6], [0.0, -1e-6]]), np.array([[-1e-3, 1e-3], [-1e-3, -1e-3]]))
+    known = certify(ContactProblem(body, np.zeros(2), Coulomb(1e3)), state).slip_opposition
+    assert known == pytest.approx(1e-5)  # the slip of 1e-6 beside a hundred times the tractions
+    for cohesion in (1e-9, 1.0, 1e3):
+        cohesive = ContactProblem(body, np.zeros(2), CohesiveCoulomb(1e3, cohesion))
+        assert certify(cohesive, state).slip_opposition == pytest.approx(known)

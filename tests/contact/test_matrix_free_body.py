@@ -61,6 +61,15 @@ def test_the_default_tolerance_is_enough_for_certificates() -> None:
     assert solution.is_converged  # 1e-9 leaves 1.8e-9
 
 
+@pytest.mark.parametrize("tolerance", [1e-10, 3e-10])
+def test_every_equation_is_solved_as_well_as_the_mean_of_all(tolerance: float) -> None:
+    """The weight of a column leaves 14 times the tolerance on a few elements where the mean is below it."""
+    solution = bk.run(with_solver(bk.load_scene("gravity-column"), 220, MatrixFree(tolerance)))
+    assert is_iterated(solution)
+    assert solution.is_converged
+    assert solution.certificate.force_imbalance < 2.6 * tolerance
+
+
 @pytest.mark.slow
 def test_statuses_are_those_of_dense_equations_at_2000_elements() -> None:
     own, dense = (bk.run(with_solver(paper(1), 2000, each)) for each in (MatrixFree(), DenseCholesky()))
@@ -72,10 +81,10 @@ def test_statuses_are_those_of_dense_equations_at_2000_elements() -> None:
 
 
 def test_a_wrong_state_is_out_of_balance() -> None:
-    scene = with_solver(paper(1), 240, MatrixFree(1e-9))
+    scene = with_solver(paper(1), 240, MatrixFree(1e-10))
     body = build_model(prepare(scene, scene.build_mesh())).body
     assert isinstance(body, HierarchicalBody)
-    assert body.accuracy == pytest.approx(1e-7)
+    assert body.accuracy == pytest.approx(1e-8)
     state = body.respond(stick(np.zeros(body.n_contact), np.zeros(body.n_contact)))
-    assert body.imbalance(state).force < 1e-7
+    assert body.imbalance(state).force < 1e-8
     assert body.imbalance(replace(state, traction=1.001 * state.traction)).force > 1e-4

@@ -135,7 +135,7 @@ def test_an_impossible_scene_among_others_fails_alone() -> None:
     block = dataclasses.replace(scene(), mesh=bk.MeshOptions(40))
     lifted = dataclasses.replace(block, parts=(*block.parts[:2], bk.Part("top", bk.Traction(y=0.05), sides=("top",))))
     stopped = dataclasses.replace(
-        block, discretisation=bk.ConstantCollocation(), mesh=bk.MeshOptions(240), linear_solver=bk.MatrixFree(1e-9, 1)
+        block, discretisation=bk.ConstantCollocation(), mesh=bk.MeshOptions(240), linear_solver=bk.MatrixFree(1e-10, 1)
     )
     with ThreadPoolExecutor(2) as pool:
         for found in (bk.run_all([block, lifted, stopped, block]), bk.run_all([block, lifted, stopped, block], pool)):

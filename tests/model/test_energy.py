@@ -8,6 +8,7 @@ import pytest
 import bemkit as bk
 from bemkit.model.solved_contact import is_indefinite, negative_share
 from bemkit.operators.rigid_modes import rigid_motions
+from bemkit.scene.toml import with_overrides
 
 PAPER = bk.ConstantCollocation(slopes=False)
 
@@ -45,6 +46,44 @@ def test_scenes_without_contact_are_judged_too(monkeypatch: pytest.MonkeyPatch) 
     solution = bk.run(scene)
     assert solution.status is bk.Status.NEGATIVE_ENERGY
     assert "2.5e-01 times" in solution.message
+
+
+@pytest.mark.parametrize(
+    "force", [bk.Gravity(1.0, (1.0, 0.0)), bk.Rotation(1.0, 1.0, (1.0, 0.0))], ids=["gravity", "rotation"]
+)
+def test_the_energy_of_forces_inside_counts(force: bk.BodyForce) -> None:
+    """Six elements on a strip of 20 : 1: the map has a positive energy, less than the forces take of it."""
+    clamp = bk.Part("clamp", bk.Clamped(), sides=("bottom",))
+    strip = bk.Scene(
+        title="strip",
+        shape=bk.Rectangle(20.0, 1.0),
+        material=bk.Material(1e3, 0.0),
+        parts=(clamp,),
+        body_forces=(force,),
+        discretisation=bk.ConstantCollocation(),
+        mesh=bk.MeshOptions(6),
+    )
+    solution = bk.run(strip)
+    assert solution.status is bk.Status.NEGATIVE_ENERGY
+    assert "times the work of all forces" in solution.message
+    fine = bk.run(with_overrides(strip, elements=84))
+    assert fine.is_converged
+    assert fine.energy > 0.0
+
+
+def test_a_thin_ring_heated_from_inside_has_its_own_energy() -> None:
+    """On 12 constant elements, too: its state is what balances the heat, nothing has to cancel."""
+    ring = thin_ring(
+        0.8,
+        12,
+        law=bk.Frictionless(),
+        symmetry=bk.Symmetry(x=0.0, y=0.0),
+        body_forces=(bk.Heating(1e-6, bk.Expression("log(hypot(x, y))")),),
+        discretisation=bk.ConstantCollocation(),
+    )
+    coarse, fine = bk.run(ring), bk.run(with_overrides(ring, elements=96, discretisation="quadratic"))
+    assert coarse.is_converged
+    assert coarse.energy == pytest.approx(fine.energy, rel=1e-9)
 
 
 @pytest.mark.parametrize("seed", range(8))

@@ -25,7 +25,7 @@ SOURCES: dict[str, tuple[Source, FloatArray]] = {
     "uniform": (UniformForce(0.7 - 0.4j), np.tile([0.7, -0.4], (7, 1))),
     "centrifugal": (CentrifugalForce(1.3), 1.3 * POINTS),
     "harmonic": (HarmonicExpansion((0.2, 0.1 - 0.3j, 0.4j)), np.zeros((7, 2))),
-    "logarithmic": (LogarithmicExpansion(0.6, 3.0 + 0.5j), np.zeros((7, 2))),
+    "logarithmic": (LogarithmicExpansion(0.6, 3.0 + 0.5j, (1.2, 4.5)), np.zeros((7, 2))),
 }
 
 
@@ -88,9 +88,35 @@ def test_energies_of_known_bodies() -> None:
     expected = 2.0 * np.pi * (beta / (16.0 * freedom**2) + 2.0 * mu * c**2) / 6.0
     assert spin.energy(disc) == pytest.approx(expected, rel=1e-10)
     ring = discretise(Ring(0.5, 1.0).outline(), n_elements=32)
-    heat = ParticularSolution((LogarithmicExpansion(1.0, 0j),), material)
+    heat = ParticularSolution((LogarithmicExpansion(1.0, 0j, (0.5, 1.0)),), material)
     r, weights = np.polynomial.legendre.leggauss(30)
     r = 0.75 + 0.25 * r
-    m = 1.0 / freedom
-    density = beta * (mu * m * np.log(r)) ** 2 + 2.0 * mu * (0.25 * m) ** 2
+    radial, hoop = free_ring(r, 0.5, 1.0, material)
+    density = beta * (0.5 * (radial + hoop)) ** 2 + (0.5 * (radial - hoop)) ** 2 / (2.0 * mu)
     assert heat.energy(ring) == pytest.approx(2.0 * np.pi * 0.25 * float(weights @ (density * r)), rel=1e-10)
+
+
+def free_ring(r: FloatArray, a: float, b: float, material: Material) -> tuple[FloatArray, FloatArray]:
+    """Return radial and hoop stresses of a ring with the thermal strain log r [TimoshenkoGoodier1970]."""
+
+    def moment(r: FloatArray | float) -> FloatArray:
+        return np.asarray(0.5 * r**2 * (np.log(r) - 0.5) - 0.5 * a**2 * (np.log(a) - 0.5))
+
+    factor = 2.0 * material.shear_modulus / (1.0 - material.effective_poisson_ratio) / r**2
+    mean = moment(b) / (b**2 - a**2)
+    radial = factor * ((r**2 - a**2) * mean - moment(r))
+    return radial, factor * ((r**2 + a**2) * mean + moment(r) - r**2 * np.log(r))
+
+
+@pytest.mark.parametrize("material", MATERIALS)
+@pytest.mark.parametrize("thickness", [0.5, 0.1, 0.001])
+def test_the_state_of_a_heated_ring_is_that_of_a_free_one(thickness: float, material: Material) -> None:
+    """However thin it is: nothing that its elements would have to cancel."""
+    inner = 1.0 - thickness
+    heat = ParticularSolution((LogarithmicExpansion(1.0, 0j, (inner, 1.0)),), material)
+    r = np.linspace(inner, 1.0, 5)
+    points = np.column_stack([r, np.zeros(5)])
+    radial, hoop = free_ring(r, inner, 1.0, material)
+    round_off = 1e-14 / thickness**2 * material.shear_modulus  # of the differences in both expressions
+    np.testing.assert_allclose(heat.stress(points)[:, 0, 0], radial, atol=round_off)
+    np.testing.assert_allclose(heat.stress(points)[:, 1, 1], hoop, atol=round_off)

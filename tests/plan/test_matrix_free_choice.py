@@ -12,7 +12,7 @@ from tests.contact.test_hierarchical_body import loose_block
 from tests.plan.test_hierarchical_choice import chosen, scene_of
 from tests.scenes import Perforated, squeezed
 
-ASKED = bk.MatrixFree(1e-8)
+ASKED = bk.MatrixFree(3e-10)
 
 
 def test_it_is_taken_where_it_is_asked_for() -> None:

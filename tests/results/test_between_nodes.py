@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import bemkit as bk
-from bemkit.results.between_nodes import BetweenNodes
+from bemkit.results.between_nodes import BetweenNodes, PointsBetween, points_between, violations_at
 from bemkit.results.result_file import write_result
 from bemkit.results.solution import Solution
 from tests.slow import slow_except, slow_only
@@ -61,6 +61,19 @@ def test_a_parabola_between_its_nodes_is_seen_to_penetrate(sliding: Solution) ->
     assert found.complementarity == pytest.approx(DEPTH / length, rel=1e-9)
     # lowered at the end it penetrates by more, there and on the next element
     assert changed(sliding, displacement=-DEPTH).penetration_depth == pytest.approx(DEPTH, rel=1e-9)
+
+
+@pytest.mark.parametrize("crossing", [1e-3, 0.05, 0.5])
+def test_a_penetration_that_is_small_beside_the_range_of_the_clearance_is_found(crossing: float) -> None:
+    """A parabola that is negative over a part of an element: its least value lies between the points."""
+    xi = points_between(2)
+    middle = 0.5 * (xi[3] + xi[4])
+    clearance = (xi - middle) ** 2 - crossing**2 - (xi[3] - middle) ** 2  # `crossing` at two points alike
+    at, nothing = np.stack([xi, 0.0 * xi], axis=1), np.zeros_like(xi)
+    found = violations_at(PointsBetween(at, xi, at, clearance, nothing, nothing), bk.Frictionless(), 1.0, 2.0)
+    assert found.penetration_depth == pytest.approx(crossing**2 + (xi[3] - middle) ** 2, rel=1e-12)
+    assert found.penetration == pytest.approx(0.5 * found.penetration_depth)
+    assert found.penetration_depth > (1.25 if crossing < 0.1 else 1.0) * -clearance.min()
 
 
 def test_round_off_of_coordinates_is_no_depth(sliding: Solution) -> None:

@@ -76,6 +76,17 @@ def test_on_fine_meshes_the_power_of_the_distance_is_found_too(power: float, off
     assert found.s == pytest.approx(1.0, abs=5e-7)
 
 
+def test_nodes_that_face_no_obstacle_say_nothing_of_the_power() -> None:
+    """As in random scene 4003, 3473: only a few nodes beside the transition have a clearance."""
+    n = 40
+    distance = np.append((np.arange(n - 1, -1, -1) / n) ** 2.5, [-0.01, -0.05])
+    s, clearance = 1.0 - distance, np.maximum(distance, 0.0) ** 1.5
+    clearance[: n - 6] = np.inf
+    columns = {"s": s, "x": s, "weight": np.full(n + 2, 1.0), "clearance": clearance}
+    (found,) = find_transitions(table([SEPARATED] * n + [STICK] * 2, **columns))
+    assert found.s == pytest.approx(1.0, abs=1e-12)
+
+
 def test_without_a_law_for_its_end_a_zone_ends_halfway() -> None:
     far = np.array([np.inf, np.inf, np.inf, 0.0, 0.0])
     assert find_transitions(table([SEPARATED] * 3 + [STICK] * 2, clearance=far))[0].x == 2.5

@@ -12,9 +12,11 @@ import bemkit as bk
 from bemkit.contact.body import ContactState
 from bemkit.geometry.errors import GeometryError
 from bemkit.geometry.vectors import check_magnitude
+from bemkit.model.assembled.model import AssembledModel
 from bemkit.model.contact_model import Model
 from bemkit.model.units import OutOfRangeError
 from bemkit.runs import history
+from bemkit.scene.toml import with_overrides
 
 ELEMENTS = [bk.LinearGalerkin(), bk.ConstantCollocation()]
 
@@ -117,3 +119,16 @@ def test_states_that_are_not_finite_end_as_a_status_without_warnings_of_numpy(mo
     solution = bk.run(block())
     assert solution.status is bk.Status.NOT_FINITE
     assert np.isnan(solution.energy)
+
+
+def test_so_do_those_of_several_bodies(monkeypatch: pytest.MonkeyPatch) -> None:
+    actual = AssembledModel.boundary_fields
+
+    def infinite(model: AssembledModel, state: ContactState) -> Any:
+        return actual(model, ContactState(state.displacement, np.full_like(state.traction, np.inf)))
+
+    monkeypatch.setattr(AssembledModel, "boundary_fields", infinite)
+    solution = bk.run(with_overrides(bk.load_scene("two-cylinders"), discretisation="hp", accuracy=0.05))
+    assert solution.status is bk.Status.NOT_FINITE
+    assert np.isnan(solution.energy)
+    assert solution.warnings == solution.plan.warnings  # of what is not certified nothing else is in doubt

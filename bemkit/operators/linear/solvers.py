@@ -71,15 +71,17 @@ class Hierarchical:
     Raises
     ------
     ValueError
-        If the tolerance is not between 1e-12 and 1e-4; finer ones than that cannot be met in double precision.
+        If the tolerance is not between 1e-12 and 1e-8: finer ones cannot be met in double precision, and from 1e-7 on
+        residuals of the equations may exceed the 1e-9 that certificates allow.
     """
 
     tolerance: float = 1e-10
 
     def __post_init__(self) -> None:
-        if not 1e-12 <= self.tolerance <= 1e-4:
+        if not 1e-12 <= self.tolerance <= 1e-8:
             raise InputError(
-                f"tolerance is {self.tolerance}: give 1e-12, finer ones cannot be met, to 1e-4, such as 1e-10"
+                f"tolerance is {self.tolerance}: give 1e-12, finer ones cannot be met, to 1e-8, larger ones would be "
+                "certified by no solution, such as 1e-10"
             )
 
     @property
@@ -102,23 +104,24 @@ class MatrixFree:
     ----------
     tolerance : float
         Of the residual after preconditioning, in the mean of all elements. The largest residual of an equation, which
-        certificates bound by 1e-9, is up to twice that; above 3e-10 a run may end as stalled.
+        certificates bound by 1e-9, is at most 2.5 times that.
     max_steps : int
         Steps allowed for a response.
 
     Raises
     ------
     ValueError
-        If the tolerance is not between 1e-11 and 1e-4, or there is no step.
+        If the tolerance is not between 1e-11 and 3e-10, or there is no step.
     """
 
     tolerance: float = 1e-10
     max_steps: int = 100
 
     def __post_init__(self) -> None:
-        if not 1e-11 <= self.tolerance <= 1e-4:
+        if not 1e-11 <= self.tolerance <= 3e-10:
             raise InputError(
-                f"tolerance is {self.tolerance}: give 1e-11, finer ones cannot be met, to 1e-4, such as 1e-10"
+                f"tolerance is {self.tolerance}: give 1e-11, finer ones cannot be met, to 3e-10, larger ones would be "
+                "certified by no solution, such as 1e-10"
             )
         if self.max_steps < 1:
             raise InputError(f"max_steps is {self.max_steps}: give a positive whole number")

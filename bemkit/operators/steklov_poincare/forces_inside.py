@@ -18,6 +18,7 @@ from bemkit.geometry.local_values import values_on_elements
 from bemkit.geometry.quadrature import gauss_legendre
 from bemkit.geometry.spaces import BoundarySpace, dof_points
 from bemkit.operators.material import Material
+from bemkit.operators.rigid_modes import without_motion
 from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions, integrate_traction
 from bemkit.operators.steklov_poincare.protocol import CondensedMap, SteklovPoincare
 
@@ -197,13 +198,13 @@ class HeavyElasticity:
     def _particular_energy(self) -> float:
         return self.inside.solution.energy(self.traction_space.mesh)
 
-    def energy_beyond(self, displacement: FloatArray, force: FloatArray) -> float:
-        """Return the elastic energy [J/m] that a body has beyond the one of the map, f_h u_h / 2.
+    def energy_beyond(self, displacement: FloatArray, force: FloatArray) -> FloatArray:
+        """Return the parts (4,) of the elastic energy [J/m] that a body has beyond the one of the map, f_h u_h / 2.
 
         Parameters
         ----------
         displacement, force : (n_nodes, 2) arrays [m], [N/m]
-            As `CondensedMap.recover` gives them.
+            Of the map: u_h and f_h.
 
         Notes
         -----
@@ -212,13 +213,11 @@ class HeavyElasticity:
         do the first on the interpolant of u_p, and the tractions, which hold normals only by interpolation, on the
         small rest.
         """
-        displacement, force = displacement - self.inside.displacement, force - self.inside.force
         traction = self.weightless.element_tractions(displacement, force)
         at_nodes, rest, of_heat = self._work_on_particular
-        work = sum(
-            float(np.sum(one * two)) for one, two in ((force, at_nodes), (traction, rest), (of_heat, displacement))
-        )
-        return work + self._particular_energy
+        strained = without_motion(self.traction_space.mesh, dof_points(self.displacement_space), displacement)
+        pairs = (force, at_nodes), (traction, rest), (of_heat, strained)
+        return np.array([*(np.sum(one * two) for one, two in pairs), self._particular_energy])
 
     @cached_property
     def _work_on_particular(self) -> tuple[FloatArray, FloatArray, FloatArray]:

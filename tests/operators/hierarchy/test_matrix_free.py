@@ -75,7 +75,8 @@ def test_graded_meshes() -> None:
     system = iterated(mesh, frame)
     answers = solved(system, clamped(mesh)), solved(system_of(mesh, frame, True, 1e-12), clamped(mesh))
     assert np.abs(answers[0][1] - answers[1][1]).max() < 1e-8 * np.abs(answers[1][1]).max()
-    assert system.steps[0] <= 13  # with kinks in the prolongations of tractions 15
+    # 13 for the mean of all equations and one for the largest; with kinks in the prolongations of tractions 15 and more
+    assert system.steps[0] <= 14
 
 
 @pytest.mark.parametrize("most", slow_except((1600, 6400), 1600))
@@ -83,7 +84,7 @@ def test_steps_do_not_grow_with_the_number_of_elements(most: int) -> None:
     steps = []
     for n in (400, most):
         mesh = mesh_of("rectangle", n)
-        system = iterated(mesh, np.tile(np.eye(2), (n, 1, 1)), 1e-9)
+        system = iterated(mesh, np.tile(np.eye(2), (n, 1, 1)), 3e-10)
         solved(system, clamped(mesh))
         steps.append(system.steps[0])
     # without groups 34 at 400 elements and 38 at 1600, with kinks in the prolongations of tractions 14 and 18
@@ -207,7 +208,7 @@ def test_the_hierarchy_inverts_the_single_layer_on_waves() -> None:
 
 
 @pytest.mark.parametrize(
-    ("options", "words"), [((1e-12,), "give 1e-11"), ((1e-3,), "to 1e-4"), ((1e-9, 0), "max_steps is 0")]
+    ("options", "words"), [((1e-12,), "give 1e-11"), ((1e-9,), "to 3e-10"), ((1e-10, 0), "max_steps is 0")]
 )
 def test_options_out_of_range(options: tuple[float, int], words: str) -> None:
     with pytest.raises(ValueError, match=words):

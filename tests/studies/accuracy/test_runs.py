@@ -86,7 +86,7 @@ def test_rows_without_a_solution_say_why_and_claim_nothing() -> None:
 
 
 def test_a_scene_that_does_not_allow_an_element_type_is_a_row_among_others() -> None:
-    free = dataclasses.replace(bk.load_scene("paper-1"), discretisation=LINEAR, linear_solver=bk.MatrixFree(1e-9, 1))
+    free = dataclasses.replace(bk.load_scene("paper-1"), discretisation=LINEAR, linear_solver=bk.MatrixFree(1e-10, 1))
     runs = all_runs(free, [CONSTANT], [uniform((240,))], [NEWTON])
     runs = (*runs, *all_runs(free, [LINEAR], [uniform((20,))], [NEWTON]))
     rows = list(compute(error_tasks(runs, reference(), 1)))

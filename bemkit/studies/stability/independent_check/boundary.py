@@ -194,6 +194,8 @@ def scales_of(solution: Solution, before: Solution | None = None) -> Scales:
     modulus, diameter = solution.scene.material.plane_modulus, solution.mesh.diameter
     displacement = float(np.abs(solution.boundary.displacement).max())
     table = solution.contact
+    gaps = np.abs(table.gap[np.isfinite(table.gap)]).max(initial=0.0)
+    coordinates = 64.0 * EPSILON * (float(np.abs(solution.mesh.nodes).max()) + float(gaps))
     fields = (solution.boundary.traction, table.sigma_n, table.sigma_t)
     largest_traction = max(float(np.abs(each).max(initial=0.0)) for each in fields)
     trusted = trusted_stress(solution, before)
@@ -202,10 +204,8 @@ def scales_of(solution: Solution, before: Solution | None = None) -> Scales:
     # forces inside strain a body, too, that an overlap has pushed aside and that touches nothing any more
     deciding = fields[1:] if solution.scene.body_forces and table.n_contact else fields
     if max(float(np.abs(each).max(initial=0.0)) for each in deciding) <= CONTACT_LIMIT * trusted:
-        # the body has only moved: a hundredth of that, to be strict
-        length = max(length, 1e-2 * displacement)
-    gaps = np.abs(table.gap[np.isfinite(table.gap)]).max(initial=0.0)
-    coordinates = 64.0 * EPSILON * (float(np.abs(solution.mesh.nodes).max()) + float(gaps))
+        # the body has only moved: a hundredth of that, to be strict; back at rest, round-off of gaps is all there is
+        length = max(length, 1e-2 * displacement, coordinates / CONTACT_LIMIT)
     curved = solution.mesh.lengths[~solution.mesh.is_straight]
     # derivatives of 14 points amplify their errors by up to 14^2 at the ends of an element
     error = 200.0 * EPSILON * float(np.abs(solution.mesh.nodes).max()) / float(curved.min()) if curved.size else 0.0

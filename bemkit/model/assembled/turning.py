@@ -1,0 +1,127 @@
+"""Round bodies that nothing keeps from turning.
+
+A body whose contact sides are arcs around one point turns about it without changing them: without friction no contact
+resists, whatever it touches. So do several that friction joins, if those sides are round by which they touch others.
+Their elements do resist, since they interpolate the rotation: a load that turns such a body would be balanced by what
+its mesh differs from a circle, at any angle.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TypeAlias
+
+import numpy as np
+
+from bemkit.arrays import FloatArray, IntArray
+from bemkit.geometry.quadrature import gauss_legendre
+from bemkit.geometry.vectors import cross, norms
+from bemkit.model.assembled.model import AssembledModel
+from bemkit.model.assembled.placed import PlacedBody
+from bemkit.model.assembled.prepared import PreparedAssembly
+from bemkit.scene.conditions import Clamped, PrescribedDisplacement, Pressure, Roller, Traction
+from bemkit.scene.unit_names import amount
+from bemkit.solvers.base import ContactSolution, Status
+
+_N_POINTS = 12
+_ROUND_OFF = 1e-9
+"""Of the diameter, by which normals of arcs miss their centre."""
+_BALANCED = 1e-6
+"""Share of the moment of all loads, each taken by its size, that counts as none."""
+
+
+_Side: TypeAlias = tuple[PlacedBody, IntArray]
+"""A body, and elements of its boundary."""
+
+
+def with_turning_checked(model: AssembledModel, result: ContactSolution) -> ContactSolution:
+    """Return the outcome of a solve, named UNSOLVABLE_LOAD if nothing but meshes keeps a body from turning.
+
+    Bodies that friction joins are judged together; those with forces inside are not.
+    """
+    if not result.is_converged:
+        return result
+    groups = _joined_by_friction(model.prepared)
+    reason = next(filter(None, (_turned(model.prepared, *group) for group in groups)), "")
+    status = Status.UNSOLVABLE_LOAD
+    return replace(result, status=status, message=f"{status.value} [{reason}]") if reason else result
+
+
+def _joined_by_friction(prepared: PreparedAssembly) -> list[tuple[list[PlacedBody], list[_Side]]]:
+    """Return bodies that friction joins, and the sides by which they touch others without; none that friction holds."""
+    bodies, rows = prepared.bodies, prepared.rows
+    group, is_held = np.arange(len(bodies)), np.zeros(len(bodies), bool)
+    for contact in rows:
+        if contact.law.is_frictionless:
+            continue
+        if 0 <= contact.other < len(bodies):
+            group[group == group[contact.other]] = group[contact.body]
+        else:
+            is_held[contact.body] = True
+    sides: dict[int, list[_Side]] = {}
+    for contact in rows:
+        ends = [(contact.body, contact.elements), (contact.other, contact.other_elements)]
+        ends = [(k, elements) for k, elements in ends if 0 <= k < len(bodies)]
+        if len(ends) == 1 or group[contact.body] != group[contact.other]:
+            for k, elements in ends:
+                sides.setdefault(int(group[k]), []).append((bodies[k], elements))
+    members = {k: np.flatnonzero(group == k) for k in sides}
+    return [([bodies[m] for m in members[k]], sides[k]) for k in sides if not is_held[members[k]].any()]
+
+
+def _turned(prepared: PreparedAssembly, bodies: list[PlacedBody], sides: list[_Side]) -> str:
+    """Say how the load turns bodies that may turn by these sides; empty if it does not."""
+    if not all(_may_turn(body) for body in bodies):
+        return ""
+    centre = _common_centre(sides)
+    if centre is None:
+        return ""
+    moment, size = (sum(values) for values in zip(*(_moment(body, centre) for body in bodies), strict=True))
+    if abs(moment) <= _BALANCED * size:
+        return ""
+    diameter = max(body.mesh.diameter for body in bodies)
+    x, y = np.where(np.abs(centre) < _ROUND_OFF * diameter, 0.0, centre).tolist()
+    by = amount(abs(moment), "energy", prepared.assembly.units)
+    sense = "anticlockwise" if moment > 0.0 else "clockwise"
+    names = " and ".join(repr(body.name) for body in bodies)
+    return (
+        f"the load turns {'body' if len(bodies) == 1 else 'bodies'} {names} {sense} about ({x:.4g}, {y:.4g}) with "
+        f"{by}, and contacts that are round and without friction do not resist: give them friction, hold what turns by "
+        "a support, or change the load"
+    )
+
+
+def _may_turn(body: PlacedBody) -> bool:
+    """Whether no support, symmetry or infinity keeps a body from turning, and nothing acts inside it."""
+    is_held = any(isinstance(part.condition, Clamped | Roller | PrescribedDisplacement) for part in body.scene.parts)
+    mesh = body.mesh
+    is_bounded = not mesh.is_exterior and mesh.surface is None
+    return is_bounded and mesh.symmetry is None and not is_held and not body.scene.body_forces
+
+
+def _common_centre(sides: list[_Side]) -> FloatArray | None:
+    """Return the point (2,) [m] through which the normals of all these elements pass; None if there is none."""
+    (first, _), (xi, _) = sides[0], gauss_legendre(_N_POINTS)
+    if any(body.mesh.is_straight[elements].any() for body, elements in sides):
+        return None
+    points = np.concatenate([body.mesh.points(elements, xi).reshape(-1, 2) for body, elements in sides])
+    normals = np.concatenate([body.mesh.normals_at(elements, xi).reshape(-1, 2) for body, elements in sides])
+    points -= first.mesh.centre
+    arms = np.column_stack([-normals[:, 1], normals[:, 0]])
+    centre = np.linalg.lstsq(arms, cross(normals, points), rcond=None)[0]
+    missed = np.abs(cross(normals, points - centre)).max()
+    return first.mesh.centre + centre if missed <= _ROUND_OFF * first.mesh.diameter else None
+
+
+def _moment(body: PlacedBody, centre: FloatArray) -> tuple[float, float]:
+    """Return the moment [N] of the loads per thickness about a point, and that of their sizes."""
+    mesh, (xi, weights) = body.mesh, gauss_legendre(_N_POINTS)
+    moment = size = 0.0
+    for part, elements in body.scene.parts_on(mesh):
+        if isinstance(part.condition, Traction | Pressure):
+            points, normals = mesh.points(elements, xi), mesh.normals_at(elements, xi)
+            load = part.condition.at(points.reshape(-1, 2), normals.reshape(-1, 2)).reshape(points.shape)
+            shares = mesh.jacobian(elements, xi) * weights
+            moment += float(np.sum(cross(points - centre, load) * shares))
+            size += float(np.sum(norms(points - centre) * norms(load) * shares))
+    return moment, size
