@@ -38,7 +38,8 @@ from rich.table import Table
 
 import bemkit as bk
 from bemkit.geometry.meshing.division import divide
-from bemkit.geometry.meshing.layers import FACTOR, layered_partition, refined_partition
+from bemkit.geometry.meshing.layers import FACTOR, refined_partition
+from bemkit.geometry.meshing.partition import Partition
 from bemkit.reference import Answer, Zone, errors_of
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
@@ -86,19 +87,31 @@ def bemkit(example: int, scene: bk.Scene, clock: Clock) -> Outcome:
     return Outcome(measured_errors(solution, example), seconds)
 
 
-def bemkit_told(example: int, degree: int, n_layers: int, clock: Clock) -> Outcome:
-    """Run bemkit on one mesh in layers, with so many more than it begins with towards the places of the reference."""
+def bemkit_told(example: int, degree: int, n_even: int, n_others: int, n_layers: int, clock: Clock) -> Outcome:
+    """Run bemkit on one mesh in layers towards the places of the reference."""
     scene, places = paper(example, bk.Galerkin(degree=degree)), [x / WIDTH[example] for x in places_of(example)]
     begin = clock()
-    outline = scene.shape.outline()
-    cuts = {outline.side_names.index("bottom"): places}
-    partition = layered_partition(divide(outline, scene.selections), cuts)
-    is_beside = np.isclose(partition.spans[:, :, None], places, atol=0.0).any(axis=(1, 2))
-    on_bottom = partition.sides == outline.side_names.index("bottom")
-    excess = np.where(is_beside & on_bottom, FACTOR ** (0.5 - n_layers), 0.0)
-    solution = bk.run(scene, mesh=refined_partition(partition, excess, partition, 1.0).mesh)
+    solution = bk.run(scene, mesh=told_mesh(scene, places, n_even, n_others, n_layers))
     seconds = clock() - begin
     return Outcome(measured_errors(solution, example) | NOT_FOUND, seconds)
+
+
+def told_mesh(scene: bk.Scene, places: Sequence[float], n_even: int, n_others: int, n_layers: int) -> bk.BoundaryMesh:
+    """Return equal elements on each piece, the first and the last of them cut into layers.
+
+    Pieces end at corners, at ends of parts and at places along the bottom, these towards `n_layers` layers, else
+    towards `n_others`, and more where a long element would meet a short one.
+    """
+    outline = scene.shape.outline()
+    bottom, base = outline.side_names.index("bottom"), divide(outline, scene.selections)
+    division, parameters = base.cut({bottom: places}), []
+    for piece in division.pieces:
+        is_told = [piece.side == bottom and bool(np.isclose(places, end, atol=0.0).any()) for end in piece.span]
+        left, right = (FACTOR ** np.arange(n_layers if told else n_others, 0, -1.0) / n_even for told in is_told)
+        inner = np.arange(1.0, n_even) / n_even
+        parameters.append(piece.at(np.concatenate([[0.0], left, inner, 1.0 - right[::-1], [1.0]])))
+    partition = Partition(base, division, tuple(parameters))
+    return refined_partition(partition, np.zeros(len(partition.sides)), partition, 1.0).mesh
 
 
 def finite_elements(
@@ -189,8 +202,28 @@ LAYERED = (
 # degree and layers of the meshes that find the transitions; those of a lower degree than the last mesh are used
 LOOKS = ((3, 2, 1, 0.17), (5, 4, 1, 0.17), (7, 5, 1, 0.25))
 FIRST_LOOK = (3, 12, 8, 2.5)
-# degree, layers at transitions beyond those that `layered_partition` begins with
-TOLD = ((2, 0), (3, 0), (4, 0), (4, 1), (5, 1), (6, 1), (6, 2), (7, 2), (8, 2), (8, 3), (9, 3), (10, 3))
+# degree, equal elements on each piece, layers at corners and jumps, layers at transitions
+TOLD = (
+    (2, 2, 0, 1),
+    (3, 1, 0, 1),
+    (3, 2, 0, 1),
+    (4, 1, 0, 1),
+    (4, 2, 0, 2),
+    (5, 2, 0, 1),
+    (5, 1, 1, 1),
+    (2, 2, 1, 2),
+    (3, 2, 1, 2),
+    (4, 2, 1, 2),
+    (4, 2, 1, 3),
+    (5, 2, 1, 3),
+    (6, 2, 1, 3),
+    (6, 2, 1, 4),
+    (7, 2, 1, 4),
+    (8, 2, 1, 4),
+    (8, 2, 1, 5),
+    (9, 2, 1, 5),
+    (10, 2, 1, 5),
+)
 GETFEM_UNIFORM = (20, 40, 80)
 GETFEM_SLOW = (160, 320)
 GETFEM_GRADED = ((16, 10), (24, 14), (32, 20), (40, 26), (48, 32), (64, 32))
@@ -264,8 +297,11 @@ def ladders(example: int, with_getfem: bool, with_slow: bool, clock: Clock) -> d
             add("graded, told", words, partial(solve_scene, x=x, y=y), is_told=True)
             add("graded, finding", words, lambda scene, follow=follow, grade=grade: follow(scene, example, *grade))
     result["bemkit, told"] = [
-        Setting(f"degree {degree}, {n} layers more", partial(bemkit_told, example, degree, n, clock))
-        for degree, n in TOLD
+        Setting(
+            f"degree {degree}, {n_even} equal, {n_others} and {n_layers} layers",
+            partial(bemkit_told, example, degree, n_even, n_others, n_layers, clock),
+        )
+        for degree, n_even, n_others, n_layers in TOLD
     ]
     if with_getfem:
         uniform = [uniform_lines(example, n) for n in GETFEM_UNIFORM + (GETFEM_SLOW if with_slow else ())]
