@@ -19,7 +19,7 @@ _N_SEEN = 4  # points of a side that tell its size, also of a closed one
 _LEAST_SPLITS = 4  # 16 pieces, 9 tangents each: a side with fewer than about 30 waves is seen as it is
 N_SAMPLES = 257
 """Points at which a predicate is looked at along a side; 2**k + 1, so that halves and quarters are among them."""
-_N_PASSES = 7  # 256**-7 is less than the spacing of numbers near 1
+_N_FINER, _N_PASSES = 4097, 5  # 1 / (256 * 4096**4) is less than the spacing of numbers near 1
 _END_TOLERANCE = 1e-12  # a part does not begin this close to the end of its side: that is round-off of the predicate
 
 Predicate = Callable[[FloatArray, FloatArray], BoolArray]
@@ -240,7 +240,7 @@ def breakpoints(curve: Curve, where: Predicate) -> FloatArray:
     """
     low, high = np.zeros(1), np.ones(1)
     for k in range(_N_PASSES):
-        samples = np.linspace(low, high, N_SAMPLES)
+        samples = np.linspace(low, high, N_SAMPLES if k == 0 else _N_FINER)
         holds = evaluate_predicate(where, curve.point(samples.ravel())).reshape(samples.shape)
         before, interval = np.nonzero(holds[1:] != holds[:-1])
         if k > 0:  # one of each: far from the origin a predicate flickers, and each flicker would bring forth others

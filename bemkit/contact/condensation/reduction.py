@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -305,14 +306,17 @@ class CondensedBody(DenseBody):
         round_off = max(of_forces, np.finfo(float).eps * reach * float(self._column_sizes[1].sum()))
         noise = NOISE_FACTOR * round_off
         reaction = float(np.abs(self.conditions.in_frames(force)[self.conditions.is_fixed]).max(initial=0.0))
-        given = self.conditions.in_frames(self.force)[~self.conditions.is_fixed]
-        resultant, inner = self.condensed.volume_force, self.condensed.inner_force
-        if resultant is not None:
-            given = np.append(given, [*resultant[:2], inner])
-        of_contact = self.unbalanced(state).beside(given, reaction if reaction > noise else 0.0, round_off)
+        of_contact = self.unbalanced(state).beside(self._given_forces, reaction if reaction > noise else 0.0, round_off)
         if not self.balanced or (np.abs(force).sum() <= noise and self._only_moves(displacement)):
             return of_contact
+        resultant, inner = self.condensed.volume_force, self.condensed.inner_force
         return of_contact.joined(resultant_imbalance(self.points, force, self.balanced, of_forces, resultant, inner))
+
+    @cached_property
+    def _given_forces(self) -> FloatArray:
+        """What acts besides contact, in directions that no support holds, and inside [N/m]."""
+        given, resultant = self.conditions.in_frames(self.force)[~self.conditions.is_fixed], self.condensed.volume_force
+        return given if resultant is None else np.append(given, [*resultant[:2], self.condensed.inner_force])
 
     def _only_moves(self, displacement: FloatArray) -> bool:
         """Whether the body has moved rigidly."""
