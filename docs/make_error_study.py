@@ -64,7 +64,7 @@ def study(scene: bk.Scene, reference: Reference) -> list[ErrorRecord]:
     elements = (bk.ConstantCollocation(), bk.LinearGalerkin(), bk.QuadraticGalerkin())
     meshes = (uniform(ELEMENTS), graded(ELEMENTS), adaptive(ACCURACIES))
     newton = all_runs(scene, elements, meshes, [bk.SemismoothNewton()])
-    newton += all_runs(scene, [bk.HpGalerkin()], [adaptive(RISING)], [bk.SemismoothNewton()])
+    newton += all_runs(scene, [bk.HpGalerkin()], [adaptive(RISING, FINEST)], [bk.SemismoothNewton()])
     few = (uniform(ELEMENTS[:-1]), adaptive(ACCURACIES[:2]))
     augmented = all_runs(scene, elements, few, [bk.AugmentedLagrangian()])
     # the finest meshes are for constant elements, which are fast and need them
