@@ -90,7 +90,9 @@ def _draw_status(strip: Axes, solution: Result, part: str) -> None:
     strip.set_xlim(0.0, length)
 
 
-def cut_peaks(axes: Axes, s: FloatArray, curves: Sequence[FloatArray], units: UnitNames | None) -> None:
+def cut_peaks(
+    axes: Axes, s: FloatArray, curves: Sequence[FloatArray], units: UnitNames | None, *, note_on_top: bool = False
+) -> None:
     """Leave peaks out that flatten all else, such as those at corners, where tractions are infinite, and say so.
 
     Parameters
@@ -100,6 +102,8 @@ def cut_peaks(axes: Axes, s: FloatArray, curves: Sequence[FloatArray], units: Un
     curves : sequence of (n,) arrays [Pa]
         Tractions there.
     units : UnitNames or None
+    note_on_top : bool
+        Whether what is cut is said at the upper end of the axes, not at the lower one.
     """
     weights = np.gradient(s)
     low, high, least, largest = 0.0, 0.0, 0.0, 0.0
@@ -117,7 +121,8 @@ def cut_peaks(axes: Axes, s: FloatArray, curves: Sequence[FloatArray], units: Un
     cut = ((least < bottom, "down to", least), (largest > top, "up to", largest))
     words = [f"{way} {amount(peak, 'stress', units)}" for is_cut, way, peak in cut if is_cut]
     note = f"peaks {' and '.join(words)} are cut"
-    axes.text(0.5, 0.02, note, transform=axes.transAxes, ha="center", va="bottom", fontsize=9)
+    height, anchor = (0.98, "top") if note_on_top else (0.02, "bottom")
+    axes.text(0.5, height, note, transform=axes.transAxes, ha="center", va=anchor, fontsize=9)
 
 
 def near(distance: FloatArray, solution: Result, chosen: BoolArray) -> FloatArray:

@@ -76,7 +76,7 @@ def draw_contact_traction(
         axes.plot(s, solution.friction_bound[chosen], label="friction bound", **LIMIT)
         axes.plot(s, -solution.friction_bound[chosen], **LIMIT)
     label_values(axes, with_unit("traction", "stress", units), traction_scale(solution))
-    cut_peaks(axes, curve.s, (curve.normal, curve.tangential), units)
+    cut_peaks(axes, curve.s, (curve.normal, curve.tangential), units, note_on_top=True)  # below is the legend
     return axes
 
 
