@@ -208,6 +208,14 @@ class AssemblySolution(SolvedProblem):
         ordered = [order for one, two in pairs for order in ((one, two), (two, one))]
         return [(side, other, *edge) for side, other in ordered for edge in side.edges(other)]
 
+    @cached_property
+    def reversal_ends(self) -> tuple[ZoneEnd, ...]:
+        """Where the direction of slip changes without a resolved stick zone, on all sides; see `slip_reversals`."""
+        from bemkit.results.slip_reversals import slip_reversals
+
+        places = [reversal.place for reversal in slip_reversals(self.contact)]
+        return tuple(side.near(np.array([place.x, place.y])) for place in places for side in self._sides_of(place.part))
+
     @property
     def facing_ends(self) -> tuple[ZoneEnd, ...]:
         """Where the end of a side lies inside the side that it faces, so that its edge presses into that."""

@@ -160,6 +160,14 @@ class Solution(SolvedProblem, SolvedBody):
         resolved = resolved_transitions(self.contact, self.transitions)
         return tuple(zone_end(self.mesh, self.contact, each) for each in resolved)
 
+    @cached_property
+    def reversal_ends(self) -> tuple[ZoneEnd, ...]:
+        """Where the direction of slip changes without a resolved stick zone; see `slip_reversals`."""
+        from bemkit.results.slip_reversals import slip_reversals
+        from bemkit.results.zone_ends import zone_end
+
+        return tuple(zone_end(self.mesh, self.contact, each.place) for each in slip_reversals(self.contact))
+
     def _measured_between(self, motion: SlipHistory | None) -> dict[str, BetweenNodes]:
         return violations_between_nodes(self, self.contact, motion)
 

@@ -29,6 +29,7 @@ from bemkit.geometry.meshing.partition import Partition
 from bemkit.results.assembly_solution import AssemblySolution
 from bemkit.results.coefficient_decay import CoefficientErrors
 from bemkit.results.contact_table import FLICKER, resolved_transitions
+from bemkit.results.slip_reversals import slip_reversals
 from bemkit.results.solution import Solution
 from bemkit.runs.density import DensityMeshes
 from bemkit.runs.element_degrees import below_layers, few_kinds, sufficient_degrees
@@ -122,7 +123,9 @@ class LayeredMeshes:
             if errors is not None:
                 self._check_lengths(members, errors)
             return None
-        is_coarse = len(resolved_transitions(solution.contact, solution.transitions)) < len(solution.transitions)
+        n_unresolved = len(solution.transitions) - len(resolved_transitions(solution.contact, solution.transitions))
+        # both ends of a stick zone of one node between opposite slips
+        is_coarse = n_unresolved > sum(2 * reversal.n_sticking for reversal in slip_reversals(solution.contact))
         has_copies = any(len(member.bodies) > 1 for member in members)
         if level.number == 0 and len(solutions) < MOST_LOOKS and is_coarse and not has_copies:
             return DensityMeshes(self.accuracy).following(level, solutions)
@@ -293,10 +296,12 @@ def _degrees_of(member: Member, discretisation: Discretisation) -> IntArray:
 def _settled_cuts(member: Member) -> dict[int, list[float]]:
     """Return where a partition is cut, as parameters by the number of the side.
 
-    Where sides of other bodies end, and where zones of one status do, of copies only if these places are few.
+    Where sides of other bodies end, and where zones of one status do, of copies only if these places are few. So where
+    the direction of slip changes: in layers towards that place the next mesh resolves the stick zone there.
     """
-    has_many = len(member.bodies) > 1 and len(member.ends) > MOST_CUTS
-    ends = member.facing_ends if has_many else (*member.ends, *member.facing_ends)
+    of_zones = (*member.ends, *member.reversals)
+    has_many = len(member.bodies) > 1 and len(of_zones) > MOST_CUTS
+    ends = member.facing_ends if has_many else (*of_zones, *member.facing_ends)
     return {side: _settled(places) for side, places in zone_cuts(member.partition, ends).items()}
 
 

@@ -29,7 +29,8 @@ AnyStated = TypeVar("AnyStated", Scene, Assembly, Body)
 class Member(NamedTuple):
     """What was found on a partition, by one body or by several copies of it.
 
-    Zones of one status end at `ends`, and sides of other bodies at `facing_ends`.
+    Zones of one status end at `ends`, and sides of other bodies at `facing_ends`; the direction of slip changes at
+    `reversals` without a resolved stick zone.
     """
 
     partition: Partition
@@ -37,6 +38,7 @@ class Member(NamedTuple):
     contact_elements: IntArray
     ends: tuple[ZoneEnd, ...]
     facing_ends: tuple[ZoneEnd, ...] = ()
+    reversals: tuple[ZoneEnd, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,15 +112,17 @@ class Level(Generic[AnyScene]):
     def members(self, solution: Solution | AssemblySolution) -> list[Member]:
         """Return what a solution on this level found on each partition."""
         if isinstance(solution, Solution):
-            return [Member(self.partition, solution.solved_bodies, solution.contact_elements, solution.zone_ends)]
+            found = self.partition, solution.solved_bodies, solution.contact_elements, solution.zone_ends
+            return [Member(*found, reversals=solution.reversal_ends)]
         members = []
         for number, partition in enumerate(self.partitions):
             names = [name for name, key in self.keys.items() if key == number]
-            ends, facing = (
-                tuple(end for end in each if end.body in names) for each in (solution.zone_ends, solution.facing_ends)
+            ends = (
+                tuple(end for end in each if end.body in names)
+                for each in (solution.zone_ends, solution.facing_ends, solution.reversal_ends)
             )
             bodies = tuple(solution.bodies[name] for name in names)
-            members.append(Member(partition, bodies, solution.contact_elements(names[0]), ends, facing))
+            members.append(Member(partition, bodies, solution.contact_elements(names[0]), *ends))
         return members
 
     def at_worst(self, bodies: Sequence[FloatArray]) -> list[FloatArray]:

@@ -1,0 +1,55 @@
+"""Places where neighbouring contact nodes slip in opposite directions: a stick zone too short for the mesh."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from bemkit.results.contact_table import ContactTable, Transition
+from bemkit.solvers.active_sets import NodeStatus
+
+
+class SlipReversal(NamedTuple):
+    """A place of a contact where the direction of slip changes.
+
+    Parameters
+    ----------
+    place : Transition
+        From slip to slip, where the slip changes its sign.
+    n_sticking : int
+        Nodes that stick in between: one or none.
+    """
+
+    place: Transition
+    n_sticking: int
+
+
+def slip_reversals(contact: ContactTable) -> tuple[SlipReversal, ...]:
+    """Return where the direction of slip changes along contacts, directly or at a single node that sticks.
+
+    Between opposite directions lies a stick zone, on which tangential tractions turn over; here the mesh does not
+    resolve it. Stick zones of several nodes have ends of their own, see `resolved_transitions`. Where there is no
+    friction, directions mean nothing.
+    """
+    direction = np.where(contact.status == NodeStatus.SLIP_FORWARD, 1.0, 0.0)
+    direction[contact.status == NodeStatus.SLIP_BACKWARD] = -1.0
+    direction[contact.sigma_t == 0.0] = 0.0
+    sticks, joined = contact.status == NodeStatus.STICK, contact.is_joined
+    reversals = []
+    for i in range(contact.n_contact - 1):
+        for k in (i + 1, i + 2):
+            if k >= contact.n_contact or not joined[i:k].all() or not sticks[i + 1 : k].all():
+                break
+            if direction[i] * direction[k] < 0.0:
+                reversals.append(SlipReversal(_where_slip_vanishes(contact, i, k), k - i - 1))
+    return tuple(reversals)
+
+
+def _where_slip_vanishes(contact: ContactTable, i: int, k: int) -> Transition:
+    """Return the place between two nodes by their displacements, or halfway if these do not change their sign."""
+    slip, share = contact.u_t[[i, k]], 0.5
+    if slip[0] * slip[1] < 0.0:
+        share = float(slip[0] / (slip[0] - slip[1]))
+    x, y, s = ((1.0 - share) * column[i] + share * column[k] for column in (contact.x, contact.y, contact.s))
+    return Transition(contact.part[i], float(x), float(y), float(s), "slip", "slip")
