@@ -37,12 +37,11 @@ def slip_reversals(contact: ContactTable) -> tuple[SlipReversal, ...]:
     direction[contact.sigma_t == 0.0] = 0.0
     sticks, joined = contact.status == NodeStatus.STICK, contact.is_joined
     reversals = []
-    for i in range(contact.n_contact - 1):
-        for k in (i + 1, i + 2):
-            if k >= contact.n_contact or not joined[i:k].all() or not sticks[i + 1 : k].all():
-                break
-            if direction[i] * direction[k] < 0.0:
-                reversals.append(SlipReversal(_where_slip_vanishes(contact, i, k), k - i - 1))
+    for n_sticking in (0, 1):
+        beyond = n_sticking + 1
+        for i in np.flatnonzero(direction[:-beyond] * direction[beyond:] < 0.0).tolist():
+            if joined[i : i + beyond].all() and sticks[i + 1 : i + beyond].all():
+                reversals.append(SlipReversal(_where_slip_vanishes(contact, i, i + beyond), n_sticking))
     return tuple(reversals)
 
 
