@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 
@@ -108,13 +108,9 @@ class AssembledModel:
         On the nodes of all elastic bodies [N/m] and [m], then on the motions of rigid bodies.
         """
         prepared, forces, displacements = self.prepared, [np.zeros(0)], [np.zeros(0)]
-        unknowns = self.body.member_displacements(state)[: len(self.condensed)]
-        bodies = zip(
-            self._contact_forces(state), prepared.conditions, prepared.forces, self.condensed, unknowns, strict=True
-        )
-        for of_contact, conditions, given_force, condensed, retained in bodies:
-            displacement, force = condensed.recover(retained)
-            forces.append(supporting_forces(conditions, given_force, force - of_contact) * prepared.force_unit)
+        bodies = zip(prepared.conditions, prepared.forces, self._beyond_contact(state), strict=True)
+        for conditions, given, (displacement, force) in bodies:
+            forces.append(supporting_forces(conditions, given, force) * prepared.force_unit)
             displacements.append(displacement.ravel() * prepared.units.displacement)
         rigid = self.rigid_bodies(state)
         forces += [reaction for _, reaction in rigid]
@@ -124,16 +120,18 @@ class AssembledModel:
     def reactions(self, state: ContactState) -> list[FloatArray]:
         """Return the forces (n_nodes, 2) [N/m] of supports on all nodes of each body, in the axes of the scene."""
         prepared, reactions = self.prepared, []
-        unknowns = self.body.member_displacements(state)[: len(self.condensed)]
-        bodies = zip(
-            prepared.bodies, self._contact_forces(state), prepared.conditions, prepared.forces, self.condensed,
-            unknowns, strict=True,
-        )  # fmt: skip
-        for body, of_contact, conditions, given, condensed, own in bodies:
-            _, force = condensed.recover(own)
-            held = supporting_forces(conditions, np.zeros_like(force), force - of_contact - given).reshape(-1, 2)
+        bodies = zip(prepared.bodies, prepared.conditions, prepared.forces, self._beyond_contact(state), strict=True)
+        for body, conditions, given, (_, force) in bodies:
+            held = supporting_forces(conditions, np.zeros_like(force), force - given).reshape(-1, 2)
             reactions.append(np.asarray(body.turn.turned(held)) * prepared.force_unit)
         return reactions
+
+    def _beyond_contact(self, state: ContactState) -> Iterator[tuple[FloatArray, FloatArray]]:
+        """Yield displacement and all forces but those of contact (n_nodes, 2) of each body, in its own axes."""
+        unknowns = self.body.member_displacements(state)[: len(self.condensed)]
+        for of_contact, condensed, retained in zip(self._contact_forces(state), self.condensed, unknowns, strict=True):
+            displacement, force = condensed.recover(retained)
+            yield displacement, force - of_contact
 
     def _contact_forces(self, state: ContactState) -> list[FloatArray]:
         """Return the nodal forces (n_nodes, 2) of contact on each body, in its own axes, dimensionless."""
