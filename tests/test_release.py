@@ -29,24 +29,36 @@ def listed(section: str) -> list[str]:
     return [line.strip().removeprefix("- ") for line in found[1].splitlines()]
 
 
-def test_the_changelog_begins_with_what_is_not_released_and_then_this_version() -> None:
-    unreleased, version = re.findall(r"^## \[(.*?)\]", CHANGELOG, re.MULTILINE)[:2]
-    assert (unreleased, version) == ("Unreleased", __version__)
+def headings() -> list[str]:
+    """Return the headings of versions in the changelog, newest first."""
+    return re.findall(r"^## (.*)$", CHANGELOG, re.MULTILINE)
 
 
-def test_versions_of_the_changelog_have_dates_and_fall() -> None:
-    released = re.findall(r"^## \[(\d+)\.(\d+)\.(\d+)\] - \d{4}-\d\d-\d\d$", CHANGELOG, re.MULTILINE)
-    numbers = [tuple(map(int, version)) for version in released]
+def test_the_changelog_begins_with_this_version() -> None:
+    assert headings()[0].split()[0] == __version__
+
+
+def test_a_version_of_the_changelog_has_a_date_or_is_unreleased_and_newest() -> None:
+    newest, *older = headings()
+    assert re.fullmatch(r"\d+\.\d+\.\d+ \((unreleased|\d{4}-\d\d-\d\d)\)", newest)
+    released = [re.fullmatch(r"(\d+)\.(\d+)\.(\d+) \(\d{4}-\d\d-\d\d\)", heading) for heading in older]
+    assert all(released)
+    numbers = [tuple(map(int, heading.split()[0].split("."))) for heading in headings()]
     assert numbers == sorted(numbers, reverse=True)
-    assert len(numbers) == CHANGELOG.count("\n## [") - 1
 
 
-def test_the_citation_names_this_version_and_its_date() -> None:
+def test_the_changelog_lists_features_of_a_version_in_few_lines() -> None:
+    for section in re.split(r"^## ", CHANGELOG, flags=re.MULTILINE)[1:]:
+        entries = [line for line in section.splitlines() if line.startswith("- ")]
+        assert 0 < len(entries) <= 25
+        assert max(map(len, entries)) <= 120
+
+
+def test_the_citation_names_this_version_and_its_date_once_it_is_released() -> None:
     citation = (ROOT / "CITATION.cff").read_text("utf-8")
     assert re.search(rf"^version: {re.escape(__version__)}$", citation, re.MULTILINE)
     date = re.search(r"^date-released: (.*)$", citation, re.MULTILINE)
-    assert date
-    assert f"## [{__version__}] - {date[1]}\n" in CHANGELOG
+    assert headings()[0] == f"{__version__} ({date[1] if date else 'unreleased'})"
 
 
 def test_the_recipe_requires_what_the_project_requires() -> None:
