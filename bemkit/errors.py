@@ -1,4 +1,4 @@
-"""The base classes of all errors that bemkit raises on purpose, and their messages as one line that is fit to print."""
+"""The base classes of all errors that bemkit raises on purpose, and their messages as text that is fit to print."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ class BemkitError(Exception):
     """An error that bemkit names: its message says what is wrong, with its value, and what to do about it.
 
     Every error class of the package derives from it, most of them from a built-in class such as ``ValueError`` as
-    well. The command line prints errors of this class as one line; anything else is a defect and keeps its traceback.
+    well. The command line prints the message of such an error; anything else is a defect and keeps its traceback.
     """
 
 

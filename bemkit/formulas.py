@@ -9,7 +9,7 @@ import ast
 import difflib
 import math
 import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field
 from functools import partial, reduce
 from types import MappingProxyType
@@ -23,6 +23,8 @@ from bemkit.errors import InputError
 
 MAX_LENGTH = 2000
 MAX_DEPTH = 100
+
+_NO_SYNONYMS: Mapping[str, tuple[str, ...]] = MappingProxyType({})
 
 _CONSTANTS: Mapping[str, float] = MappingProxyType({"pi": math.pi, "e": math.e})
 
@@ -189,10 +191,16 @@ def check_field(value: object, name: str) -> None:
         raise InputError(f"{name} = {value!r} is not a number; give a number, Expression({example!r}) or a function")
 
 
-def closest(word: str, names: "tuple[str, ...] | list[str]") -> str:
-    """Return ``"; did you mean 'name'?"`` for the name most like `word`, or an empty string."""
-    matches = difflib.get_close_matches(word[:60], names, n=1)
-    return f"; did you mean '{matches[0]}'?" if matches else ""
+def nearest(word: str, names: Collection[str], synonyms: Mapping[str, tuple[str, ...]] = _NO_SYNONYMS) -> str:
+    """Return the name that `word` is a synonym of, else the name most like it, else an empty string."""
+    meant = [name for name in synonyms.get(word.lower(), ()) if name in names]
+    return next(iter(meant or difflib.get_close_matches(word[:60], names, n=1)), "")
+
+
+def closest(word: str, names: Collection[str], synonyms: Mapping[str, tuple[str, ...]] = _NO_SYNONYMS) -> str:
+    """Return ``"; did you mean 'name'?"`` for the name nearest to `word`, or an empty string."""
+    name = nearest(word, names, synonyms)
+    return f"; did you mean '{name}'?" if name else ""
 
 
 def choices(word: str, names: "tuple[str, ...] | list[str]") -> str:

@@ -23,12 +23,12 @@ NOT_NEEDED = (
     *("operators.particular_solutions", "model.particular", "model.free_motion", "model.untouched_body"),
     *("geometry.drawn", "geometry.nurbs", "geometry.files", "geometry.arclength", "geometry.placement"),
     *("geometry.reflection", "geometry.meshing.partition", "geometry.meshing.layers"),
-    *("scene.assembly", "scene.body", "scene.copies", "scene.places", "scene.symmetry", "scene.explanations"),
+    *("scene.assembly", "scene.body", "scene.copies", "scene.places", "scene.symmetry"),
     *("results.assembly_solution", "results.part_forces", "results.zone_ends"),
     *("runs.warm_start", "solvers.homotopy", "solvers.multistart"),
 )
 """Of a scene with one body of straight sides on one obstacle, solved by collocation from a number of elements."""
-HEAVY = ("scipy.sparse.linalg", "h5py", "pyamg", "matplotlib", "meshio", "rich", "click", "cattrs")
+HEAVY = ("scipy.sparse.linalg", "h5py", "pyamg", "matplotlib", "meshio", "rich", "click")
 
 
 def order() -> list[str]:

@@ -132,4 +132,5 @@ def commands() -> None:
 
 
 def _complain(message: str) -> None:
-    print(f"bemkit: error: {printable(' '.join(message.split()))}", file=sys.stderr)
+    lines = [printable(line) for line in message.splitlines() if line.strip()]
+    print("\n".join([f"bemkit: error: {lines[0] if lines else ''}", *lines[1:]]), file=sys.stderr)

@@ -5,9 +5,8 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, is_dataclass, replace
-from functools import cache
 from types import UnionType
-from typing import Any, TypeVar, Union, cast, get_args, get_origin, get_type_hints
+from typing import Any, TypeVar, Union, cast, get_args, get_origin
 
 import numpy as np
 
@@ -15,7 +14,9 @@ from bemkit.errors import InputError
 from bemkit.formulas import closest
 from bemkit.scene.body import Body
 from bemkit.scene.conditions import Part
+from bemkit.scene.declared_types import hints_of
 from bemkit.scene.plane_motion import RigidBody
+from bemkit.scene.registry import SYNONYMS
 
 _NAME = r'(?:"[^"]+"|[^.\[\]"=\s]+)'
 _PLACE = re.compile(rf"{_NAME}(?:\.{_NAME}|\[\d+\])*")
@@ -141,7 +142,7 @@ def _inside(node: Any, declared: Any, name: str | int, path: str) -> tuple[Any, 
         return node.get(name), (get_args(declared) or (None, float))[1], inner_path
     if is_dataclass(node):
         _known(name, [entry.name for entry in fields(node) if entry.init and entry.name != "name"], path)
-        return getattr(node, name), _declared_types(cast(type, type(node)))[name], inner_path
+        return getattr(node, name), hints_of(cast(type, type(node)))[name], inner_path
     kind = "a list: give the number of an entry, such as [0]" if isinstance(node, tuple | list) else "no table"
     raise PlaceError(f"{path}.{name}: unknown key: {path} is {kind}")
 
@@ -156,13 +157,8 @@ def _entry_type(declared: Any, number: int, entry: object) -> Any:
     return type(entry)
 
 
-@cache
-def _declared_types(of: type) -> dict[str, Any]:
-    return get_type_hints(of)
-
-
 def _known(name: str, names: list[str], path: str) -> str:
     if name in names:
         return name
     known = f"the keys are {', '.join(names)}" if names else "there are no keys here"
-    raise PlaceError(f"{f'{path}.{name}'.lstrip('.')}: unknown key: {known}{closest(name, names)}")
+    raise PlaceError(f"{f'{path}.{name}'.lstrip('.')}: unknown key: {known}{closest(name, names, SYNONYMS)}")

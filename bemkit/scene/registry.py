@@ -73,12 +73,11 @@ class Registry:
         installed = self._installed()
         if kind in installed:
             return self._load(installed[kind])
-        known = self.words()
         if kind in self.retired:
-            raise InputError(f"the {self.role} {kind!r} is no more: {self.retired[kind]}")
-        raise InputError(
-            f"unknown {self.role} {shorten(kind)}: the known ones are {', '.join(known)}{closest(kind, known)}"
-        )
+            raise InputError(f"the {self.role} {kind!r} was removed: {self.retired[kind]}")
+        known = self.words()
+        hint = closest(kind, known, SYNONYMS)
+        raise InputError(f"unknown {self.role} {shorten(kind)}: the known ones are {', '.join(known)}{hint}")
 
     def words(self) -> tuple[str, ...]:
         """Return all words: the built-in ones, then those that installed packages add."""
@@ -252,7 +251,7 @@ LINEAR_SOLVERS = Registry(
         "matrix-free": "bemkit.operators.linear.solvers:MatrixFree",
     },
     retired={
-        "krylov": "take 'hierarchical', faster and smaller for constant, linear and quadratic elements, or 'automatic'"
+        "krylov": "use 'hierarchical', faster and smaller for constant, linear and quadratic elements, or 'automatic'"
     },
     protocol="bemkit.operators.linear.solvers:LinearSolver",
 )
@@ -280,3 +279,26 @@ HEADINGS = {
     "bemkit.scene.plane_motion:RigidBody": "rigid",
 }
 """Classes of which several stand in tables headed by their names, and the word before the name."""
+
+SYNONYMS: Mapping[str, tuple[str, ...]] = MappingProxyType(
+    {
+        **dict.fromkeys(("e", "young", "young_modulus", "elastic_modulus", "modulus"), ("youngs_modulus",)),
+        **dict.fromkeys(("nu", "poisson"), ("poisson_ratio",)),
+        **dict.fromkeys(("mu", "friction", "coefficient"), ("friction_coefficient", "coulomb")),
+        **dict.fromkeys(("n", "number", "size"), ("elements",)),
+        **dict.fromkeys(("tolerance", "tol", "error", "eps"), ("accuracy",)),
+        **dict.fromkeys(("p", "order"), ("degree",)),
+        **{"r": ("radius",), "w": ("width",), "h": ("height",), "centroid": ("centre",), "faces": ("sides",)},
+        **dict.fromkeys(("square", "block", "box"), ("rectangle",)),
+        **dict.fromkeys(("cylinder", "ball"), ("disk", "circle")),
+        **dict.fromkeys(("fixed", "encastre", "held"), ("clamped",)),
+        **dict.fromkeys(("symmetric", "sliding", "slider"), ("roller",)),
+        **dict.fromkeys(("force", "load", "neumann"), ("traction", "force_y")),
+        **dict.fromkeys(("dirichlet", "prescribed"), ("displacement",)),
+        **dict.fromkeys(("plane", "floor", "wall", "line"), ("half-plane",)),
+        **dict.fromkeys(("ssn", "newton"), ("semismooth-newton",)),
+        **dict.fromkeys(("alm", "uzawa"), ("augmented-lagrangian",)),
+        **dict.fromkeys(("dense", "cholesky", "lu"), ("direct",)),
+    }
+)
+"""What people write by habit, and the words and keys that it may mean."""

@@ -10,18 +10,19 @@ import inspect
 import math
 import re
 from collections.abc import Callable, Mapping
-from dataclasses import MISSING, Field, fields, is_dataclass
+from dataclasses import Field, fields, is_dataclass
 from enum import Enum
 from functools import partial
-from typing import Any, cast, get_args, get_origin, get_type_hints
+from typing import Any, cast, get_args, get_origin
 
 from bemkit.arrays import FloatArray
 from bemkit.errors import InputError
 from bemkit.formulas import Expression
 from bemkit.scene.assembly import Assembly
+from bemkit.scene.declared_types import default_of, heading_of, hints_of, is_required, options_of, registry_of
 from bemkit.scene.registry import Registry
 from bemkit.scene.scene import Scene
-from bemkit.scene.serialisation import heading_of, options_of, registry_of, unstructure
+from bemkit.scene.serialisation import unstructure
 
 DRAFT = "http://json-schema.org/draft-07/schema#"
 Schema = dict[str, Any]
@@ -118,7 +119,7 @@ class _Definitions:
     def table(self, owner: type, *, leave_out: str = "") -> Schema:
         """Return the schema of a table with the fields of a dataclass."""
         entries = [entry for entry in fields(owner) if entry.init and entry.name != leave_out]
-        hints, texts = get_type_hints(owner), parameters(inspect.getdoc(owner) or "")
+        hints, texts = hints_of(owner), parameters(inspect.getdoc(owner) or "")
         described = {
             entry.name: _described(self.of_type(hints[entry.name]), entry, hints[entry.name], texts.get(entry.name, ""))
             for entry in entries
@@ -127,7 +128,7 @@ class _Definitions:
             "description": summary(inspect.getdoc(owner) or ""),
             "type": "object",
             "properties": described,
-            "required": [entry.name for entry in entries if _is_required(entry)],
+            "required": [entry.name for entry in entries if is_required(entry)],
             "additionalProperties": False,
         }
 
@@ -182,10 +183,6 @@ def _slug(text: str) -> str:
     return text.replace(" ", "-")
 
 
-def _is_required(entry: Field[Any]) -> bool:
-    return entry.init and entry.default is MISSING and entry.default_factory is MISSING
-
-
 def _any_of(schemas: list[Schema]) -> Schema:
     """Return the schema of a value that fits one of several; plain types become a list of types."""
     if len(schemas) == 1:
@@ -198,8 +195,8 @@ def _any_of(schemas: list[Schema]) -> Schema:
 def _described(schema: Schema, entry: Field[Any], declared: Any, text: str) -> Schema:
     """Return a schema with the description and the default of a key."""
     described: Schema = {"description": text} if text else {}
-    if not _is_required(entry) and "additionalProperties" not in schema:
-        default = entry.default if entry.default_factory is MISSING else entry.default_factory()
+    if not is_required(entry) and "additionalProperties" not in schema:
+        default = default_of(entry)
         if default is not None and default != math.inf:  # JSON has no infinity
             described["default"] = unstructure(default, declared)
     # beside a reference nothing else counts in draft 7

@@ -1,7 +1,7 @@
-"""Plain tables (from TOML) to frozen dataclasses and back.
+"""Plain tables (from TOML) to frozen dataclasses and back, each way one plain recursion over the declared types.
 
-cattrs converts field by field. Added here are strict numbers, formulas, arrays, and classes named by a word: either the
-word alone (``solver = "semismooth-newton"``) or a table with its options (``{ kind = "tresca", bound_value = 0.5 }``).
+A class that a word names is the word itself (``solver = "semismooth-newton"``) or a table with its options
+(``{ kind = "tresca", bound_value = 0.5 }``). All mistakes of a table are found in one pass.
 """
 
 from __future__ import annotations
@@ -9,28 +9,52 @@ from __future__ import annotations
 import math
 import re
 import types
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
-from dataclasses import MISSING, Field, fields, is_dataclass
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import Field, fields, is_dataclass
 from enum import Enum
 from functools import cache
-from typing import Any, TypeVar, Union, cast, get_args, get_origin, get_type_hints
+from typing import Any, TypeVar, cast, get_args, get_origin
 
 import numpy as np
-from cattrs import AttributeValidationNote, Converter
-from cattrs.gen import make_dict_structure_fn
 
 from bemkit.arrays import FloatArray
 from bemkit.contact.laws import FrictionLaw
 from bemkit.errors import InputError
-from bemkit.formulas import Expression, closest, shorten
-from bemkit.scene.registry import HEADINGS, LAWS, REGISTRIES, Registry, reference_of
+from bemkit.formulas import Expression, closest, nearest, shorten
+from bemkit.scene.declared_types import default_of, heading_of, hints_of, is_required, options_of, registry_of
+from bemkit.scene.registry import LAWS, SYNONYMS, Registry
 
 T = TypeVar("T")
 
+_MISSING_REMEDIES: Mapping[str, str] = types.MappingProxyType(
+    {
+        "title": "add a line such as title = 'Block on a foundation'",
+        "shape": "add a table [shape] with kind = 'rectangle', width = 1.0, height = 1.0, or another shape",
+        "material": "add a table [material] with youngs_modulus and poisson_ratio",
+        "parts": "add tables [parts.NAME] with sides and condition",
+        "condition": "add condition = 'clamped', or a table with kind = 'traction', 'contact' ...",
+        "bodies": "add tables [bodies.NAME], each with a shape and a material",
+        "sides": "add sides = ['one.top', 'two.bottom'], each a body and one of its sides",
+        "obstacle": "add obstacle = { kind = 'half-plane', point = [0.0, 0.0], normal = [0.0, 1.0] } or another",
+    }
+)
+
 
 class StructureError(InputError):
-    """A table that does not describe the object of the declared type; the message is ``key: value: remedy``."""
+    """A table that does not describe the object of the declared type.
+
+    Parameters
+    ----------
+    mistakes : iterable of str
+        One line for each mistake: ``key: value: remedy``. The message consists of these lines.
+    """
+
+    def __init__(self, mistakes: Iterable[str]) -> None:
+        self.mistakes = tuple(mistakes)
+        super().__init__("\n".join(self.mistakes))
+
+    def __reduce__(self) -> tuple[type[StructureError], tuple[tuple[str, ...]]]:
+        return StructureError, (self.mistakes,)
 
 
 class UnstructureError(InputError):
@@ -52,16 +76,12 @@ def structure(table: object, declared: type[T]) -> T:
     Raises
     ------
     StructureError
-        Naming the key, the value and the remedy.
+        With all mistakes, each naming the key, the value and the remedy.
     """
     try:
-        return _converter().structure(table, declared)
+        return cast(T, _structured(table, declared, ""))
     except RecursionError:
-        raise StructureError("nested too deeply: simplify it") from None
-    except Exception as error:  # whatever a constructor raised, it rejects the text of the user
-        from bemkit.scene.explanations import explain
-
-        raise StructureError(explain(error)) from error
+        raise StructureError(["nested too deeply: simplify it"]) from None
 
 
 def unstructure(value: Any, declared: Any = None, path: str = "", *, keep_defaults: bool = False) -> Any:
@@ -117,7 +137,7 @@ def _without_file(value: Any) -> Any:
 
 
 def _unstructure_dataclass(value: Any, declared: Any, path: str, keep_defaults: bool) -> Any:
-    hints = get_type_hints(type(value))
+    hints = hints_of(cast(type, type(value)))
     prefix = f"{path}." if path else ""
     table = {
         entry.name: unstructure(content, hints[entry.name], prefix + entry.name)
@@ -143,50 +163,58 @@ def _written_fields(value: Any, keep_defaults: bool) -> Iterator[tuple[Field[Any
 
 
 def _is_default(content: object, entry: Field[Any]) -> bool:
-    if entry.default is MISSING and entry.default_factory is MISSING:
+    if is_required(entry):
         return False
-    default = entry.default if entry.default_factory is MISSING else entry.default_factory()
+    default = default_of(entry)
     return type(content) is type(default) and bool(np.all(content == default))
 
 
+def _structured(value: object, declared: Any, path: str) -> Any:
+    """Return the object of a declared type that a value states; see `structure`."""
+    return _at(path, _reader_of(declared), value, declared, path)
+
+
+def _at(path: str, function: Callable[..., Any], *arguments: Any, **values: Any) -> Any:
+    """Return what a function makes of the text of the user; its error becomes a mistake at the path."""
+    try:
+        return function(*arguments, **values)
+    except (StructureError, RecursionError):
+        raise
+    except Exception as error:  # whatever a constructor raised, it rejects the text
+        raise StructureError([f"{path}: {error}" if path else str(error)]) from error
+
+
+def _structured_all(entries: Mapping[Any, tuple[object, Any, str]], mistakes: Iterable[str] = ()) -> dict[Any, Any]:
+    """Return objects from several values, each with its type and path; all mistakes are raised together."""
+    structured, found = {}, list(mistakes)
+    for key, entry in entries.items():
+        try:
+            structured[key] = _structured(*entry)
+        except StructureError as error:
+            found += error.mistakes
+    if found:
+        raise StructureError(found)
+    return structured
+
+
 @cache
-def _converter() -> Converter:
-    converter = Converter(forbid_extra_keys=True, detailed_validation=True)
-
-    def add(is_meant: Callable[[Any], bool], hook: Callable[[Any, Any], Any]) -> None:
-        converter.register_structure_hook_func(is_meant, hook)
-
-    converter.register_structure_hook(float, lambda value, _: _number(value))
-    converter.register_structure_hook(int, lambda value, _: _integer(value))
-    converter.register_structure_hook(bool, lambda value, _: _exactly(value, bool, "true or false"))
-    converter.register_structure_hook(str, lambda value, _: _exactly(value, str, "a text in quotation marks"))
-    add(lambda declared: declared == FloatArray, lambda value, _: _array(value))
-    add(lambda declared: get_origin(declared) is tuple, lambda value, declared: _tuple(converter, value, declared))
-    add(lambda declared: get_origin(declared) is Mapping, lambda value, declared: _mapping(converter, value, declared))
-    add(lambda declared: _is_class(declared, Enum), lambda value, declared: _enum(value, declared))
-    add(lambda declared: bool(options_of(declared)), lambda value, declared: _one_of(converter, value, declared))
-    converter.register_structure_hook_factory(is_dataclass, lambda declared: _table_hook(converter, declared))
-    add(lambda declared: declared is Expression, lambda value, _: Expression(value))
-    add(lambda declared: registry_of(declared) is not None, lambda value, declared: _tagged(converter, value, declared))
-    add(lambda declared: bool(heading_of(declared)), lambda value, declared: _named(converter, value, declared))
-    return converter
-
-
-def registry_of(declared: Any) -> Registry | None:
-    """Return the registry whose words name the classes of a declared type, None if there is none."""
-    alternatives = options_of(declared) or (declared,)
-    return next((registry for registry in REGISTRIES if registry.holds(alternatives)), None)
-
-
-def heading_of(declared: Any) -> str:
-    """Return the word that heads the tables of the entries of a tuple, each by its name; empty if none does."""
-    inner = get_args(declared)
-    is_listed = get_origin(declared) is tuple and inner[1:] == (Ellipsis,)
-    return HEADINGS.get(reference_of(inner[0]), "") if is_listed else ""
-
-
-def _is_class(declared: Any, parent: type) -> bool:
-    return isinstance(declared, type) and issubclass(declared, parent)
+def _reader_of(declared: Any) -> Callable[[Any, Any, str], Any]:
+    """Return the function (value, declared, path) that reads values of a type."""
+    if heading_of(declared):
+        return _named
+    if registry_of(declared) is not None:
+        return _tagged
+    if options_of(declared):
+        return _one_of
+    if declared in _PLAIN:
+        return lambda value, declared, path: _PLAIN[declared](value)
+    if get_origin(declared) is tuple:
+        return _tuple
+    if get_origin(declared) is Mapping:
+        return _mapping
+    if is_dataclass(declared):
+        return _table
+    return _member if _is_class(declared, Enum) else lambda value, declared, path: value
 
 
 def _number(value: object) -> float:
@@ -218,29 +246,19 @@ def _array(value: object) -> FloatArray:
     return np.array([_array(item) if isinstance(item, list) else _number(item) for item in items], dtype=float)
 
 
-def _tuple(converter: Converter, value: object, declared: Any) -> tuple[Any, ...]:
-    items = _exactly(value, list, "a list in square brackets")
-    inner = get_args(declared)
-    if len(inner) == 2 and inner[1] is Ellipsis:
-        inner = (inner[0],) * len(items)
-    if len(items) != len(inner):
-        raise InputError(f"{_show(value)} has {len(items)} entries: give {len(inner)}")
-    structured = []
-    for index, (item, kind) in enumerate(zip(items, inner, strict=True)):
-        with _at(f"[{index}]"):
-            structured.append(converter.structure(item, kind))
-    return tuple(structured)
+_PLAIN: Mapping[Any, Callable[[Any], Any]] = types.MappingProxyType(
+    {
+        float: _number,
+        int: _integer,
+        bool: lambda value: _exactly(value, bool, "true or false"),
+        str: lambda value: _exactly(value, str, "a text in quotation marks"),
+        FloatArray: _array,
+        Expression: Expression,
+    }
+)
 
 
-def _mapping(converter: Converter, value: object, declared: Any) -> dict[str, Any]:
-    structured = {}
-    for key, item in _exactly(value, dict, "a table").items():
-        with _at(key):
-            structured[key] = converter.structure(item, get_args(declared)[1])
-    return structured
-
-
-def _enum(value: object, declared: type[Enum]) -> Enum:
+def _member(value: object, declared: type[Enum], path: str) -> Enum:
     words = [str(member.value) for member in declared]
     for member in declared:
         if member.value == value:
@@ -248,31 +266,81 @@ def _enum(value: object, declared: type[Enum]) -> Enum:
     raise InputError(f"{_show(value)} is unknown: give one of {', '.join(words)}{closest(str(value), words)}")
 
 
-def options_of(declared: Any) -> tuple[Any, ...]:
-    """Return the alternatives of a union that a table can hold."""
-    if get_origin(declared) not in (Union, types.UnionType):
-        return ()
-    return tuple(option for option in get_args(declared) if option is not type(None) and not _is_callable(option))
+def _tuple(value: object, declared: Any, path: str) -> tuple[Any, ...]:
+    items, inner = _exactly(value, list, "a list in square brackets"), get_args(declared)
+    if len(inner) == 2 and inner[1] is Ellipsis:
+        inner = (inner[0],) * len(items)
+    if len(items) != len(inner):
+        raise InputError(f"{_show(value)} has {len(items)} entries: give {len(inner)}")
+    entries = enumerate(zip(items, inner, strict=True))
+    return tuple(_structured_all({index: (*entry, f"{path}[{index}]") for index, entry in entries}).values())
 
 
-def _is_callable(declared: Any) -> bool:
-    return get_origin(declared) is Callable
+def _mapping(value: object, declared: Any, path: str) -> dict[str, Any]:
+    items, inner = _exactly(value, dict, "a table"), get_args(declared)[1]
+    return _structured_all({key: (item, inner, _join(path, key)) for key, item in items.items()})
 
 
-def _is_list(declared: Any) -> bool:
-    return get_origin(declared) is tuple or declared == FloatArray  # whose origin depends on the version of numpy
+def _named(value: object, declared: Any, path: str) -> tuple[Any, ...]:
+    """Return the entries of a tuple from tables that are headed by their names."""
+    entry_type, heading = get_args(declared)[0], heading_of(declared)
+    of_bodies = ", in one of several bodies [bodies.BODY.parts.NAME]" if heading == "parts" else ""
+    tables = _exactly(value, dict, f"a table of {heading}: write [{heading}.NAME]{of_bodies}")
+    role = re.sub(r"(?<!^)(?=[A-Z])", " ", entry_type.__name__).lower()
+    remedy = f"the name of a {role} stands in its heading [{heading}.NAME]"
+    has_name = [name for name, table in tables.items() if isinstance(table, dict) and "name" in table]
+    mistakes = [f"{_join(path, name)}: unknown key 'name': {remedy}" for name in has_name]
+    entries = {
+        name: ({"name": name, **table} if isinstance(table, dict) else table, entry_type, _join(path, name))
+        for name, table in tables.items()
+        if name not in has_name
+    }
+    return tuple(_structured_all(entries, mistakes).values())
 
 
-def _one_of(converter: Converter, value: object, declared: Any) -> Any:
+def _one_of(value: object, declared: Any, path: str) -> Any:
     options = options_of(declared)
     for option in options:
         if _fits(value, option):
-            return converter.structure(value, option)
+            return _structured(value, option, path)
     raise InputError(f"{_show(value)} does not fit: give {' or '.join(_name(option) for option in options)}")
 
 
+def _tagged(value: object, declared: Any, path: str) -> Any:
+    """Return an object whose class is named by a word alone, or by the kind of a table."""
+    registry = cast(Registry, registry_of(declared))  # the reader is chosen by it
+    table = {"kind": value} if isinstance(value, str) else value
+    table = registry.without_variant(_exactly(table, dict, f"a {registry.role} as a word or as a table with its kind"))
+    if "kind" not in table:
+        raise InputError(f"kind is missing: add kind = one of {', '.join(registry.built_in)}")
+    kind_path = _join(path, "kind")
+    named_class = _at(kind_path, registry.find, _structured(table.pop("kind"), str, kind_path))
+    return _structured(table, named_class, path)
+
+
+def _table(value: object, declared: Any, path: str) -> Any:
+    """Return a dataclass from the table of its fields."""
+    table = _exactly(value, dict, "a table of keys and values")
+    known = {entry.name: entry for entry in fields(declared) if entry.init}
+    unknown = sorted(table.keys() - known.keys())
+    missing = [name for name, entry in known.items() if name not in table and is_required(entry)]
+    listed = f"the keys are {', '.join(known)}" if known else "there are no keys here"
+    mistakes = [
+        f"{_join(path, shorten(key)[1:-1])}: unknown key: {listed}{closest(key, known, SYNONYMS)}" for key in unknown
+    ]
+    # a key that is missing because it is misspelt is one mistake
+    misspelt = {nearest(key, known, SYNONYMS) for key in unknown}
+    mistakes += [
+        f"{_join(path, name)}: missing: {_MISSING_REMEDIES.get(name, f'add {name} = ...')}"
+        for name in missing
+        if name not in misspelt
+    ]
+    entries = {name: (table[name], hints_of(declared)[name], _join(path, name)) for name in known if name in table}
+    return _at(path, declared, **_structured_all(entries, mistakes))
+
+
 def _fits(value: object, option: Any) -> bool:
-    """Tell whether a value of this TOML type can become the alternative."""
+    """Return whether a value of this TOML type can become the alternative."""
     match value:
         case bool():
             return option is bool
@@ -295,50 +363,16 @@ def _name(option: Any) -> str:
     return names.get(option, "a list" if _is_list(option) else "a table")
 
 
-def _table_hook(converter: Converter, declared: Any) -> Callable[[object, Any], Any]:
-    structure_fields = make_dict_structure_fn(declared, converter)
-
-    def hook(value: object, _: Any) -> Any:
-        return structure_fields(_exactly(value, dict, "a table of keys and values"), declared)
-
-    return hook
+def _is_class(declared: Any, parent: type) -> bool:
+    return isinstance(declared, type) and issubclass(declared, parent)
 
 
-def _tagged(converter: Converter, value: object, declared: Any) -> Any:
-    registry = cast(Registry, registry_of(declared))  # the hook is chosen by it
-    if isinstance(value, str):
-        value = {"kind": value}
-    table = registry.without_variant(_exactly(value, dict, f"a {registry.role} as a word or as a table with its kind"))
-    if "kind" not in table:
-        raise InputError(f"kind is missing: add kind = one of {', '.join(registry.built_in)}")
-    with _at("kind"):
-        named_class = registry.find(_exactly(table["kind"], str, "a text"))
-    return converter.structure({key: item for key, item in table.items() if key != "kind"}, named_class)
+def _is_list(declared: Any) -> bool:
+    return get_origin(declared) is tuple or declared == FloatArray  # whose origin depends on the version of numpy
 
 
-def _named(converter: Converter, value: object, declared: Any) -> tuple[Any, ...]:
-    structured: list[Any] = []
-    item_type, heading = get_args(declared)[0], heading_of(declared)
-    of_bodies = ", in one of several bodies [bodies.BODY.parts.NAME]" if heading == "parts" else ""
-    written = f"[{heading}.NAME]{of_bodies}"
-    for name, options in _exactly(value, dict, f"a table of {heading}: write {written}").items():
-        with _at(name):
-            table = _exactly(options, dict, "a table of keys and values")
-            if "name" in table:
-                role = re.sub(r"(?<!^)(?=[A-Z])", " ", item_type.__name__).lower()
-                raise InputError(f"unknown key 'name': the name of a {role} stands in its heading [{heading}.NAME]")
-            structured.append(converter.structure({"name": name, **table}, item_type))
-    return tuple(structured)
-
-
-@contextmanager
-def _at(key: str) -> Iterator[None]:
-    """Note on errors inside that they are errors at this key, as cattrs does for the fields of classes."""
-    try:
-        yield
-    except Exception as error:
-        error.add_note(AttributeValidationNote("", key, None))
-        raise
+def _join(path: str, key: str) -> str:
+    return f"{path}.{key}" if path else key
 
 
 def _show(value: object) -> str:

@@ -1,6 +1,6 @@
 """Scene files: TOML in, `Scene` out, and back.
 
-Every complaint is a `SceneError` of one line that names the file, the key, the value and the remedy.
+A `SceneError` lists all mistakes of a file; each line names the key, the value and the remedy.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from bemkit.scene.load_history import load_steps
 from bemkit.scene.mesh_options import MeshOptions
 from bemkit.scene.registry import FILE_KINDS, SOLVERS
 from bemkit.scene.scene import Scene
-from bemkit.scene.serialisation import UnstructureError, structure, unstructure
+from bemkit.scene.serialisation import StructureError, UnstructureError, structure, unstructure
 from bemkit.solvers.base import ContactSolver
 
 if TYPE_CHECKING:
@@ -42,7 +42,7 @@ _PART_KEYS = ("sides", "where", "condition")
 
 
 class SceneError(InputError):
-    """A scene that cannot be read, understood or written; one line with file, key, value and remedy."""
+    """A scene that cannot be read, understood or written; each mistake is a line with key, value and remedy."""
 
 
 def shipped_files() -> dict[str, Traversable]:
@@ -141,7 +141,10 @@ def scene_from_toml(text: str, *, name: str = "scene", folder: Path | None = Non
     try:
         return scene_from_table(table, folder)
     except SceneError as error:
-        raise SceneError(f"{name}: {error}") from error
+        mistakes = str(error).splitlines()
+        if len(mistakes) > 1:
+            mistakes = [f"{len(mistakes)} mistakes", *(f"  {mistake}" for mistake in mistakes)]
+        raise SceneError(f"{name}: " + "\n".join(mistakes)) from error
 
 
 def scene_from_table(table: dict[str, Any], folder: Path | None = None) -> Scene | Assembly:
@@ -157,6 +160,8 @@ def scene_from_table(table: dict[str, Any], folder: Path | None = None) -> Scene
         scene = structure(table, _kind_of(table))
         if scene.steps:
             _ = load_steps(scene)  # whatever a step changes is checked
+    except StructureError as error:
+        raise SceneError("\n".join(map(printable, error.mistakes))) from error
     except InputError as error:
         raise SceneError(printable(str(error))) from error
     return scene

@@ -45,5 +45,5 @@ def test_scene_files_name_linear_solvers() -> None:
     assert 'linear_solver = "automatic"' in bk.scene_to_toml(SCENE)
     direct = bk.scene_to_toml(replace(SCENE, linear_solver=bk.DenseCholesky()))
     assert bk.scene_from_toml(direct).linear_solver == bk.DenseCholesky()
-    with pytest.raises(ValueError, match=r"linear solver 'krylov' is no more: take 'hierarchical', faster"):
+    with pytest.raises(ValueError, match=r"linear solver 'krylov' was removed: use 'hierarchical', faster"):
         bk.scene_from_toml(direct.replace('"direct"', '"krylov"'))

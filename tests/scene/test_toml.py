@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import pickle
 from pathlib import Path
 
 import numpy as np
@@ -22,6 +23,7 @@ from bemkit.scene.conditions import Clamped, Contact, Part, PrescribedDisplaceme
 from bemkit.scene.discretisation import ConstantCollocation, LinearGalerkin
 from bemkit.scene.mesh_options import MeshOptions
 from bemkit.scene.scene import Scene
+from bemkit.scene.serialisation import StructureError
 from bemkit.scene.toml import SceneError, load_scene, scene_from_toml, scene_to_toml, shipped_scenes, with_overrides
 from bemkit.solvers.alm import AugmentedLagrangian, BoundUpdate, InnerNewton
 from bemkit.solvers.fixed_point import FixedPoint
@@ -257,6 +259,43 @@ def test_each_mistake_gives_one_line_with_file_key_value_and_remedy(old: str, ne
     assert text.startswith("my.toml: ")
     assert text.isprintable()
     assert len(text) < 500
+
+
+def test_all_mistakes_of_a_file_are_listed_with_their_keys() -> None:
+    text = BLOCK.replace("youngs_modulus = 10000.0", "E = 10000.0").replace('"coulomb"', '"culomb"')
+    text = text.replace("width = 1.0", "width = -1.0").replace('"roller"', "3").replace("elements = 320\n", "")
+    text = text.replace("x > 0.5", "x.real > 0.5") + "\n[parts.extra]\nname = 'one'\n[parts.other]\n"
+    with pytest.raises(SceneError) as caught:
+        scene_from_toml(text, name="my.toml")
+    heading, *mistakes = str(caught.value).splitlines()
+    assert heading == f"my.toml: {len(mistakes)} mistakes"
+    keys = ["shape", "material.E", "law.kind", "parts.extra", "parts.wall.condition", "parts.top-load.where"]
+    assert sorted(line.split(": ")[0].strip() for line in mistakes) == sorted([*keys, "parts.other.condition"])
+    assert all(line.isprintable() for line in mistakes)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("youngs_modulus", "E", "material.E: unknown key.*did you mean 'youngs_modulus'"),
+        ("poisson_ratio", "nu", "material.nu: unknown key.*did you mean 'poisson_ratio'"),
+        ("friction_coefficient", "mu", "law.mu: unknown key.*did you mean 'friction_coefficient'"),
+        ("friction_coefficient", "friction", "law.friction: unknown key.*did you mean 'friction_coefficient'"),
+        ("elements = 320", "tolerance = 1e-3", "mesh.tolerance: unknown key.*did you mean 'accuracy'"),
+        ('"rectangle"', '"square"', "shape.kind: unknown shape 'square'.*did you mean 'rectangle'"),
+        ('"roller"', '"fixed"', "parts.wall.condition.kind: unknown condition 'fixed'.*did you mean 'clamped'"),
+    ],
+)
+def test_synonyms_name_the_key_or_word_that_is_meant(old: str, new: str, message: str) -> None:
+    with pytest.raises(SceneError, match=message) as caught:
+        scene_from_toml(BLOCK.replace(old, new))
+    assert "\n" not in str(caught.value)  # a key that is missing because it is misspelt is one mistake
+
+
+def test_errors_of_tables_can_be_sent_to_other_processes() -> None:
+    error = StructureError(["one: wrong", "two: wrong"])
+    again = pickle.loads(pickle.dumps(error))
+    assert (again.mistakes, str(again)) == (error.mistakes, "one: wrong\ntwo: wrong")
 
 
 @pytest.mark.parametrize("section", ["shape", "material", "parts"])
