@@ -430,7 +430,7 @@ except SystemExit as end:
     assert end.code == 0
 wanted = {"matplotlib", "meshio", "h5py", "rich", "pyamg", "distributed", "scipy.sparse"}
 names = ("operators.somigliana.fields", "operators.somigliana.moments", "operators.hierarchy.matrix_free",
-    "operators.cache", "results.interior", "pictures.files", "results.result_file", "hdf5", "cli.console",
+    "results.interior", "pictures.files", "results.result_file", "hdf5", "cli.console",
     "runs.adaptive", "scene.assembly", "geometry.drawn", "operators.forms", "solvers.homotopy")
 wanted |= {f"bemkit.{name}" for name in names}
 print(sorted(wanted & set(sys.modules)), file=sys.stderr)

@@ -67,13 +67,6 @@ class Cholesky:
                 "the body free"
             )
 
-    @classmethod
-    def from_lower(cls, lower: FloatArray) -> Cholesky:
-        """Take over a factor L computed earlier."""
-        factor = cls.__new__(cls)
-        factor._factor = np.asfortranarray(lower)
-        return factor
-
     @property
     def factorisation(self) -> Factorisation:
         """What it took."""
@@ -83,11 +76,6 @@ class Cholesky:
     def factorisations(self) -> tuple[Factorisation, ...]:
         """The same as one of several."""
         return (self.factorisation,)
-
-    @property
-    def lower(self) -> FloatArray:
-        """The factor L, zero above its diagonal."""
-        return np.tril(self._factor)
 
     def solve(self, right: FloatArray) -> FloatArray:
         """Solve A x = right."""

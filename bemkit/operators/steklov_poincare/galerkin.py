@@ -45,7 +45,7 @@ _HELD_BODY = "the body held by its supports and its contact boundary"
 
 @dataclass(frozen=True, eq=False)
 class GalerkinFactors:
-    """What a Galerkin map computes once, and what `bemkit.operators.cache` stores.
+    """The matrices that a Galerkin map computes once.
 
     Parameters
     ----------
@@ -56,7 +56,7 @@ class GalerkinFactors:
     whitened_trace : (n_traction_dofs, n_dofs) array
         L^-1 (1/2 M + K), less the part whose tractions exert a resultant.
     work : OperationCounts
-        What they took; nothing if they come from a cache.
+        Operations of their assembly and factorisation.
     """
 
     matrix: FloatArray
@@ -182,10 +182,6 @@ class GalerkinElasticity:
     def _without_pressure(self, displacement: FloatArray) -> FloatArray:
         """Return S u for the columns of (n_dofs, m) displacements, without the uniform pressure."""
         return multiply(self.factors.matrix, displacement)
-
-    def keep(self, factors: GalerkinFactors) -> None:
-        """Take over the factors of an equal map, so that nothing is assembled any more."""
-        self.__dict__["factors"] = factors  # where cached_property keeps its value
 
     def condense(self, conditions: NodalConditions, force: FloatArray) -> CondensedMap:
         """Eliminate every direction that is not retained, by a Schur complement, with the linear solver of the map."""

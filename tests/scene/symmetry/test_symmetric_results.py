@@ -10,7 +10,6 @@ import pytest
 
 import bemkit as bk
 from bemkit.cli.console import print_summary
-from bemkit.operators.cache import StaleCacheError, load, save
 from bemkit.pictures import draw_deformation
 from bemkit.pictures.shown import at_mesh_nodes, shown
 from bemkit.scene.toml import scene_from_toml, scene_to_toml
@@ -105,15 +104,3 @@ def test_moved_scenes_take_their_lines_along() -> None:
     moved = transformed_scene(scene, AffineMap((2.0, 2.0), (7.0, 1.0)))
     assert moved.symmetry == bk.Symmetry(x=8.0)
     assert bk.run(moved).force_normal == pytest.approx(2.0 * bk.run(scene).force_normal, rel=1e-12)
-
-
-def test_a_cached_operator_belongs_to_its_lines(tmp_path: Path) -> None:
-    material = bk.Material(1.0, 0.3)
-    mesh = RING.build_mesh()
-    half = bk.GalerkinMap(mesh, material)
-    save(tmp_path / "half.h5", half)
-    again = bk.GalerkinMap(mesh, material)
-    load(tmp_path / "half.h5", again)
-    assert np.array_equal(again.matrix(), half.matrix())
-    with pytest.raises(StaleCacheError, match="geometry"):
-        load(tmp_path / "half.h5", bk.GalerkinMap(replace(RING, symmetry=bk.Symmetry(x=0.0)).build_mesh(), material))
