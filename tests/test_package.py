@@ -19,7 +19,7 @@ CONTRIBUTING = Path(__file__).parent.parent / "CONTRIBUTING.md"
 NAME = "bemkit"
 NOT_NEEDED = (
     *("operators.steklov_poincare.galerkin", "operators.forms", "operators.assembly", "operators.integrals.sweep"),
-    *("operators.hierarchy.element_pairs", "operators.steklov_poincare.matrix_free_needs"),
+    "operators.steklov_poincare.matrix_free_needs",
     *("operators.particular_solutions", "model.particular", "model.free_motion", "model.untouched_body"),
     *("geometry.drawn", "geometry.nurbs", "geometry.files", "geometry.arclength", "geometry.placement"),
     *("geometry.reflection", "geometry.meshing.partition", "geometry.meshing.layers"),

@@ -36,7 +36,6 @@ _COMMANDS = {
     "study": ("study", "Measure error against run time; make the tables of the paper."),
     "sweep": ("sweep", "Solve a scene under several values of its numbers."),
     "verify": ("verify", "Compare with closed forms and other known answers."),
-    "warm-up": ("warm_up", "Compile the kernels of large scenes, once for an installation."),
 }
 """The module of each command, which is loaded when it is asked for, and what the list of commands says of it."""
 

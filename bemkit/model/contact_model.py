@@ -297,10 +297,10 @@ def contact_body(elastic: SteklovPoincare, prepared: Prepared) -> ContactBody:
         data = prepared.conditions, prepared.contact.nodes, prepared.force
         if prepared.linear_solver.hierarchical is not None and not prepared.is_condensed:
             from bemkit.contact.condensation.hierarchical_body import hierarchical_body
-            from bemkit.operators.steklov_poincare.hierarchical import HierarchicalMap
+            from bemkit.operators.steklov_poincare.hierarchical import HierarchicalCollocation
 
             weightless = elastic.weightless if isinstance(elastic, HeavyElasticity) else elastic
-            assert isinstance(weightless, HierarchicalMap)
+            assert isinstance(weightless, HierarchicalCollocation)
             return hierarchical_body(weightless, *data, prepared.inside)
         return condensed_body(elastic, *data, prepared.free_modes)
     from bemkit.model.free_motion import check_held

@@ -22,7 +22,6 @@ from bemkit.model.contact_data import ContactData, find_contact
 from bemkit.model.units import Units, check_position, find_units
 from bemkit.operators.half_plane.far_drive import FarDrive
 from bemkit.operators.linear.solvers import (
-    Automatic,
     ChosenLinearSolver,
     Hierarchical,
     LinearSolverChoice,
@@ -34,7 +33,6 @@ from bemkit.operators.steklov_poincare.forces_inside import ForcesInside
 from bemkit.operators.steklov_poincare.hierarchical_needs import (
     LARGEST_BLOCK,
     choose_collocation_solver,
-    choose_galerkin_solver,
 )
 from bemkit.operators.steklov_poincare.needs import BodyCase, physical_memory
 from bemkit.operators.steklov_poincare.nodal_conditions import (
@@ -167,7 +165,7 @@ class Prepared:
             self.space.mesh, self.material, self.conditions, (self.map_data,), is_condensed=self.is_condensed
         )
         requested, discretisation = self.scene.linear_solver, self.scene.discretisation
-        return linear_solver_of(requested, discretisation, case, self.space)
+        return linear_solver_of(requested, discretisation, case)
 
     @property
     def largest_matrix(self) -> int:
@@ -307,7 +305,7 @@ def _layout(part: Part) -> tuple[object, ...]:
 
 
 def linear_solver_of(
-    requested: LinearSolverChoice, discretisation: Discretisation, case: BodyCase, space: BoundarySpace
+    requested: LinearSolverChoice, discretisation: Discretisation, case: BodyCase
 ) -> ChosenLinearSolver:
     """Choose the linear solver of a map.
 
@@ -317,14 +315,18 @@ def linear_solver_of(
     discretisation : Discretisation
     case : BodyCase
         Its linear solver counts for nothing.
-    space : BoundarySpace
-        Of the displacements.
+
+    Raises
+    ------
+    InputError
+        If compressed equations of Galerkin's method are requested: there are none.
     """
-    memory, hindrance = physical_memory(), discretisation.why_dense(case.mesh)
     if not discretisation.is_symmetric:
-        return choose_collocation_solver(requested, case, memory, hindrance)
-    dense = choose_linear_solver(requested)
-    if not isinstance(requested, Automatic | Hierarchical):
-        return dense
-    n_tractions = discretisation.traction_space(case.mesh).n_dofs
-    return choose_galerkin_solver(requested, case, dense, n_tractions, space.degree, memory, hindrance)
+        return choose_collocation_solver(requested, case, physical_memory(), discretisation.why_dense(case.mesh))
+    if isinstance(requested, Hierarchical) and case.mesh.surface is None:
+        raise InputError(
+            f"linear_solver is 'hierarchical', but discretisation {discretisation.method} has dense equations only: "
+            'take discretisation = "constant", whose equations are compressed, or hp with an accuracy and '
+            'linear_solver = "automatic"'
+        )
+    return choose_linear_solver(requested)

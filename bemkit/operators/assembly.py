@@ -14,9 +14,8 @@ from bemkit.arrays import FloatArray, IntArray
 from bemkit.geometry.errors import GeometryError
 from bemkit.geometry.local_values import of_one_degree
 from bemkit.geometry.spaces import BoundarySpace
-from bemkit.operators.compiled_sweep import sweep_over
 from bemkit.operators.integrals.pairs import Degrees
-from bemkit.operators.integrals.sweep import FEW
+from bemkit.operators.integrals.sweep import FEW, PairSweep
 from bemkit.operators.linear.threads import for_each_chunk
 from bemkit.operators.matrix_rows import Block, Columns, Kind, Rows, Target
 from bemkit.operators.pair_form import PairForm
@@ -95,7 +94,7 @@ def _fill_kinds(targets: Sequence[Target], tests: Sequence[Kind], trials: Sequen
     images = range(0, mesh.whole.n_elements, mesh.n_elements)
     test = np.concatenate([elements for elements, _ in tests])
     trial = np.concatenate([image + elements for elements, _ in trials for image in images])
-    sweep = sweep_over(mesh, degrees, test, trial)
+    sweep = PairSweep(mesh.whole, degrees, test, trial)
     edges: list[int] = np.cumsum([0, *(elements.size for elements, _ in tests)]).tolist()
     half = 0.5 * mesh.whole.lengths
     lock = Lock()

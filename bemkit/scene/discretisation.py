@@ -156,10 +156,6 @@ class SymmetricGalerkin(Discretisation, Protocol):
 
             return half_plane_needs(case)
         degree = self.displacement_space(case.mesh).degree
-        if case.linear_solver.hierarchical is not None:
-            from bemkit.operators.steklov_poincare.hierarchical_needs import hierarchical_galerkin_needs
-
-            return hierarchical_galerkin_needs(case, degree)
         return galerkin_needs(case, self.traction_space(case.mesh).n_dofs, degree)
 
 
@@ -239,21 +235,6 @@ class Galerkin(SymmetricGalerkin):
     def traction_space(self, mesh: BoundaryMesh) -> BoundarySpace:
         """Return functions of one degree less, which may jump at corners and at ends of parts, or constants."""
         return _galerkin_tractions(self, mesh)
-
-    def why_dense(self, mesh: BoundaryMesh) -> str:
-        """Return the reason: a half-plane, or another degree than 1 or 2 on all elements."""
-        if mesh.surface is not None:
-            return "a half-plane has a map of its own"
-        return "" if set(self._degrees) <= {self.largest_degree} <= {1, 2} else "elements are not of degree 1 or 2"
-
-    def hierarchical_map(
-        self, mesh: BoundaryMesh, material: Material, options: Hierarchical | MatrixFree
-    ) -> SteklovPoincare:
-        """Return the compressed map."""
-        from bemkit.operators.steklov_poincare.hierarchical_galerkin import HierarchicalGalerkin
-
-        assert isinstance(options, Hierarchical)  # MatrixFree is chosen for collocation alone
-        return HierarchicalGalerkin(mesh, material, options, self.displacement_space(mesh), self.traction_space(mesh))
 
     def degrees_on(self, mesh: BoundaryMesh) -> IntArray | None:
         """Return the degrees (n_elements,) of the elements of a mesh; None if all are equal."""

@@ -250,9 +250,7 @@ LINEAR_SOLVERS = Registry(
         "hierarchical": "bemkit.operators.linear.solvers:Hierarchical",
         "matrix-free": "bemkit.operators.linear.solvers:MatrixFree",
     },
-    retired={
-        "krylov": "use 'hierarchical', faster and smaller for constant, linear and quadratic elements, or 'automatic'"
-    },
+    retired={"krylov": "use 'hierarchical', faster and smaller for constant elements, or 'automatic'"},
     protocol="bemkit.operators.linear.solvers:LinearSolver",
 )
 

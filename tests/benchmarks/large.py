@@ -1,8 +1,8 @@
 """Example 1 on compressed equations, from a thousand elements on, beside dense ones where these fit.
 
-    python tests/benchmarks/large.py [--dense N] [--without-numba] [--galerkin P] [N ...]
+    python tests/benchmarks/large.py [--dense N] [--without-numba] [N ...]
 
-Elements are those of constant collocation, or of Galerkin's method of degree P (1 or 2). For each number of elements N
+Elements are those of constant collocation. For each number of elements N
 (default 1000 2000 5000 10000 20000) it runs `bk.run`, which begins on coarser meshes, and
 prints what the finest mesh takes of it in processor seconds: compressing the equations, the first factorisation, the
 median of later contact steps that change at most `FEW` leaves, and the median of certificates; the memory of all arrays
@@ -101,18 +101,17 @@ class Parts:
         HierarchicalBody.imbalance = certified  # type: ignore[method-assign]
 
 
-def scene_of(n_elements: int, linear_solver: object, degree: int) -> bk.Scene:
+def scene_of(n_elements: int, linear_solver: object) -> bk.Scene:
     """Return Example 1."""
     scene = bk.load_scene("paper-1")
-    discretisation = bk.Galerkin(degree) if degree else bk.ConstantCollocation()
     mesh = replace(scene.mesh, elements=n_elements)
-    return replace(scene, mesh=mesh, linear_solver=linear_solver, discretisation=discretisation)
+    return replace(scene, mesh=mesh, linear_solver=linear_solver, discretisation=bk.ConstantCollocation())
 
 
-def row_of(n_elements: int, parts: Parts, degree: int) -> tuple[Row, bk.Solution]:
+def row_of(n_elements: int, parts: Parts) -> tuple[Row, bk.Solution]:
     """Measure one number of elements."""
     clock, begin = time.process_time(), time.perf_counter()
-    solution = bk.run(scene_of(n_elements, bk.Hierarchical(), degree))
+    solution = bk.run(scene_of(n_elements, bk.Hierarchical()))
     whole, wall = time.process_time() - clock, time.perf_counter() - begin
     places = [each.x for each in solution.transitions]
     miss = max(abs(place - known) for place, known in zip(places, REFERENCE, strict=True))
@@ -124,10 +123,10 @@ def row_of(n_elements: int, parts: Parts, degree: int) -> tuple[Row, bk.Solution
     ), solution  # fmt: skip
 
 
-def beside_dense(row: Row, solution: bk.Solution, degree: int) -> Row:
+def beside_dense(row: Row, solution: bk.Solution) -> Row:
     """Solve the same on dense equations."""
     clock = time.process_time()
-    dense = run_on_mesh(scene_of(row.n_elements, bk.DenseCholesky(), degree))
+    dense = run_on_mesh(scene_of(row.n_elements, bk.DenseCholesky()))
     seconds = time.process_time() - clock
     assert np.array_equal(dense.contact.status, solution.contact.status), "the statuses differ"
     apart = np.abs(dense.contact.sigma_n - solution.contact.sigma_n).max() / np.abs(dense.contact.sigma_n).max()
@@ -183,7 +182,6 @@ def main() -> None:
     parser.add_argument("numbers", nargs="*", type=int, default=[1000, 2000, 5000, 10000, 20000])
     parser.add_argument("--dense", type=int, default=2000)
     parser.add_argument("--without-numba", action="store_true")
-    parser.add_argument("--galerkin", type=int, choices=(1, 2), default=0)
     options = parser.parse_args()
     if options.without_numba:
         compiled.functions = lambda: None  # type: ignore[assignment]
@@ -192,14 +190,13 @@ def main() -> None:
     parts.listen()
     solutions = []
     for number in options.numbers:
-        row, solution = row_of(number, parts, options.galerkin)
+        row, solution = row_of(number, parts)
         rows.append(row)
         solutions.append(solution if number <= options.dense else None)
         console.print(table_of(rows[-1:]))
     # dense runs come last: their memory would be the largest of the process ever since
     rows = [
-        row if solution is None else beside_dense(row, solution, options.galerkin)
-        for row, solution in zip(rows, solutions, strict=True)
+        row if solution is None else beside_dense(row, solution) for row, solution in zip(rows, solutions, strict=True)
     ]
     console.print(table_of(rows))
     growth = Table(title="growth exponents")

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import importlib
 import re
+import subprocess
+import sys
 from dataclasses import replace
 
 import pytest
@@ -11,7 +13,7 @@ import pytest
 import bemkit as bk
 from bemkit.model.prepared import prepare
 from bemkit.operators.hierarchy import compiled
-from bemkit.operators.linear.solvers import ChosenLinearSolver, DenseCholesky, choose_linear_solver
+from bemkit.operators.linear.solvers import ChosenLinearSolver, DenseCholesky
 from bemkit.plan import check_elements
 from bemkit.plan import plan as plan_module
 from bemkit.runs.nested import run_cascade
@@ -64,25 +66,24 @@ def test_what_cannot_be_compressed_is_dense_and_the_plan_says_why(words: str) ->
     assert any(words in item.reason for item in plan.items if item.name == "linear solver of the body")
 
 
-def test_quadratic_elements_of_incompressible_bodies_with_holes_are_dense() -> None:
-    ring, material = bk.Ring(0.5, 1.0), bk.Material(1.0, 0.5)
-    scene = squeezed(ring, mesh=bk.MeshOptions(elements=480), material=material, linear_solver=ASKED)
-    choices = [chosen(replace(scene, discretisation=bk.Galerkin(degree))) for degree in (1, 2)]
-    assert choices[0].hierarchical == ASKED
-    assert choices[1].hierarchical is None
-    assert (
-        "because the material is incompressible, and the elements of a body with holes quadratic" in choices[1].reason
-    )
-
-
-def test_galerkin_asked_to_compress_takes_what_automatic_takes() -> None:
-    choice = choose_linear_solver(ASKED)
-    assert choice.solver == choose_linear_solver(bk.Automatic()).solver
-    assert "not compressed over a tree" in choice.reason
-    scene = scene_of(40, discretisation=bk.QuadraticGalerkin(), linear_solver=ASKED)
-    assert bk.run(scene).is_converged
+@pytest.mark.parametrize("degree", [1, 2, 3])
+def test_compressed_equations_of_galerkin_are_refused(degree: int) -> None:
+    scene = scene_of(240, discretisation=bk.Galerkin(degree), linear_solver=ASKED)
+    with pytest.raises(bk.errors.InputError, match=r"linear_solver is 'hierarchical', but .* Galerkin.*\"constant\""):
+        bk.make_plan(scene, scene.build_mesh())
+    with pytest.raises(bk.errors.InputError, match="dense equations only"):
+        bk.run(scene)
     with pytest.raises(ValueError, match="a map does not choose"):
         bk.GalerkinMap(scene.build_mesh(), scene.material, linear_solver=ASKED)
+
+
+def test_automatic_keeps_galerkin_dense() -> None:
+    assert chosen(scene_of(5000, discretisation=bk.LinearGalerkin())).hierarchical is None
+
+
+def test_half_planes_have_equations_of_their_own() -> None:
+    scene = replace(bk.load_scene("cylinder-on-half-plane"), linear_solver=ASKED)
+    assert chosen(scene).hierarchical is None
 
 
 def test_only_what_does_not_fit_otherwise_is_compressed_for_want_of_memory(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -166,3 +167,13 @@ def test_a_body_of_many_sides_takes_no_mesh_that_is_too_coarse_for_it(monkeypatc
     check_elements(scene)
     assert not run._gain_by_cascade(scene)
     assert run._gain_by_cascade(replace(scene, mesh=replace(scene.mesh, elements=6000))) == 16
+
+
+def test_a_plan_loads_no_compiler() -> None:
+    code = (
+        "import sys, bemkit as bk; from dataclasses import replace; scene = bk.load_scene('paper-1'); "
+        "scene = replace(scene, discretisation=bk.ConstantCollocation(), linear_solver=bk.Hierarchical()); "
+        "assert bk.make_plan(scene, scene.build_mesh()).is_compressed; "
+        "assert 'numba' not in sys.modules and not any('compiled_' in name for name in sys.modules)"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)

@@ -264,15 +264,3 @@ def test_the_time_of_the_next_mesh_follows_from_the_plans() -> None:
         partitions=(better_partition(level.partition, np.ones(solution.n_elements), 400, cuts={}, spread_over=()),),
     )
     assert 2.0 < refinement.expected_seconds(finer, solution, 1.0) < 200.0
-
-
-@pytest.mark.slow
-def test_meshes_that_follow_an_accuracy_are_the_same_on_compressed_equations() -> None:
-    scene = paper(1, bk.LinearGalerkin(), bk.MeshOptions(accuracy=5e-3))
-    dense = run_adaptive(dataclasses.replace(scene, linear_solver=bk.DenseCholesky()))
-    compressed = run_adaptive(dataclasses.replace(scene, linear_solver=bk.Hierarchical()))
-    assert compressed[-1].plan.is_compressed
-    assert not dense[-1].plan.is_compressed
-    assert [each.n_elements for each in compressed] == [each.n_elements for each in dense]
-    # the tolerance of compressed equations is 1e-10, of which an estimate of 4e-3 loses three digits at most
-    assert compressed[-1].estimated_error == pytest.approx(dense[-1].estimated_error, rel=1e-6)

@@ -20,7 +20,7 @@ from bemkit.operators.hierarchy.system import NodeConditions
 from bemkit.operators.linear.dense import SingularMatrixError
 from bemkit.operators.rigid_modes import admissible_modes, without_motion
 from bemkit.operators.steklov_poincare.forces_inside import ForcesInside
-from bemkit.operators.steklov_poincare.hierarchical import HierarchicalMap, LoadedSystem
+from bemkit.operators.steklov_poincare.hierarchical import HierarchicalCollocation, LoadedSystem
 from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions
 
 _SAMPLED_PAIRS, _MOST_SAMPLED, _FEWEST_SAMPLED = 250_000, 50, 8
@@ -227,7 +227,7 @@ class HierarchicalBody(LinearBody):
             return Imbalance(np.nan, np.nan)
         points = dof_points(loaded.map.displacement_space)
         size = float(np.abs(without_motion(mesh, points, fields.displacement - loaded.motion)).max())
-        of_contact = (fields.force - self.force) / loaded.map.weights[:, None]
+        of_contact = (fields.force - self.force) / loaded.map.mesh.lengths[:, None]
         at_nodes = self.conditions.in_frames(of_contact)[self.nodes.nodes]
         at_nodes = np.einsum("nij,nj->ni", self._elements.of_traction, at_nodes)
         missing = float(np.abs(self.weights[:, None] * (state.traction - at_nodes)).max())
@@ -253,7 +253,7 @@ class HierarchicalBody(LinearBody):
             self._solved(stick(state.u_n, state.u_t) if response is None else response.conditions)
         loaded = self._moving
         traction, strained = loaded.system.everywhere()
-        displacement, force = strained + loaded.motion, traction * loaded.map.weights[:, None]
+        displacement, force = strained + loaded.motion, traction * loaded.map.mesh.lengths[:, None]
         if self.inside is not None:
             displacement, force = displacement + self.inside.displacement, force + self.inside.force
         fields = _Fields(state, loaded, strained, traction, displacement, force)
@@ -280,7 +280,7 @@ class HierarchicalBody(LinearBody):
 
     @cached_property
     def _elements(self) -> ElementConditions:
-        return ElementConditions.of(self.conditions, self.nodes, self.loaded.map.weights)
+        return ElementConditions.of(self.conditions, self.nodes, self.loaded.map.mesh.lengths)
 
     @cached_property
     def _known(self) -> tuple[FloatArray, FloatArray]:
@@ -292,7 +292,7 @@ class HierarchicalBody(LinearBody):
         force, displacement = -self.force[nodes], np.zeros((self.n_contact, 2))
         if self.inside is not None:
             force, displacement = force + self.inside.force[nodes], self.inside.displacement[nodes]
-        frame, traction = self.conditions.frame[nodes], force / self.loaded.map.weights[nodes, None]
+        frame, traction = self.conditions.frame[nodes], force / self.loaded.map.mesh.lengths[nodes, None]
         return np.einsum("nkc,nc->nk", frame, traction), np.einsum("nkc,nc->nk", frame, displacement)
 
     def _solved(self, conditions: LinearConditions) -> ContactState:
@@ -352,7 +352,7 @@ def _left_of(
 
 
 def hierarchical_body(
-    elastic: HierarchicalMap,
+    elastic: HierarchicalCollocation,
     conditions: NodalConditions,
     contact: ContactNodes,
     force: FloatArray,
@@ -362,7 +362,7 @@ def hierarchical_body(
 
     Parameters
     ----------
-    elastic : HierarchicalMap
+    elastic : HierarchicalCollocation
     conditions : NodalConditions
     contact : ContactNodes
         Both as `contact_conditions` has found them.

@@ -330,4 +330,4 @@ def linear_solver(prepared: PreparedAssembly, number: int) -> ChosenLinearSolver
     requested, discretisation = prepared.assembly.linear_solver, body.scene.discretisation
     material = body.material.scaled(prepared.units.modulus)
     case = BodyCase(body.own_mesh, material, conditions, (prepared.map_data(number),), is_condensed=True)
-    return linear_solver_of(requested, discretisation, case, body.space)
+    return linear_solver_of(requested, discretisation, case)

@@ -58,7 +58,6 @@ class BoundaryColumns:
     slopes: ComplexArray | None
     means: ComplexArray | None
     curved: CurvedElements | None = None
-    is_symmetric = False
 
     @classmethod
     def of(
@@ -116,19 +115,6 @@ class BoundaryColumns:
     def reach(self) -> IntArray:
         """(k, n_elements) places on which each element acts: itself, and with slopes its neighbours."""
         return self.neighbours[1:2] if self.slopes is None else self.neighbours
-
-    @property
-    def sizes(self) -> FloatArray:
-        """(n_elements,) array by which the equations become displacements: they are."""
-        return np.ones(self.order.size)
-
-    def felt(self, columns: IntArray) -> IntArray:
-        """Return those of some columns that other equations feel: all."""
-        return columns
-
-    def beside(self, places: IntArray) -> IntArray:
-        """Return the places whose equations are examined with those of some places: no more."""
-        return places
 
     def entries(self, rows: IntArray, columns: IntArray) -> FloatArray:
         """Return entries (n_rows, n_columns) of the equations; rows are 2 * place + component."""

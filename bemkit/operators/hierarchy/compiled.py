@@ -1,8 +1,7 @@
 """The closed forms of `element_fields` compiled by numba, if the extra ``fast`` is installed and works.
 
 The modules beside this one that import numba are imported only where `functions` says that it works. Compiling takes
-some seconds, once for an installation: numba keeps the result on disk. `bemkit.operators.hierarchy.warm_up` compiles
-all of them.
+some seconds, once for an installation: numba keeps the result on disk.
 """
 
 from __future__ import annotations
@@ -29,6 +28,11 @@ def is_installed() -> bool:
 def why() -> str:
     """Say in one line whether the compiled kernels are used, and if not, why."""
     return _loaded()[1]
+
+
+def expected() -> tuple[bool, str]:
+    """Say, without loading numba or compiling anything, whether a run will use the compiled kernels, and why."""
+    return (True, "numba is installed") if is_installed() else (False, _MISSING)
 
 
 def functions() -> ModuleType | None:

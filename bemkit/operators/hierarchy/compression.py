@@ -11,10 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray, IntArray
-from bemkit.operators.hierarchy.columns import Columns
+from bemkit.operators.hierarchy.boundary_columns import BoundaryColumns
 from bemkit.operators.hierarchy.proxies import discs_of, extents, n_proxies
-from bemkit.operators.hierarchy.skeletons import CollocationView, Skeleton
-from bemkit.operators.hierarchy.symmetric_skeletons import SymmetricView
+from bemkit.operators.hierarchy.skeletons import LevelView, Skeleton
 from bemkit.operators.hierarchy.tree import ClusterTree
 from bemkit.operators.linear.threads import for_each_chunk
 
@@ -25,7 +24,7 @@ class Compression:
 
     Parameters
     ----------
-    columns : Columns
+    columns : BoundaryColumns
     tree : ClusterTree
     unknowns : tuple of arrays
         The columns of each leaf that may have a value: those of tractions and displacements that are not always zero.
@@ -33,18 +32,18 @@ class Compression:
         By level from the leaves up to below the root, and by cluster.
     """
 
-    columns: Columns
+    columns: BoundaryColumns
     tree: ClusterTree
     unknowns: tuple[IntArray, ...]
     skeletons: tuple[tuple[Skeleton, ...], ...]
 
     @classmethod
-    def of(cls, columns: Columns, tree: ClusterTree, may_differ: BoolArray, tolerance: float) -> Compression:
+    def of(cls, columns: BoundaryColumns, tree: ClusterTree, may_differ: BoolArray, tolerance: float) -> Compression:
         """Compress the equations.
 
         Parameters
         ----------
-        columns : Columns
+        columns : BoundaryColumns
             In the order of the tree.
         tree : ClusterTree
         may_differ : (n_elements, 4) bool array
@@ -56,13 +55,12 @@ class Compression:
         leaves = [tree.places(0, leaf) for leaf in range(tree.n_leaves)]
         unknowns = tuple(every[places][may_differ[places]] for places in leaves)
         rows = [np.arange(2 * places.start, 2 * places.stop) for places in leaves]
-        candidates = [columns.felt(each) for each in unknowns]
+        candidates = list(unknowns)
         extent = extents(columns)
         levels: list[tuple[Skeleton, ...]] = []
-        view_of = SymmetricView if columns.is_symmetric else CollocationView
         for level in range(tree.n_levels):
             discs = discs_of(columns, tree, level)
-            view = view_of(columns, discs, rows, candidates, extent, tolerance, is_lowest=level == 0)
+            view = LevelView(columns, discs, rows, candidates, extent, tolerance, is_lowest=level == 0)
             n_integrals = columns.n_elements * n_proxies(tolerance)
             skeletons = tuple(for_each_chunk(view.skeleton, range(len(rows)), n_integrals=n_integrals))
             levels.append(skeletons)
@@ -77,37 +75,7 @@ class Compression:
         They are evaluated anew each time: that takes less than what follows, and no memory.
         """
         one, two = self.skeletons[level][2 * pair : 2 * pair + 2]
-        on_one = self.columns.entries(one.rows, two.columns)
-        return on_one, on_one.T if self.columns.is_symmetric else self.columns.entries(two.rows, one.columns)
-
-    def product(self, values: FloatArray) -> FloatArray:
-        """Return the equations (2 n_elements, k) of columns with some values (4 n_elements, k), to the tolerance."""
-        tree, top = self.tree, self.tree.n_levels - 1
-        felt = [self.columns.felt(columns) for columns in self.unknowns]
-        caused = [[each.column_map.gather(values[own]) for each, own in zip(self.skeletons[0], felt, strict=True)]]
-        for skeletons in self.skeletons[1:]:
-            pairs = zip(caused[-1][::2], caused[-1][1::2], strict=True)
-            caused.append(
-                [each.column_map.gather(np.concatenate(pair)) for each, pair in zip(skeletons, pairs, strict=True)]
-            )
-        coming = [np.zeros((0, values.shape[1]))]
-        for level in range(top, -1, -1):
-            below = []
-            for pair, of_parent in enumerate(coming):
-                on_one, on_two = self.couplings(level, pair)
-                one, two = on_one @ caused[level][2 * pair + 1], on_two @ caused[level][2 * pair]
-                if level < top:
-                    passed = self.skeletons[level + 1][pair].row_map.matrix() @ of_parent
-                    one, two = one + passed[: len(one)], two + passed[len(one) :]
-                below += [one, two]
-            coming = below
-        result = np.empty((2 * self.columns.n_elements, values.shape[1]))
-        for leaf, (columns, of_leaf) in enumerate(zip(felt, coming, strict=True)):
-            places = tree.places(0, leaf)
-            rows = np.arange(2 * places.start, 2 * places.stop)
-            result[rows] = self.columns.entries(rows, columns) @ values[columns]
-            result[rows] += self.skeletons[0][leaf].row_map.matrix() @ of_leaf
-        return result
+        return self.columns.entries(one.rows, two.columns), self.columns.entries(two.rows, one.columns)
 
     @property
     def largest_rank(self) -> int:

@@ -288,7 +288,7 @@ class HierarchicalFactor:
         rows = np.arange(2 * places.start, 2 * places.stop)
         n, n_border = places.stop - places.start, self.border.errors.shape[1]
         skeleton = compression.skeletons[0][number]
-        own = compression.columns.felt(columns) - 4 * places.start
+        own = columns - 4 * places.start
         n_caused = rows.size + skeleton.columns.size
         # columns: the equations, then what is caused and added to the balances
         both = np.zeros((4 * n, n_caused + n_border))

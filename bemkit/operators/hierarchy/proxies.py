@@ -12,15 +12,15 @@ import numpy as np
 
 from bemkit.arrays import ComplexArray, FloatArray, IntArray
 from bemkit.operators.hierarchy import compiled
+from bemkit.operators.hierarchy.boundary_columns import BoundaryColumns
 from bemkit.operators.hierarchy.clusters import Discs
-from bemkit.operators.hierarchy.columns import Columns
 from bemkit.operators.hierarchy.tree import ClusterTree
 
 PROXY_RATIO = 2.0
 """Radius of the proxy circle by that of the cluster: what varies m times along the circle decays like 2^-m inside."""
 
 
-def discs_of(columns: Columns, tree: ClusterTree, level: int) -> Discs:
+def discs_of(columns: BoundaryColumns, tree: ClusterTree, level: int) -> Discs:
     """Return discs around the clusters of a level, with all elements on which their unknowns act."""
     ends = np.stack([columns.start, columns.centre, columns.end])
     n = columns.n_elements
@@ -47,7 +47,7 @@ def n_proxies(tolerance: float) -> int:
     return int(2.2 * np.log(1.0 / tolerance) / np.log(PROXY_RATIO)) + 8
 
 
-def extents(columns: Columns) -> FloatArray:
+def extents(columns: BoundaryColumns) -> FloatArray:
     """Return how far from the middle of each element its unknowns act [m]."""
     ends = np.stack([columns.start, columns.centre, columns.end])
     far: FloatArray = np.abs(ends[:, columns.reach] - columns.centre[: columns.n_elements]).max(axis=(0, 1))

@@ -7,7 +7,6 @@ because tractions and displacements are both among the unknowns.
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,7 +14,6 @@ import numpy as np
 from bemkit.arrays import ComplexArray, FloatArray, IntArray
 from bemkit.operators.hierarchy.boundary_columns import NOWHERE, BoundaryColumns
 from bemkit.operators.hierarchy.clusters import Discs
-from bemkit.operators.hierarchy.columns import Columns
 from bemkit.operators.hierarchy.interpolative import Block, Interpolation, sketched
 from bemkit.operators.hierarchy.proxies import PROXY_RATIO, n_proxies, near_clusters, point_forces, proxy_points
 
@@ -50,20 +48,16 @@ class Skeleton:
 
 
 @dataclass(frozen=True, eq=False)
-class LevelView(ABC):
+class LevelView:
     """The clusters of one level with the rows and columns that are candidates for their skeletons."""
 
-    columns: Columns
+    columns: BoundaryColumns
     discs: Discs
     rows: list[IntArray]
     candidates: list[IntArray]
     extent: FloatArray
     tolerance: float
     is_lowest: bool
-
-    @abstractmethod
-    def skeleton(self, cluster: int) -> Skeleton:
-        """Choose the skeleton of one cluster."""
 
     def near(self, cluster: int) -> tuple[IntArray, IntArray]:
         """Return the rows and columns of other clusters that lie in the proxy circle of one, or reach into it."""
@@ -102,15 +96,6 @@ class LevelView(ABC):
         """Return the points that stand for all that is far from a cluster."""
         return proxy_points(self.discs, cluster, n_proxies(self.tolerance))
 
-
-class CollocationView(LevelView):
-    """Interpolates what columns of collocation cause, and what its equations feel, one for each."""
-
-    @property
-    def _of(self) -> BoundaryColumns:
-        assert isinstance(self.columns, BoundaryColumns)
-        return self.columns
-
     def skeleton(self, cluster: int) -> Skeleton:
         """Choose the skeleton of one cluster."""
         near_rows, near_columns = self.near(cluster)
@@ -120,7 +105,7 @@ class CollocationView(LevelView):
 
     def _column_map(self, cluster: int, near_rows: IntArray) -> Interpolation:
         """Interpolate the columns of a cluster, seen from near rows and from the proxy circle."""
-        candidates, of = self.candidates[cluster], self._of
+        candidates, of = self.candidates[cluster], self.columns
         points, proxies = np.unique(near_rows // 2), self.proxies(cluster)
         places = np.append(np.full(proxies.size, NOWHERE), points)
         fields = of.fields(np.append(proxies, of.centre[points]), places, candidates)
@@ -138,7 +123,7 @@ class CollocationView(LevelView):
 
     def _row_map(self, cluster: int, near_columns: IntArray) -> Interpolation:
         """Interpolate the rows of a cluster under near columns and under forces on the proxy circle."""
-        rows, of = self.rows[cluster], self._of
+        rows, of = self.rows[cluster], self.columns
         points, number = np.unique(rows // 2, return_inverse=True)
         x, proxies = of.centre[points], self.proxies(cluster)
         circle = PROXY_RATIO * float(self.discs.radius[cluster])

@@ -75,7 +75,7 @@ class HierarchicalSystem:
     compression : Compression
     border : Border
     frame : (n_elements, 2, 2) array
-        Rows are the directions of the conditions of each element; those of Galerkin's method stand at nodes.
+        Rows are the directions of the conditions of each element.
     displacement_unit : float [m/Pa]
         Displacement by traction of a single element.
     may_change : (n_elements,) bool array
@@ -83,7 +83,7 @@ class HierarchicalSystem:
 
     Notes
     -----
-    Places of the tree beyond the elements, holes or tractions that no condition binds, have a traction alone.
+    Places of the tree beyond the elements, those of holes, have a traction alone.
     """
 
     def __init__(
@@ -180,14 +180,8 @@ class HierarchicalSystem:
         state = self._states()[self._place[: self.n_elements]]
         return state[:, :2], state[:, 2:]
 
-    def beyond(self) -> FloatArray:
-        """Return the tractions (n, 2), in x and y, at the places beyond the elements, under the same conditions."""
-        return self._states()[self._place[self.n_elements :], :2]
-
     def residual(self, elements: IntArray, traction: FloatArray, displacement: FloatArray) -> FloatArray:
         """Return what is left (n, 2) of the equations of some elements, nothing compressed, as displacements.
-
-        Those of Galerkin's method are the equations of nodes, and of the tractions around them.
 
         Parameters
         ----------
@@ -195,13 +189,14 @@ class HierarchicalSystem:
         traction, displacement : (n_elements, 2) arrays
             As `everywhere` has returned them.
         """
-        places, border = self._columns.beside(self._place[elements]), self.factor.border
+        places, border = self._place[elements], self.factor.border
         of_all = self._states()
         is_element = self._order < self.n_elements
         of_all[is_element] = np.concatenate([traction, displacement], axis=1)[self._order[is_element]]
         left = self._columns.applied(places, of_all[:, :2], of_all[:, 2:])
         errors = border.errors.reshape(self._order.size, 2, -1)[places] @ self.factor.errors()
-        return (left + errors) / self._columns.sizes[places, None]
+        residual: FloatArray = left + errors
+        return residual
 
     def laws(self, conditions: NodeConditions) -> ElementLaws:
         """Return what conditions on all elements make of their tractions and displacements, by place, in x and y."""

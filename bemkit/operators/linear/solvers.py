@@ -60,8 +60,8 @@ class Automatic:
 class Hierarchical:
     """Boundary equations compressed over a tree and factored: time and memory grow like the number of elements.
 
-    For constant collocation, and for Galerkin's method of degree 1 and 2. Other equations are solved as by `Automatic`;
-    the plan says why.
+    For constant collocation; scenes with equations of Galerkin's method are refused. Bodies whose equations cannot be
+    compressed are solved as by `Automatic`; the plan says why.
 
     Parameters
     ----------

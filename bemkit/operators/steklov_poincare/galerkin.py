@@ -176,12 +176,8 @@ class GalerkinElasticity:
         if self.material.is_incompressible or self.mesh.is_exterior:
             return Volume(total, 0.0)
         beta, dilatation = self.material.plane_compressibility, dilatation_of(self.displacement_space)[:, None]
-        change = total - beta * self._without_pressure(dilatation)
+        change = total - beta * multiply(self.factors.matrix, dilatation)
         return Volume(change, beta * float(np.vdot(dilatation, change)))
-
-    def _without_pressure(self, displacement: FloatArray) -> FloatArray:
-        """Return S u for the columns of (n_dofs, m) displacements, without the uniform pressure."""
-        return multiply(self.factors.matrix, displacement)
 
     def condense(self, conditions: NodalConditions, force: FloatArray) -> CondensedMap:
         """Eliminate every direction that is not retained, by a Schur complement, with the linear solver of the map."""
@@ -195,7 +191,8 @@ class GalerkinElasticity:
         Of an incompressible body they lack the pressures, which displacements do not tell; those on curved loops of a
         nearly incompressible one they hardly tell.
         """
-        rest = self._tractions_without_pressures(displacement.ravel())
+        factors = self.factors  # V^-1 (1/2 M + K) u on tractions without uniform pressures
+        rest = factors.single_layer.solve_upper(factors.whitened_trace @ displacement.ravel())
         if self.material.is_incompressible or self.mesh.is_exterior:
             return rest.reshape(-1, 2)
         # the pressure by the work on the dilatation, whose forces are the flux over the compressibility
@@ -210,11 +207,6 @@ class GalerkinElasticity:
         everywhere, centre, flux = np.arange(self.mesh.n_elements), self.mesh.centre, self._flux[:, 0]
         arms = integrate_traction(self.traction_space, everywhere, lambda points, _: points - centre).ravel()
         return arms, flux, float(flux @ dilatation_of(self.displacement_space))
-
-    def _tractions_without_pressures(self, displacement: FloatArray) -> FloatArray:
-        """Return V^-1 (1/2 M + K) u (n_traction_dofs,) on tractions without uniform pressures."""
-        factors = self.factors
-        return factors.single_layer.solve_upper(factors.whitened_trace @ displacement)
 
     def element_tractions(self, displacement: FloatArray, force: FloatArray) -> FloatArray:
         """Return the (n_elements, n_local, 2) tractions V^-1 (1/2 M + K) u, with the pressures that `force` tells.

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray, IntArray
+from bemkit.errors import InputError
 from bemkit.geometry.mesh import BoundaryMesh
-from bemkit.geometry.spaces import BoundarySpace
 from bemkit.operators.hierarchy.collocation_system import collocation_system
 from bemkit.operators.hierarchy.element_laws import ElementLaws
 from bemkit.operators.hierarchy.system import HierarchicalSystem, NodeConditions
@@ -20,54 +19,15 @@ from bemkit.operators.steklov_poincare.collocation import CollocationElasticity
 from bemkit.operators.steklov_poincare.nodal_conditions import GivenData, NodalConditions, free_modes, turning
 from bemkit.operators.steklov_poincare.protocol import CondensedMap
 
+_LARGEST_RESIDUAL, _SAMPLED = 1e3, 16
+"""Residual by the tolerance of the compression, found at so many elements, beyond which equations are inexact. It is
+below one on all bodies that were tried."""
+_FAR = 10.0
+"""A rigid motion so much larger than what is left of the displacements is left out."""
+
 
 class InexactEquationsError(SingularMatrixError):
     """Compressed equations that are not as accurate as their tolerance says."""
-
-
-class HierarchicalMap(ABC):
-    """An elastic map that solves over a tree; see `SteklovPoincare`."""
-
-    mesh: BoundaryMesh
-    material: Material
-    options: Hierarchical | MatrixFree
-    displacement_space: BoundarySpace
-    keeps_rotations: bool
-
-    @property
-    @abstractmethod
-    def weights(self) -> FloatArray:
-        """(n_nodes,) array [m]: by which tractions become the forces of nodes."""
-
-    @abstractmethod
-    def system(self, conditions: NodalConditions, may_be_loaded: BoolArray, may_move: BoolArray) -> HierarchicalSystem:
-        """Return the compressed equations in the frames of nodes.
-
-        Parameters
-        ----------
-        conditions : NodalConditions
-        may_be_loaded, may_move : (n_nodes,) bool arrays
-            Nodes whose traction, and whose displacement, may ever differ from zero.
-        """
-
-    def condense(self, conditions: NodalConditions, force: FloatArray) -> CondensedMap:
-        """Solve for a unit displacement of each retained direction; see `SteklovPoincare.condense`.
-
-        Raises
-        ------
-        InexactEquationsError
-            If the boundary equations, all integrals in closed form and none compressed, are not fulfilled by a sample
-            of the solutions.
-        """
-        loaded = LoadedSystem.of(self, conditions, force)
-        condensed = _Condensed(self, loaded, loaded.stiffness()).map()
-        residual = loaded.residual(np.cos(np.arange(loaded.retained.size)))
-        if residual > _LARGEST_RESIDUAL * self.options.tolerance:
-            raise InexactEquationsError(
-                f"compressed to {self.options.tolerance:g} the boundary equations leave a residual of {residual:.1e} "
-                "of the displacements: choose the linear solver 'direct' for this body"
-            )
-        return condensed
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,12 +36,12 @@ class _Condensed:
 
     Parameters
     ----------
-    body : HierarchicalMap
+    body : HierarchicalCollocation
     loaded : LoadedSystem
     stiffness : (n_retained, n_retained) array [Pa]
     """
 
-    body: HierarchicalMap
+    body: HierarchicalCollocation
     loaded: LoadedSystem
     stiffness: FloatArray
 
@@ -96,7 +56,7 @@ class _Condensed:
     def recover(self, retained_displacement: FloatArray) -> tuple[FloatArray, FloatArray]:
         """See `CondensedMap`."""
         displacement, traction = self.loaded.recovered(retained_displacement)
-        return displacement, traction * self.body.weights[:, None]
+        return displacement, traction * self.body.mesh.lengths[:, None]
 
     def follow(self, directions: IntArray) -> tuple[FloatArray, FloatArray]:
         """See `CondensedMap`."""
@@ -109,7 +69,7 @@ class _Condensed:
         return _Condensed(self.body, self.loaded.under(displacement, force), self.stiffness).map()
 
 
-class HierarchicalCollocation(HierarchicalMap, CollocationElasticity):
+class HierarchicalCollocation(CollocationElasticity):
     """The map of `CollocationElasticity` that solves over a tree.
 
     Parameters
@@ -125,15 +85,17 @@ class HierarchicalCollocation(HierarchicalMap, CollocationElasticity):
         self, mesh: BoundaryMesh, material: Material, options: Hierarchical | MatrixFree, *, slopes: bool = True
     ) -> None:
         super().__init__(mesh, material, slopes=slopes)
-        self.options, self.keeps_rotations = options, slopes
-
-    @property
-    def weights(self) -> FloatArray:
-        """(n_elements,) array [m]: their lengths."""
-        return self.mesh.lengths
+        self.options = options
 
     def system(self, conditions: NodalConditions, may_be_loaded: BoolArray, may_move: BoolArray) -> HierarchicalSystem:
-        """Return the equations of elements, compressed or not stored."""
+        """Return the equations in the frames of the elements, compressed or not stored.
+
+        Parameters
+        ----------
+        conditions : NodalConditions
+        may_be_loaded, may_move : (n_elements,) bool arrays
+            Elements whose traction, and whose displacement, may ever differ from zero.
+        """
         if isinstance(self.options, MatrixFree):
             from bemkit.operators.hierarchy.matrix_free import MatrixFreeSystem
 
@@ -149,12 +111,30 @@ class HierarchicalCollocation(HierarchicalMap, CollocationElasticity):
             tolerance=self.options.tolerance,
         )
 
+    def condense(self, conditions: NodalConditions, force: FloatArray) -> CondensedMap:
+        """Solve for a unit displacement of each retained direction; see `SteklovPoincare.condense`.
 
-_LARGEST_RESIDUAL, _SAMPLED = 1e3, 16
-"""Residual by the tolerance of the compression, found at so many elements, beyond which equations are inexact. It is
-below one on all bodies that were tried."""
-_FAR = 10.0
-"""A rigid motion so much larger than what is left of the displacements is left out."""
+        Raises
+        ------
+        InputError
+            If the equations are solved without being stored: every column of the stiffness would be an iteration.
+        InexactEquationsError
+            If the boundary equations, all integrals in closed form and none compressed, are not fulfilled by a sample
+            of the solutions.
+        """
+        if isinstance(self.options, MatrixFree):
+            raise InputError(
+                "the linear solver MatrixFree forms no stiffness: condense this body with Hierarchical() or densely"
+            )
+        loaded = LoadedSystem.of(self, conditions, force)
+        condensed = _Condensed(self, loaded, loaded.stiffness()).map()
+        residual = loaded.residual(np.cos(np.arange(loaded.retained.size)))
+        if residual > _LARGEST_RESIDUAL * self.options.tolerance:
+            raise InexactEquationsError(
+                f"compressed to {self.options.tolerance:g} the boundary equations leave a residual of {residual:.1e} "
+                "of the displacements: choose the linear solver 'direct' for this body"
+            )
+        return condensed
 
 
 @dataclass(frozen=True, eq=False)
@@ -163,7 +143,7 @@ class LoadedSystem:
 
     Parameters
     ----------
-    map : HierarchicalMap
+    map : HierarchicalCollocation
     conditions : NodalConditions
         Of the elements.
     system : HierarchicalSystem
@@ -182,7 +162,7 @@ class LoadedSystem:
         only, which counts where a body moves by far more than it strains.
     """
 
-    map: HierarchicalMap
+    map: HierarchicalCollocation
     conditions: NodalConditions
     system: HierarchicalSystem
     known: ElementLaws
@@ -193,7 +173,7 @@ class LoadedSystem:
     travel: FloatArray
 
     @classmethod
-    def of(cls, map: HierarchicalMap, conditions: NodalConditions, force: FloatArray) -> LoadedSystem:
+    def of(cls, map: HierarchicalCollocation, conditions: NodalConditions, force: FloatArray) -> LoadedSystem:
         """Compress the equations of a body, under its later loads, too."""
         is_loaded, is_moved = _loaded(conditions, force)
         for given in conditions.later:
@@ -203,7 +183,7 @@ class LoadedSystem:
         may_move = is_moved | ~conditions.is_fixed.all(axis=1)
         system = map.system(conditions, may_be_loaded, may_move)
         motions = free_modes(map.displacement_space, conditions)
-        if not map.keeps_rotations:  # constant elements resist a rotation
+        if not map.slopes:  # constant elements resist a rotation
             motions = motions[~turning(motions)]
         motions = np.ascontiguousarray(motions.transpose(1, 2, 0))
         at_rest = np.zeros(motions.shape[2])
@@ -238,7 +218,7 @@ class LoadedSystem:
 
     def _held(self, displacement: FloatArray) -> NodeConditions:
         """Return conditions of given tractions on free directions, and of displacements (n_elements, 2) on others."""
-        traction = self.conditions.in_frames(self.force) / self.map.weights[:, None]
+        traction = self.conditions.in_frames(self.force) / self.map.mesh.lengths[:, None]
         return NodeConditions.given(~self.conditions.is_free, traction, displacement)
 
     def travel_of(self, elements: IntArray, displacement: FloatArray) -> FloatArray | None:
@@ -268,7 +248,7 @@ class LoadedSystem:
         retained = self.retained
         if not retained.size:
             return np.zeros((0, 0))
-        stiffness = self.map.weights[retained // 2, None] * self.responses(retained)[0]
+        stiffness = self.map.mesh.lengths[retained // 2, None] * self.responses(retained)[0]
         # what no support resists costs no force, in the compressed equations but for their tolerance
         motions = np.einsum("nkc,ncm->nkm", self.conditions.frame, self.motions).reshape(self.force.size, -1)
         basis = np.linalg.qr(motions[retained])[0]

@@ -27,7 +27,6 @@ from bemkit.operators.steklov_poincare.needs import (
     BodyNeeds,
     PlanItem,
     collocation_needs,
-    galerkin_needs,
     seconds_of,
 )
 
@@ -73,11 +72,6 @@ class _Costs:
 
 
 _COLLOCATION = _Costs(14e3, 3e3, 0.4e6, 25e3, 8.8e3, 3.5e3, 16e6, 6.5e3)
-_GALERKIN = {
-    1: _Costs(250e3, 100e3, 4e6, 0.4e6, 27e3, 0.0, 32e6, 0.0),
-    2: _Costs(500e3, 190e3, 8e6, 0.8e6, 54e3, 0.0, 42e6, 0.0),
-}
-"""By the degree of the displacements."""
 _MOST_IN_NUMPY = 38e6
 """Bytes of the integrals that exist at the same time."""
 _FLOPS_OF_STEP = 2e8
@@ -138,56 +132,18 @@ def choose_collocation_solver(
     if hindrance := hindrance or why_dense(case):
         return ChosenLinearSolver(_DIRECT, f"the equations are not compressed, because {hindrance}")
     dense = collocation_needs(case, takes_slopes=True)
-    gain = _gain(requested, case, dense, _COLLOCATION, memory)
+    gain = _gain(requested, case, dense, memory)
     return gain if isinstance(gain, ChosenLinearSolver) else ChosenLinearSolver(_DIRECT, gain)
 
 
-def choose_galerkin_solver(
-    requested: Automatic | Hierarchical,
-    case: BodyCase,
-    otherwise: ChosenLinearSolver,
-    n_tractions: int,
-    degree: int,
-    memory: float,
-    hindrance: str,
-) -> ChosenLinearSolver:
-    """Choose between the compressed equations of Galerkin's method and what is chosen otherwise.
-
-    Parameters
-    ----------
-    requested : Hierarchical or Automatic
-    case : BodyCase
-        Its linear solver counts for nothing.
-    otherwise : ChosenLinearSolver
-    n_tractions : int
-        Components of all traction dofs.
-    degree : int
-        Of the displacements.
-    memory : float [bytes]
-        Of the computer.
-    hindrance : str
-        Why the equations cannot be compressed; empty if they can.
-    """
-    if case.mesh.n_elements < _FEWEST_ELEMENTS:
-        hindrance = hindrance or f"{case.mesh.n_elements} elements are few"
-    if degree == 2 and _is_incompressible_with_holes(case):
-        hindrance = hindrance or "the material is incompressible, and the elements of a body with holes quadratic"
-    if hindrance:
-        reason = f"{otherwise.reason}; the equations are not compressed, because {hindrance}"
-        return replace(otherwise, reason=reason) if isinstance(requested, Hierarchical) else otherwise
-    dense = galerkin_needs(replace(case, linear_solver=otherwise), n_tractions, degree)
-    gain = _gain(requested, case, dense, _GALERKIN[degree], memory)
-    return gain if isinstance(gain, ChosenLinearSolver) else replace(otherwise, reason=f"{otherwise.reason}; {gain}")
-
-
 def _gain(
-    requested: Automatic | Hierarchical, case: BodyCase, dense: BodyNeeds, costs: _Costs, memory: float
+    requested: Automatic | Hierarchical, case: BodyCase, dense: BodyNeeds, memory: float
 ) -> ChosenLinearSolver | str:
     """Return the compressed equations if they are worth it, or say why they are not."""
     if isinstance(requested, Hierarchical):
         return ChosenLinearSolver(_DIRECT, "asked for", requested)
     options = Hierarchical()
-    compressed = _needs(case, options, costs)
+    compressed = _needs(case, options)
     of_dense = _FLOPS_OF_LARGE * (dense.flops + CONTACT_STEPS * 2.0 / 3.0 * case.n_retained**3)
     share = compressed.seconds / seconds_of(dense.evaluations, of_dense)
     if share < _SHARE:
@@ -196,19 +152,6 @@ def _gain(
         reason = f"dense ones need about {dense.memory / 1e9:.3g} GB, there are {memory / 1e9:.3g} GB"
         return ChosenLinearSolver(_DIRECT, reason, options)
     return f"compressed over a tree they would take {share:.2g} times as long"
-
-
-def hierarchical_galerkin_needs(case: BodyCase, degree: int) -> BodyNeeds:
-    """Return what the compressed equations of Galerkin's method take, as `hierarchical_needs`."""
-    options, costs = _options(case), _GALERKIN[degree]
-    reason = f"compressed over a tree to {options.tolerance:g}: {case.linear_solver.reason}"
-    items = (
-        PlanItem("boundary equations", True, f"single and double layer and hypersingular operator, {reason}"),
-        PlanItem("adjoint double layer K'", False, "it is the transpose of K"),
-        PlanItem("Steklov-Poincare map", False, "tractions and displacements are both unknowns; V is not inverted"),
-        *_tree_items(case, options, costs),
-    )
-    return replace(_needs(case, options, costs), items=items)
 
 
 def _options(case: BodyCase) -> Hierarchical:
@@ -225,24 +168,25 @@ def hierarchical_needs(case: BodyCase, *, takes_slopes: bool) -> BodyNeeds:
         PlanItem("boundary equations", True, f"single and double layer, {reason}"),
         PlanItem("slopes between constant elements", takes_slopes, slopes),
         PlanItem("hypersingular operator W", False, "collocation takes the displacement equation alone"),
-        *_tree_items(case, options, _COLLOCATION),
+        *_tree_items(case, options),
     )
-    return replace(_needs(case, options, _COLLOCATION), items=items)
+    return replace(_needs(case, options), items=items)
 
 
-def _tree_items(case: BodyCase, options: Hierarchical, costs: _Costs) -> tuple[PlanItem, PlanItem, PlanItem]:
+def _tree_items(case: BodyCase, options: Hierarchical) -> tuple[PlanItem, PlanItem, PlanItem]:
     """Say how the tree is solved, which kernels are used, and what the others would cost."""
-    is_compiled = compiled.functions() is not None
-    here, there = (_needs(case, options, costs, is_compiled=each).seconds for each in (is_compiled, not is_compiled))
+    is_compiled, why = compiled.expected()
+    here, there = (_needs(case, options, is_compiled=each).seconds for each in (is_compiled, not is_compiled))
     others = f"{'numpy' if is_compiled else 'compiled ones'} would take about {there:.3g} s instead of {here:.3g} s"
     return (
         PlanItem("linear solver of the body", True, "LU of the clusters of the tree; no matrix of the whole body"),
-        PlanItem("compiled kernels (numba)", is_compiled, f"{compiled.why()}; {others}"),
+        PlanItem("compiled kernels (numba)", is_compiled, f"{why}; {others}"),
         PlanItem("algebraic multigrid (pyamg)", False, "the linear solver is direct"),
     )
 
 
-def _needs(case: BodyCase, options: Hierarchical, costs: _Costs, *, is_compiled: bool | None = None) -> BodyNeeds:
+def _needs(case: BodyCase, options: Hierarchical, *, is_compiled: bool | None = None) -> BodyNeeds:
+    costs = _COLLOCATION
     n, digits = case.mesh.n_elements, -math.log10(options.tolerance) / _DIGITS
     n_both = int(np.count_nonzero(case.conditions.is_retained.any(axis=1)))
     if is_compiled is None:

@@ -54,7 +54,7 @@ def matrix_free_needs(case: BodyCase, options: MatrixFree, *, takes_slopes: bool
         PlanItem(
             "linear solver of the body", True, f"GMRES to {options.tolerance:g}, about {_STEPS:.0f} steps from cold"
         ),
-        PlanItem("compiled kernels (numba)", is_compiled, compiled.why()),
+        PlanItem("compiled kernels (numba)", *compiled.expected()),
         PlanItem("algebraic multigrid (pyamg)", True, "its hierarchy inverts the single layer between elements"),
     )
     evaluations = of_product * _STEPS * _RESPONSES * len(case.loads)

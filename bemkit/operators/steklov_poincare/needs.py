@@ -155,7 +155,6 @@ def galerkin_needs(case: BodyCase, n_tractions: int, degree: int) -> BodyNeeds:
     degree : int
         Of the displacements.
     """
-    from bemkit.operators.compiled_sweep import why
     from bemkit.operators.integrals.sweep import sweep_memory
 
     t, u, f, r = n_tractions, case.n_displacements, case.n_free, case.n_retained
@@ -185,11 +184,10 @@ def galerkin_needs(case: BodyCase, n_tractions: int, degree: int) -> BodyNeeds:
     memory = max(_BYTES * assembled + buffers, _BYTES * largest)
     straight, curved = ((15.0, 18e3), (20.0, 35e3)) if degree < 2 else ((40.0, 30e3), (100.0, 55e3))
     evaluations = _evaluations(case, straight, curved) / threads
-    kernels = PlanItem("compiled kernels (numba)", *why(degrees, mesh.n_elements * n_sources))
-    return BodyNeeds(_galerkin_items(case, n_tractions, kernels), work, memory, _BYTES * kept, evaluations, flops)
+    return BodyNeeds(_galerkin_items(case, n_tractions), work, memory, _BYTES * kept, evaluations, flops)
 
 
-def _galerkin_items(case: BodyCase, n_tractions: int, kernels: PlanItem) -> tuple[PlanItem, ...]:
+def _galerkin_items(case: BodyCase, n_tractions: int) -> tuple[PlanItem, ...]:
     t, u, choice = n_tractions, case.n_displacements, case.linear_solver
     inverse = f"V^-1 by Cholesky, because V is symmetric and positive definite; order {t}"
     is_incompressible = case.material.is_incompressible and not case.mesh.is_exterior
@@ -201,7 +199,6 @@ def _galerkin_items(case: BodyCase, n_tractions: int, kernels: PlanItem) -> tupl
         PlanItem("hypersingular operator W", True, f"makes the Steklov-Poincare map symmetric; {u} x {u}"),
         PlanItem("Steklov-Poincare map", True, inverse),
         PlanItem("linear solver of the body", True, f"{choice.reason}; order {case.n_free}"),
-        kernels,
         PlanItem("algebraic multigrid (pyamg)", False, "the linear solver is direct"),
         PlanItem("pressure that keeps the volume", is_incompressible, volume),
     )

@@ -56,11 +56,15 @@ def test_columns_of_one_kind_are_compressed_alone(monkeypatch: pytest.MonkeyPatc
     for kind in (0, 1):
         may_differ = np.tile(np.arange(4) // 2 == kind, (mesh.n_elements, 1))
         compression = Compression.of(columns, tree, may_differ, 1e-9)
-        values = may_differ * np.cos(place[:, None] + np.arange(4))
-        exact = columns.applied(np.arange(mesh.n_elements), values[:, :2], values[:, 2:])
-        error = compression.product(values.reshape(-1, 1))[:, 0] - exact.ravel()
-        # sums over all elements of errors below the tolerance each
-        assert np.abs(error).max() <= 1e-8 * np.abs(exact).max()
+        leaves = compression.skeletons[0]
+        for receiver, source in ((0, len(leaves) - 1), (len(leaves) - 1, 0), (1, 2)):
+            unknowns, own = compression.unknowns[source], tree.places(0, receiver)
+            values = np.cos(place[unknowns // 4] + unknowns % 4)
+            exact = columns.entries(np.arange(2 * own.start, 2 * own.stop), unknowns) @ values
+            between = columns.entries(leaves[receiver].rows, leaves[source].columns)
+            found = leaves[receiver].row_map.matrix() @ (between @ leaves[source].column_map.gather(values))
+            # sums over all elements of errors below the tolerance each
+            assert np.abs(found - exact).max() <= 1e-8 * np.abs(exact).max()
 
 
 @pytest.mark.slow

@@ -10,6 +10,7 @@ import pytest
 import bemkit as bk
 from bemkit.arrays import FloatArray
 from bemkit.geometry import BoundaryMesh
+from bemkit.model.prepared import prepare
 from bemkit.operators.hierarchy.boundary_columns import BoundaryColumns
 from bemkit.operators.hierarchy.coarse_equations import ElementGroups
 from bemkit.operators.hierarchy.collocation_system import boundary_border
@@ -22,7 +23,9 @@ from bemkit.operators.hierarchy.traction_hierarchy import TractionHierarchy
 from bemkit.operators.linear.dense import SingularMatrixError
 from bemkit.operators.linear.solvers import MatrixFree
 from bemkit.operators.material import Material
+from bemkit.operators.steklov_poincare.hierarchical import HierarchicalCollocation
 from tests.operators.hierarchy.test_system import MATERIAL, SHAPES, conditions_of, graded, mesh_of, system_of
+from tests.scenes import paper
 from tests.slow import slow_except
 
 NOTHING = np.zeros(0, np.intp)
@@ -213,3 +216,13 @@ def test_the_hierarchy_inverts_the_single_layer_on_waves() -> None:
 def test_options_out_of_range(options: tuple[float, int], words: str) -> None:
     with pytest.raises(ValueError, match=words):
         MatrixFree(*options)
+
+
+def test_no_stiffness_is_condensed_without_stored_equations() -> None:
+    scene = paper(1, bk.ConstantCollocation(), replace(paper(1).mesh, elements=240))
+    given = prepare(scene, scene.build_mesh())
+    elastic = HierarchicalCollocation(given.mesh.unit, given.material, bk.MatrixFree())
+    with pytest.raises(
+        bk.errors.InputError, match="MatrixFree forms no stiffness: condense this body with Hierarchical"
+    ):
+        elastic.condense(given.conditions, given.force)
