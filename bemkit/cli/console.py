@@ -15,6 +15,7 @@ from bemkit.contact.problem import Certificate
 from bemkit.geometry.shapes import Shape
 from bemkit.operators.counts import OperationCounts
 from bemkit.plan import Plan
+from bemkit.result_warning import ResultWarning
 from bemkit.results.between_nodes import BetweenNodes
 from bemkit.results.outputs import plain_table, stdout_console
 from bemkit.results.solution import Solution
@@ -56,7 +57,7 @@ def print_plan(title: str, plan: Plan) -> None:
     _print_warnings(plan.warnings, console)
 
 
-def _print_warnings(warnings: Sequence[str], console: Console) -> None:
+def _print_warnings(warnings: Sequence[ResultWarning], console: Console) -> None:
     for warning in warnings:
         console.print(Text(f"warning: {warning}", style="yellow"))
 

@@ -25,6 +25,7 @@ from bemkit.model.contact_model import Model, energy_beyond, map_fields
 from bemkit.operators.equilibrium import NOISE_FACTOR, round_off_of
 from bemkit.operators.rigid_modes import traction_free_modes
 from bemkit.operators.steklov_poincare import CondensedMap, SteklovPoincare
+from bemkit.result_warning import ResultWarning
 from bemkit.scene.unit_names import amount
 from bemkit.solvers.active_sets import NodeStatus
 from bemkit.solvers.base import ContactSolution, Status
@@ -85,7 +86,7 @@ def with_held_friction(
     return ContactState(state.displacement, np.stack([state.sigma_n, sigma_t], axis=1)), status
 
 
-def contact_warnings(model: Model, displacement: FloatArray, node_status: IntArray) -> tuple[str, ...]:
+def contact_warnings(model: Model, displacement: FloatArray, node_status: IntArray) -> tuple[ResultWarning, ...]:
     """Say where contact is closed at a large angle, and where supports push the body into an obstacle.
 
     Parameters
@@ -97,13 +98,13 @@ def contact_warnings(model: Model, displacement: FloatArray, node_status: IntArr
 
     Returns
     -------
-    tuple of str
-        At most one sentence of either kind for each contact part.
+    tuple of ResultWarning
+        At most one of either kind for each contact part.
     """
     return (*_oblique(model, node_status), *_pushed_in(model, displacement))
 
 
-def _oblique(model: Model, node_status: IntArray) -> list[str]:
+def _oblique(model: Model, node_status: IntArray) -> list[ResultWarning]:
     contact = model.contact
     angle = np.degrees(np.arccos(np.clip(contact.facing, -1.0, 1.0)))
     is_oblique = (node_status != NodeStatus.SEPARATED) & (angle > LARGEST_ANGLE)
@@ -112,13 +113,18 @@ def _oblique(model: Model, node_status: IntArray) -> list[str]:
         part = contact.parts[node]
         worst[part] = max(worst.get(part, 0.0), float(angle[node]))
     return [
-        f"Part {part!r} touches its obstacle at up to {degrees:.0f} degrees to its own normal, where small "
-        "displacements no longer describe how it lies down: describe the body in a position nearer to its final one."
+        ResultWarning(
+            "oblique contact",
+            part,
+            f"Part {part!r} touches its obstacle at up to {degrees:.0f} degrees to its own normal, where small "
+            "displacements no longer describe the contact: model the body nearer to its final position.",
+            degrees,
+        )
         for part, degrees in worst.items()
     ]
 
 
-def _pushed_in(model: Model, displacement: FloatArray) -> list[str]:
+def _pushed_in(model: Model, displacement: FloatArray) -> list[ResultWarning]:
     candidates, nodes = model.prepared.candidates, model.prepared.candidates.nodes
     overlap = np.sum(displacement[nodes.nodes] * nodes.directions, axis=1) - candidates.gap
     overlap[np.isin(nodes.nodes, model.nodes.nodes)] = -math.inf
@@ -128,10 +134,11 @@ def _pushed_in(model: Model, displacement: FloatArray) -> list[str]:
         if overlap[node] > SMALLEST_OVERLAP * np.abs(displacement).max():
             x, y = candidates.points[node]
             depth = amount(overlap[node], "length", model.scene.units, 3)
-            found.append(
+            text = (
                 f"Supports push part {part!r} {depth} into its obstacle at ({x:.6g}, {y:.6g}), where "
                 "contact cannot act: let them move with the obstacle, or leave a free element between them."
             )
+            found.append(ResultWarning("pushed into obstacle", part, text, float(overlap[node])))
     return found
 
 

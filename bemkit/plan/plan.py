@@ -28,6 +28,7 @@ from bemkit.operators.steklov_poincare.needs import (
     seconds_of,
 )
 from bemkit.operators.stopwatch import announce
+from bemkit.result_warning import ResultWarning
 from bemkit.scene.load_history import load_steps
 from bemkit.scene.registry import BODY_FORCES
 from bemkit.scene.scene import Scene
@@ -230,8 +231,8 @@ class Plan(ShownInNotebooks):
         On a common computer; tells milliseconds from seconds from minutes.
     items : tuple of PlanItem
         In the order in which they are used.
-    warnings : tuple of str
-        What will be doubtful about the result, one sentence each.
+    warnings : tuple of ResultWarning
+        What to check in the result, known before the solve.
     is_compressed : bool
         Whether the equations are compressed over a tree, so that memory grows like the number of elements.
     """
@@ -242,7 +243,7 @@ class Plan(ShownInNotebooks):
     memory: int
     seconds: float
     items: tuple[PlanItem, ...]
-    warnings: tuple[str, ...] = ()
+    warnings: tuple[ResultWarning, ...] = ()
     is_compressed: bool = False
 
     def as_dict(self) -> dict[str, Any]:
@@ -252,7 +253,7 @@ class Plan(ShownInNotebooks):
             "seconds": self.seconds,
             "work": self.work.as_dict(),
             "items": [item.as_dict() for item in self.items],
-            "warnings": list(self.warnings),
+            "warnings": [warning.as_dict() for warning in self.warnings],
         }
 
 

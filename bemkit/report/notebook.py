@@ -42,7 +42,7 @@ def notebook_html(value: object) -> str:
 
 
 def _result(result: Result) -> Element:
-    warnings = [element("li", warning) for warning in result.warnings]
+    warnings = [element("li", warning.text) for warning in result.warnings]
     doubts = [element("ul", *warnings)] if warnings else []
     return element("div", element("p", badge(result)), facts(headline_rows(result), "Result"), *doubts)
 

@@ -45,7 +45,7 @@ def headline_rows(result: Result) -> Iterator[tuple[str, str]]:
 
 def warnings_section(result: Result) -> list[Element]:
     """Return what is doubtful, one sentence each."""
-    sentences = [element("li", warning) for warning in result.warnings]
+    sentences = [element("li", warning.text) for warning in result.warnings]
     return [element("ul", *sentences) if sentences else element("p", "Nothing is known to be doubtful.")]
 
 

@@ -15,7 +15,7 @@ stranger runs no code. The layout, version 2:
                      programs, since they follow from the fields
     /contact, /transitions, /history    tables: one dataset per column, all of one length
     /plan, /work     texts: linear solver, sizes and counts as JSON
-    /warnings        texts, one sentence each; a file without them has none
+    /warnings        JSON: kind, subject, text and number of each
 
 Every array has an attribute `meaning` and, where the scene names its units, `unit`; see `bemkit.results.file_meanings`.
 
@@ -50,6 +50,7 @@ from bemkit.geometry.symmetry import Symmetry
 from bemkit.hdf5 import FileFormat, Reader, ResultFileError, rows_of, write_table, write_text
 from bemkit.operators.counts import OperationCounts
 from bemkit.plan import Plan
+from bemkit.result_warning import ResultWarning
 from bemkit.results.assembly_solution import AssemblySolution, BodyResult
 from bemkit.results.contact_table import ContactTable, Transition
 from bemkit.results.file_meanings import annotate
@@ -231,7 +232,7 @@ def _write_outcome(
     for name in ("plan", "work"):
         write_text(file, name, json.dumps(unstructure(getattr(solution, name))))
     file.create_group("memory").attrs.update(solution.memory)
-    write_table(file, {"warnings": list(solution.warnings)})
+    write_text(file, "warnings", json.dumps([unstructure(warning) for warning in solution.warnings]))
 
 
 def _read_outcome(reader: Reader, columns: tuple[str, ...] = ()) -> tuple[dict[str, Any], dict[str, FloatArray]]:
@@ -251,7 +252,7 @@ def _read_outcome(reader: Reader, columns: tuple[str, ...] = ()) -> tuple[dict[s
         "plan": structure(json.loads(reader.text("plan", _MAX_PLAN)), Plan),
         "work": structure(json.loads(reader.text("work", _MAX_PLAN)), OperationCounts),
         "memory": {name: int(value) for name, value in reader.attributes("memory").items()},
-        "warnings": reader.texts("warnings"),
+        "warnings": structure(json.loads(reader.text("warnings", _MAX_PLAN)), tuple[ResultWarning, ...]),
     }
     return outcome, further
 

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -17,6 +16,7 @@ from bemkit.errors import InputError
 from bemkit.notebook import ShownInNotebooks
 from bemkit.operators.counts import OperationCounts
 from bemkit.plan import Plan
+from bemkit.result_warning import ResultWarning, without_duplicates
 from bemkit.results.between_nodes import BetweenNodes
 from bemkit.results.contact_table import ContactTable, Transition
 from bemkit.results.load_history import LoadHistory, step_rows
@@ -54,8 +54,8 @@ class SolvedProblem(ShownInNotebooks):
         How the solver ended.
     memory : mapping of str to int [bytes]
         Largest memory of all arrays in each stage of the run; empty unless `tracemalloc` was tracing.
-    warnings : tuple of str
-        Doubts about the result, one sentence each; see `bemkit.results.warnings`.
+    warnings : tuple of ResultWarning
+        See `bemkit.results.warnings`.
     loading : LoadHistory, optional
         The steps up to this one; None without a load history.
     """
@@ -72,7 +72,7 @@ class SolvedProblem(ShownInNotebooks):
     work: OperationCounts
     message: str = ""
     memory: Mapping[str, int] = field(default_factory=dict)
-    warnings: WhenAsked[tuple[str, ...]] = WhenAsked(())  # noqa: RUF009 - a descriptor, shared by all on purpose
+    warnings: WhenAsked[tuple[ResultWarning, ...]] = WhenAsked(())  # noqa: RUF009 - a descriptor, shared by all on purpose
     loading: LoadHistory | None = None
 
     if TYPE_CHECKING:  # a field of the one kind, a property of the other
@@ -209,7 +209,7 @@ class SolvedProblem(ShownInNotebooks):
         """The warnings, or the function that will find them: what a solution that replaces this one takes over."""
         return WhenAsked.held(self, "warnings")
 
-    def with_warnings(self, warnings: tuple[str, ...] | Callable[[Any], tuple[str, ...]]) -> Self:
+    def with_warnings(self, warnings: tuple[ResultWarning, ...] | Callable[[Any], tuple[ResultWarning, ...]]) -> Self:
         """Return the same solution, with what it has computed, and other warnings.
 
         A function of the solution is called when the warnings are first read.
@@ -243,7 +243,7 @@ class SolvedProblem(ShownInNotebooks):
             "message": self.message or self.status.value,
             "converged": self.is_converged,
             "certified": self.is_certified,
-            "warnings": list(self.warnings),
+            "warnings": [warning.as_dict() for warning in self.warnings],
             **self._sizes(),
             "n_elements": self.n_elements,
             "n_contact": self.contact.n_contact,
@@ -310,7 +310,7 @@ def following(
 ) -> AnySolution:
     """Return a step of a load history with the records, solves, times, memory and warnings of all before it.
 
-    Of warnings that differ in numbers alone the last one is kept; `at_step` has those of a step.
+    Of each kind and subject of warnings the last one is kept; `at_step` has those of a step.
 
     Parameters
     ----------
@@ -328,17 +328,8 @@ def following(
     name = f"load step {number} of {n_steps}"
     before = () if so_far is None else (so_far,)
     total: AnySolution = with_totals(solution, [*before, solution], [*("" for _ in before), name])
-    warnings = unlike((*solution.warnings, *(text for earlier in before for text in earlier.warnings)))
+    warnings = without_duplicates((*solution.warnings, *(each for earlier in before for each in earlier.warnings)))
     loading = None if solution.loading is None else replace(solution.loading, asked=stated)
     message = f"{name}: {solution.message}"
     whole: AnySolution = replace(total, message=message, warnings=warnings, loading=loading)
     return whole
-
-
-def unlike(texts: Iterable[str]) -> tuple[str, ...]:
-    """Return sentences without those that differ from an earlier one in numbers and plurals alone."""
-    first: dict[str, str] = {}
-    for text in texts:
-        kind = re.sub(r", and \d+ more [a-z]+ like it|(?<=node)s|\d+(\.\d+)?(e[-+]?\d+)?", "", text)
-        first.setdefault(kind, text)
-    return tuple(first.values())

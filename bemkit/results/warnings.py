@@ -1,8 +1,9 @@
-"""Doubts about a certified solution, in sentences for its reader."""
+"""Warnings about a certified solution."""
 
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from itertools import chain
 from typing import TYPE_CHECKING
 
@@ -14,6 +15,7 @@ from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.neighbours import break_nodes
 from bemkit.geometry.vectors import norms
 from bemkit.operators.rigid_modes import without_motion
+from bemkit.result_warning import ResultWarning, first_of_each_kind
 from bemkit.results.between_nodes import BetweenNodes
 from bemkit.results.contact_table import ContactTable
 from bemkit.results.solution import Solution
@@ -38,8 +40,6 @@ STRAINED_SHARE = 0.05
 LARGEST_PENETRATION = 0.2
 """Penetration between the nodes, as `BetweenNodes` measures it, above which nodes do not feel the contact: a cylinder
 pressed by constant elements on a zone of six of them comes to that."""
-_MOST_ALIKE = 3
-"""Doubts of one kind about several bodies and contacts that are told."""
 LARGEST_DISTANCE_OFF = 0.2
 """Difference between distances from an obstacle after the displacement and the clearances that were solved, relative to
 the displacement that the contact force causes, above which contact is no longer where it was solved."""
@@ -49,44 +49,46 @@ _CLOSED = 1e-9
 """Clearance, relative to the largest one, up to which a node counts as closed: round-off of zero."""
 
 
-def find_warnings(solution: Solution | AssemblySolution) -> tuple[str, ...]:
-    """Return the doubts about a solution.
-
-    Returns
-    -------
-    tuple of str
-        One sentence for each doubt with its value and the remedy. Those of the plan come first. Of many doubts of one
-        kind about several bodies and contacts there are the first three.
-    """
+def find_warnings(solution: Solution | AssemblySolution) -> tuple[ResultWarning, ...]:
+    """Return the warnings about a solution, first those of its plan, at most three of each kind and their number."""
     if not solution.is_certified:
         return solution.plan.warnings
     remedy = _remedy(solution.solved_bodies)
-    of_all: list[Iterator[str]]
+    of_all: list[Iterator[ResultWarning]]
     titled: dict[str, SolvedBody]
     if isinstance(solution, Solution):
-        laws, of_all, titled = solution.scene.laws, [_error(solution), _turned(solution)], {"": solution}
+        laws, of_all = solution.scene.laws, [_error(solution), _turned(solution)]
+        titled = {"": solution}
     else:
         laws = {pair.name: solution.assembly.law_of(pair) for pair in solution.assembly.contacts}
         of_all = [_large(solution.estimated_error, remedy)]
-        titled = {f"Body {name!r}: ": body for name, body in solution.bodies.items()}
+        titled = dict(solution.bodies)
     smooth = {name for name, law in laws.items() if law.is_frictionless}
-    doubts = [
+    of_bodies = [_in_body(name, found) for name, body in titled.items() for found in _of_body(solution, body)]
+    found = [
         *of_all,
-        (title + doubt for title, body in titled.items() for doubt in _coarse_curves(body.mesh)),
-        (title + doubt for title, body in titled.items() for doubt in _large_strains(body)),
-        (title + doubt for title, body in titled.items() for doubt in _unbounded_tractions(solution, body)),
-        (title + doubt for title, body in titled.items() for doubt in _moved_contacts(body, solution.units)),
+        *of_bodies,
         _narrow_zones(solution.contact, smooth, remedy),
         _hidden_overlaps(solution.contacts_between_nodes, solution.contact, solution.units, remedy),
     ]
-    is_one = isinstance(solution, Solution)
-    return (*solution.plan.warnings, *chain(*(kind if is_one else _first(list(kind)) for kind in doubts)))
+    return (*solution.plan.warnings, *first_of_each_kind(chain.from_iterable(found)))
 
 
-def _first(doubts: list[str]) -> list[str]:
-    """Return the first few of doubts of one kind, and how many more there are."""
-    n_more = len(doubts) - _MOST_ALIKE
-    return doubts if n_more <= 0 else [*doubts[:_MOST_ALIKE], f"There are {n_more} more doubts like the last one."]
+def _of_body(solution: Solution | AssemblySolution, body: SolvedBody) -> tuple[Iterator[ResultWarning], ...]:
+    """Return the kinds of warnings about one body."""
+    return (
+        _coarse_curves(body.mesh),
+        _large_strains(body),
+        _unbounded_tractions(solution, body),
+        _moved_contacts(body, solution.units),
+    )
+
+
+def _in_body(name: str, warnings: Iterable[ResultWarning]) -> Iterator[ResultWarning]:
+    """Name the body in warnings about it; the single body of a scene has no name."""
+    for warning in warnings:
+        subject = f"{name} {warning.subject}".strip()
+        yield replace(warning, subject=subject, text=f"Body {name!r}: {warning.text}") if name else warning
 
 
 def _remedy(bodies: Iterable[SolvedBody]) -> str:
@@ -98,35 +100,39 @@ def _remedy(bodies: Iterable[SolvedBody]) -> str:
     return "use more elements, or give an accuracy"
 
 
-def _unbounded_tractions(solution: Solution | AssemblySolution, body: SolvedBody) -> list[str]:
-    """Doubt the largest contact tractions where estimates of their error leave a corner out."""
+def _unbounded_tractions(solution: Solution | AssemblySolution, body: SolvedBody) -> Iterator[ResultWarning]:
+    """Warn of singular contact tractions, whose estimated error excludes the corner."""
     if body.coefficient_errors is None:
-        return []
-    doubts = []
+        return
     for corner in solution.corners_of(body):
         length = amount(float(body.mesh.lengths[list(corner.elements)].sum()), "length", solution.units, 2)
-        doubts.append(
-            f"Contact tractions have no bound at ({corner.x:.4g}, {corner.y:.4g}), where they grow like "
-            f"r^{corner.exponent - 1.0:.2g}: judge by forces, or round the corner. Their estimated error leaves out "
-            f"{length} there."
+        point = f"({corner.x:.4g}, {corner.y:.4g})"
+        yield ResultWarning(
+            "singular contact traction",
+            point,
+            f"Contact tractions are singular at {point} (r^{corner.exponent - 1.0:.2g}). Use forces instead of peak "
+            f"values, or round the corner. The estimated error of tractions excludes {length} there.",
+            corner.exponent - 1.0,
         )
-    return _first(doubts)
 
 
-def _large(error: float | None, remedy: str) -> Iterator[str]:
+def _large(error: float | None, remedy: str) -> Iterator[ResultWarning]:
     if error is not None and error > LARGEST_ERROR:
-        yield f"The estimated error is {100.0 * error:.2g} %: {remedy}."
+        text = f"The estimated error is {100.0 * error:.2g} %: {remedy}."
+        yield ResultWarning("large estimated error", "", text, error)
 
 
-def _error(solution: Solution) -> Iterator[str]:
-    """Doubt a large estimated error, and an error that could not be estimated."""
+def _error(solution: Solution) -> Iterator[ResultWarning]:
+    """Warn of a large estimated error, and of an error that could not be estimated."""
     discretisation = solution.scene.discretisation
     if not discretisation.estimates_error:
         return
     error = solution.estimated_error
     if error is None:
         energy = f"the elastic energy, {amount(solution.energy, 'energy', solution.units, 2)}, is not positive"
-        yield f"No error could be estimated, because {energy}: use more elements, or bring body and obstacle together."
+        remedy = "use more elements, or bring body and obstacle together"
+        text = f"No error could be estimated, because {energy}: {remedy}."
+        yield ResultWarning("no estimated error", "", text, solution.energy)
     yield from _large(error, _remedy((solution,)))
     if solution.coefficient_errors is not None:
         return  # elements of high degree are judged by themselves
@@ -134,9 +140,12 @@ def _error(solution: Solution) -> Iterator[str]:
     whole = solution.mesh.whole
     is_alone = break_nodes(whole)[whole.elements].all(axis=1)
     if (share := whole.lengths[is_alone].sum() / whole.lengths.sum()) > LARGEST_SHARE_ALONE:
-        yield (
-            f"On {100.0 * share:.0f} % of the boundary single elements stand between corners and ends of parts, where "
-            "no error can be estimated: use more elements."
+        yield ResultWarning(
+            "single elements",
+            "",
+            f"{100.0 * share:.0f} % of the boundary consists of pieces with one element, where no error can be "
+            "estimated: use more elements.",
+            float(share),
         )
     from bemkit.results.error_indicators import blind_elements
 
@@ -145,14 +154,17 @@ def _error(solution: Solution) -> Iterator[str]:
         elements = solution.mesh.part(part.name)
         if isinstance(part.condition, Clamped | Roller | PrescribedDisplacement) and is_blind[elements].any():
             count = "1 element" if elements.size == 1 else f"{elements.size} elements"
-            yield (
+            yield ResultWarning(
+                "held part with few elements",
+                part.name,
                 f"Part {part.name!r} has {count}, too few to estimate the error of its reactions: "
-                "use more elements there."
+                "use more elements there.",
+                elements.size,
             )
 
 
-def _turned(solution: Solution) -> Iterator[str]:
-    """Doubt constant elements without slopes, which take rotation for strain, if the rotation is larger."""
+def _turned(solution: Solution) -> Iterator[ResultWarning]:
+    """Warn of constant elements without slopes, which take rotation for strain, if the rotation is larger."""
     discretisation, mesh = solution.scene.discretisation, solution.mesh
     if discretisation.keeps_rotations:
         return
@@ -161,28 +173,34 @@ def _turned(solution: Solution) -> Iterator[str]:
     motion = displacement - strained
     turn = np.hypot(*(motion - motion.mean(axis=0)).T).max() / np.hypot(*(points - points.mean(axis=0)).T).max()
     if turn * mesh.lengths.max() > np.abs(strained).max():
-        yield (
-            f"The body turns by {turn:.2g}, which moves the ends of constant elements without slopes by more than it "
-            "is strained, and is taken for strain: use slopes, or linear elements."
+        yield ResultWarning(
+            "rotation taken for strain",
+            "",
+            f"The body rotates by {turn:.2g}, which moves the ends of constant elements without slopes by more than "
+            "the strain, and would be mistaken for strain: use slopes, or linear elements.",
+            float(turn),
         )
 
 
-def _large_strains(body: SolvedBody) -> Iterator[str]:
-    """Doubt displacements that vary too much along the boundary to be small, by strain or by rotation."""
+def _large_strains(body: SolvedBody) -> Iterator[ResultWarning]:
+    """Warn of displacements that vary too much along the boundary to be small, by strain or by rotation."""
     gradients, lengths = boundary_gradients(body)
     largest_first = np.argsort(gradients)[::-1]
     share = np.cumsum(lengths[largest_first]) / lengths.sum()
     strain = gradients[largest_first[np.searchsorted(share, STRAINED_SHARE)]]
     if strain > LARGEST_STRAIN:
-        yield (
+        yield ResultWarning(
+            "large strain",
+            "",
             f"Strains and rotations exceed {strain:.2g} on {100.0 * STRAINED_SHARE:.0f} % of the boundary, far outside "
             "small displacements, where results are proportional to loads but not true: check the units of loads "
-            "and of Young's modulus, or load less."
+            "and of Young's modulus, or load less.",
+            float(strain),
         )
 
 
-def _moved_contacts(body: SolvedBody, units: UnitNames | None) -> Iterator[str]:
-    """Doubt contacts with obstacles along which the body moves so far that their gaps have become others."""
+def _moved_contacts(body: SolvedBody, units: UnitNames | None) -> Iterator[ResultWarning]:
+    """Warn of contacts with obstacles along which the body moves so far that their gaps have become others."""
     if not body.scene.contact_parts:
         return
     from bemkit.results.moved_contacts import distances_off
@@ -191,10 +209,13 @@ def _moved_contacts(body: SolvedBody, units: UnitNames | None) -> Iterator[str]:
         if off > LARGEST_DISTANCE_OFF * length:
             distance = amount(off, "length", units, 2)
             share = f"{100.0 * off / length:.0f} % of" if off < length else "more than"
-            yield (
+            yield ResultWarning(
+                "moved contact",
+                name,
                 f"Part {name!r} moves so far that its contact ends {distance} off the obstacle, {share} the "
-                "displacement that its contact force causes: gaps and normals are those of the undeformed body; "
-                "draw it where it will touch."
+                "displacement that its contact force causes: gaps and normals are those of the undeformed body. "
+                "Model the body in its final position.",
+                off,
             )
 
 
@@ -214,8 +235,8 @@ def boundary_gradients(body: SolvedBody) -> tuple[FloatArray, FloatArray]:
     return norms(displacement[after] - displacement[before]) / lengths, lengths
 
 
-def _coarse_curves(mesh: BoundaryMesh) -> Iterator[str]:
-    """Doubt elements that go around a large part of a circle: their error is not yet that of short elements."""
+def _coarse_curves(mesh: BoundaryMesh) -> Iterator[ResultWarning]:
+    """Warn of elements that go around a large part of a circle: their error is not yet that of short elements."""
     curved = np.flatnonzero(~mesh.is_straight)
     if not curved.size:
         return
@@ -224,14 +245,17 @@ def _coarse_curves(mesh: BoundaryMesh) -> Iterator[str]:
     turn = np.degrees(np.arccos(np.clip(cosines, -1.0, 1.0))).sum(axis=0)
     if turn.max() > LARGEST_TURN:
         x, y = mesh.centres[curved[np.argmax(turn)]]
-        yield (
+        yield ResultWarning(
+            "coarse curve",
+            "",
             f"The boundary turns by {turn.max():.0f} degrees on one element, near ({x:.4g}, {y:.4g}), where no error "
-            "estimate holds: use more elements there."
+            "estimate holds: use more elements there.",
+            float(turn.max()),
         )
 
 
-def _narrow_zones(contact: ContactTable, smooth: Collection[str], remedy: str) -> Iterator[str]:
-    """Doubt zones of contact, stick and slip of few nodes; of smooth parts, without friction, of contact alone."""
+def _narrow_zones(contact: ContactTable, smooth: Collection[str], remedy: str) -> Iterator[ResultWarning]:
+    """Warn of zones of contact, stick and slip of few nodes; of smooth parts, without friction, of contact alone."""
     words = np.array(contact.status_words(), dtype=object)
     # friction that acts across a gap sticks or slips without contact
     clearance = np.where(np.isfinite(contact.clearance), contact.clearance, 0.0)
@@ -254,8 +278,8 @@ def _narrow_zones(contact: ContactTable, smooth: Collection[str], remedy: str) -
 
 def _hidden_overlaps(
     contacts: Mapping[str, BetweenNodes], table: ContactTable, units: UnitNames | None, remedy: str
-) -> Iterator[str]:
-    """Doubt contacts whose sides overlap between the nodes, by a share of the displacement by contact forces."""
+) -> Iterator[ResultWarning]:
+    """Warn of contacts whose sides overlap between the nodes, by a share of the displacement by contact forces."""
     is_pressed = bool(table.sigma_n.any() or table.sigma_t.any())
     length = (
         "the displacement that contact forces cause" if is_pressed else "how far bodies move, without contact forces"
@@ -264,9 +288,12 @@ def _hidden_overlaps(
         if between.penetration > LARGEST_PENETRATION:
             depth = amount(between.penetration_depth, "length", units, 2)
             share = f"{100.0 * between.penetration:.0f} % of" if between.penetration < 1.0 else "more than"
-            yield (
-                f"Between its nodes part {name!r} is {depth} deep in what it touches, {share} {length}: "
-                f"{_there(remedy)}."
+            yield ResultWarning(
+                "overlap between nodes",
+                name,
+                f"Contact {name!r}: the sides overlap by {depth} between the nodes ({share} {length}): "
+                f"{_there(remedy)}.",
+                between.penetration_depth,
             )
 
 
@@ -277,11 +304,12 @@ def _zones(contact: ContactTable, chosen: BoolArray) -> list[IntArray]:
     return [zone for zone in np.split(nodes, np.flatnonzero(is_end) + 1) if zone.size]
 
 
-def _narrow(part: str, kind: str, zones: Sequence[FloatArray], remedy: str) -> str:
+def _narrow(part: str, kind: str, zones: Sequence[FloatArray], remedy: str) -> ResultWarning:
     nodes = "1 node" if zones[0].size == 1 else f"{zones[0].size} nodes"
     n_more, middle = len(zones) - 1, float(zones[0].mean())
     more = f", and {n_more} more {'zone' if n_more == 1 else 'zones'} like it" if n_more else ""
-    return f"A {kind} zone of part {part!r} at s = {middle:.4g} has only {nodes}{more}: {_there(remedy)}."
+    text = f"A {kind} zone of part {part!r} at s = {middle:.4g} has only {nodes}{more}: {_there(remedy)}."
+    return ResultWarning(f"narrow {kind} zone", part, text, zones[0].size)
 
 
 def _there(remedy: str) -> str:

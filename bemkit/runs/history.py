@@ -20,6 +20,7 @@ from bemkit.model.prepared import Prepared, prepare_steps
 from bemkit.model.solved_contact import contact_warnings, with_energy_checked, with_held_friction
 from bemkit.operators.stopwatch import Stage, StageClock
 from bemkit.plan import Plan, check_elements, plan_steps
+from bemkit.result_warning import ResultWarning
 from bemkit.results.contact_table import ContactTable, find_transitions
 from bemkit.results.solution import BoundaryFields, Solution
 from bemkit.results.solved_problem import SolvedSteps
@@ -138,11 +139,11 @@ def solution_of(
         work=model.work,
         message=result.message,
     )
-    return solution.with_warnings(partial(_doubts, of_contact))
+    return solution.with_warnings(partial(_warnings, of_contact))
 
 
-def _doubts(of_contact: tuple[str, ...], solution: Solution) -> tuple[str, ...]:
-    """Return what is doubtful about a solution, last what is about its contact."""
+def _warnings(of_contact: tuple[ResultWarning, ...], solution: Solution) -> tuple[ResultWarning, ...]:
+    """Return the warnings about a solution, last those about its contact."""
     return (*find_warnings(solution), *of_contact)
 
 

@@ -17,6 +17,7 @@ from bemkit.geometry.meshing.discretise import Grading, Uniform, discretise
 from bemkit.geometry.meshing.division import divide
 from bemkit.geometry.outline import Outline, Selection
 from bemkit.geometry.symmetry import Symmetry
+from bemkit.result_warning import ResultWarning
 
 if TYPE_CHECKING:
     from bemkit.geometry.meshing.partition import Partition
@@ -166,8 +167,8 @@ class MeshOptions:
 
 
 @lru_cache(maxsize=4)  # the plan and the choice of a linear solver ask for it, and it takes a while on large meshes
-def thinness_warnings(mesh: BoundaryMesh) -> tuple[str, ...]:
-    """Warn in one sentence if elements of collocation are too long for the thickness of the body."""
+def thinness_warnings(mesh: BoundaryMesh) -> tuple[ResultWarning, ...]:
+    """Warn if elements of collocation are too long for the thickness of the body."""
     if mesh.is_exterior:
         return ()
     longest = mesh.lengths / thicknesses(mesh, mesh.lengths / _LONGEST)
@@ -175,10 +176,11 @@ def thinness_warnings(mesh: BoundaryMesh) -> tuple[str, ...]:
     if mesh.lengths[is_thin].sum() <= _SHARE * mesh.lengths.sum():
         return ()
     factor = float(np.median(longest[is_thin])) / _LONGEST
-    return (
+    text = (
         f"collocation: on {int(np.count_nonzero(is_thin))} of {mesh.n_elements} elements the body is thinner than the "
-        f"elements are long, and bends too stiffly: take {factor:.1f} times as many elements, or quadratic Galerkin",
+        f"elements are long, and bends too stiffly: take {factor:.1f} times as many elements, or quadratic Galerkin"
     )
+    return (ResultWarning("thin body", "", text, factor),)
 
 
 def thicknesses(mesh: BoundaryMesh, reach: FloatArray | float = np.inf) -> FloatArray:

@@ -13,6 +13,7 @@ from bemkit.model.contact_data import find_contact
 from bemkit.model.contact_model import Model, build_model
 from bemkit.model.prepared import prepare
 from bemkit.model.solved_contact import contact_warnings
+from bemkit.result_warning import ResultWarning
 from bemkit.solvers.base import solve
 from tests.slow import slow_except
 
@@ -202,7 +203,7 @@ def test_obstacles_may_turn_their_directions_from_step_to_step() -> None:
     np.testing.assert_allclose(second.contact.sigma_n, alone.contact.sigma_n, atol=1e-9 * 1e4)  # E, certificate
 
 
-def warnings_of(scene: bk.Scene) -> tuple[str, ...]:
+def warnings_of(scene: bk.Scene) -> tuple[ResultWarning, ...]:
     model: Model = build_model(prepare(scene, scene.build_mesh()))
     result = solve(model.problem, scene.solver)
     displacement, _, _ = model.boundary_fields(result.state)
@@ -215,16 +216,17 @@ def test_contact_at_a_large_angle_is_warned_of() -> None:
     (warning,) = warnings_of(
         block(bk.Part("chamfer", steep, sides=("bottom",)), press, bk.Part("guide", bk.Roller(), sides=("left",)))
     )
-    assert "Part 'chamfer' touches its obstacle at up to 45 degrees to its own normal" in warning
+    assert "Part 'chamfer' touches its obstacle at up to 45 degrees to its own normal" in warning.text
+    assert (warning.kind, warning.subject, warning.number) == ("oblique contact", "chamfer", pytest.approx(45.0))
     assert warnings_of(block(FLOOR_PART, press)) == ()
 
 
 def test_solutions_carry_these_warnings() -> None:
     press = bk.Part("press", bk.PrescribedDisplacement(x=1e-3, y=0.0), sides=("top",))
-    assert any("Supports push part 'wall'" in warning for warning in bk.run(block(WALL_PART, press)).warnings)
+    assert any("Supports push part 'wall'" in warning for warning in map(str, bk.run(block(WALL_PART, press)).warnings))
 
 
 def test_a_support_that_drives_the_body_into_an_obstacle_is_warned_of() -> None:
     press = bk.Part("press", bk.PrescribedDisplacement(x=1e-3, y=0.0), sides=("top",))
     (warning,) = warnings_of(block(WALL_PART, press))
-    assert "Supports push part 'wall' 0.001 into its obstacle at (1, 1)" in warning
+    assert "Supports push part 'wall' 0.001 into its obstacle at (1, 1)" in warning.text

@@ -11,6 +11,7 @@ import pytest
 
 import bemkit as bk
 from bemkit.report.notebook import notebook_html
+from bemkit.result_warning import ResultWarning
 from bemkit.scene.toml import with_overrides
 from tests.report.test_page import Page
 
@@ -54,7 +55,7 @@ def test_load_steps_show_a_table_of_the_first_and_last_and_the_friction_loop(mon
 
 def test_doubts_are_shown() -> None:
     solution = bk.run(with_overrides(bk.load_scene("paper-1"), elements=24))
-    doubted = solution.with_warnings(("Something is doubtful.",))
+    doubted = solution.with_warnings((ResultWarning("test", "", "Something is doubtful."),))
     assert "Something is doubtful." in Page(doubted._repr_html_()).texts
 
 

@@ -16,6 +16,7 @@ import bemkit as bk
 from bemkit.atomic_files import OutputFileError
 from bemkit.cli.main import main
 from bemkit.report.page import report, save_report
+from bemkit.result_warning import ResultWarning
 from bemkit.scene.toml import with_overrides
 from tests.slow import slow_except
 
@@ -114,7 +115,9 @@ def test_everyone_can_read_it(page: Page) -> None:
 
 def test_doubts_and_failures_are_told(solution: bk.Solution, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("bemkit.report.page.has_pictures", lambda: False)
-    doubted = Page(report(solution.with_warnings(("The estimated error is 7 %: use more elements.",))))
+    doubted = Page(
+        report(solution.with_warnings((ResultWarning("test", "", "The estimated error is 7 %: use more elements."),)))
+    )
     assert "The estimated error is 7 %: use more elements." in doubted.texts
     failed = Page(report(dataclasses.replace(solution, status=bk.Status.STALLED, message="It stalled.")))
     assert {"class": "badge bad"} in failed.of("strong")

@@ -173,11 +173,14 @@ def test_what_is_left_out_is_near_the_corners_and_told() -> None:
         assert following in solution.contact_elements
         assert lengths[list(corner.elements)].sum() + lengths[following] > 1e-3
         assert np.abs(solution.mesh.centres[tip] - (corner.x, corner.y)).max() == pytest.approx(0.5 * lengths[tip])
-    told = [text for text in solution.warnings if "have no bound" in text]
+    told = [text for text in map(str, solution.warnings) if "tractions are singular" in text]
     assert len(told) == 2
-    assert "at (0, 0), where they grow like r^-0.29" in told[0]
+    assert "at (0, 0) (r^-0.29)" in told[0]
     assert solution.summary()["singular_corners"] == [corner.as_dict() for corner in solution.singular_corners]
-    assert not any("have no bound" in text for text in bk.run(replace(BLOCK, discretisation=bk.Galerkin(2))).warnings)
+    assert not any(
+        "tractions are singular" in text
+        for text in map(str, bk.run(replace(BLOCK, discretisation=bk.Galerkin(2))).warnings)
+    )
 
 
 def test_short_elements_at_a_corner_belong_to_it_and_long_ones_do_not() -> None:
@@ -227,8 +230,8 @@ def test_bodies_of_an_assembly_leave_out_corners_and_edges() -> None:
         assert near < left_out
         x = body.mesh.centres[sorted(left_out - near), 0]
         assert np.abs(np.abs(x - 0.5) - 0.2).max() < 0.01
-    (told,) = [text for text in solution.warnings if "have no bound" in text]
-    assert told.startswith("Body 'lower': Contact tractions have no bound at (1, 0)")
+    (told,) = [text for text in map(str, solution.warnings) if "tractions are singular" in text]
+    assert told.startswith("Body 'lower': Contact tractions are singular at (1, 0)")
     assert [corner["body"] for corner in solution.summary()["singular_corners"]] == ["lower"]
 
 

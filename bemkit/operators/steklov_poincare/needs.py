@@ -20,6 +20,7 @@ from bemkit.operators.linear.threads import n_threads
 from bemkit.operators.material import Material
 from bemkit.operators.rigid_modes import admissible_modes
 from bemkit.operators.steklov_poincare.nodal_conditions import GivenData, NodalConditions
+from bemkit.result_warning import ResultWarning
 
 _BYTES = 8
 CONTACT_STEPS = 8
@@ -118,8 +119,8 @@ class BodyNeeds:
         Of closed-form integrals, at one point for one element, on each thread.
     flops : float
         Of dense linear algebra.
-    warnings : tuple of str
-        What will be doubtful about the result, one sentence each.
+    warnings : tuple of ResultWarning
+        What to check in the result, known before the solve.
     is_matrix_free : bool
         Whether the contact problem has no matrix either: all of its work and memory is counted here.
     """
@@ -130,7 +131,7 @@ class BodyNeeds:
     kept: int = 0
     evaluations: float = 0.0
     flops: float = 0.0
-    warnings: tuple[str, ...] = ()
+    warnings: tuple[ResultWarning, ...] = ()
     is_matrix_free: bool = False
 
     @property

@@ -128,7 +128,7 @@ def judge(steps: Iterable[Solution] | Iterable[AssemblySolution]) -> tuple[Outco
     if not last.is_converged:
         return Outcome.NAMED, last.status.name.lower(), last.message or last.status.value
     if any(step.warnings for step in solutions):
-        return Outcome.WARNED, "warning", "; ".join(sorted({text for step in solutions for text in step.warnings}))
+        return Outcome.WARNED, "warning", "; ".join(sorted({each.text for step in solutions for each in step.warnings}))
     return Outcome.SUCCESS, "", ""
 
 

@@ -139,7 +139,7 @@ def test_points_in_each_other_between_nodes_are_doubted() -> None:
     check = check_assembly(solution)
     assert check.is_good
     assert check.needs_warning == "hidden_overlap"
-    assert any("contact zone of part 'disc.low / plate.top'" in warning for warning in solution.warnings)
+    assert any("contact zone of part 'disc.low / plate.top'" in warning for warning in map(str, solution.warnings))
     assert judge([solution])[0] is Outcome.WARNED
     assert judge([replace(solution, warnings=())])[:2] == (Outcome.WRONG, "hidden_overlap")
     belittled = replace(solution)

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 import bemkit as bk
+from bemkit.result_warning import ResultWarning
 from bemkit.scene.toml import scene_from_toml
 from bemkit.studies.engine import compute_with_progress
 from bemkit.studies.stability.random_scenes import RandomCase, random_case
@@ -185,7 +186,10 @@ def test_fields_of_another_body_are_wrong_unless_the_solution_says_that_it_is_co
         warnings=(),
     )
     assert judge([strained])[:2] == (Outcome.WRONG, "reciprocity")
-    assert judge([dataclasses.replace(strained, warnings=("use more elements",))])[0] is Outcome.WARNED
+    assert (
+        judge([dataclasses.replace(strained, warnings=(ResultWarning("test", "", "use more elements"),))])[0]
+        is Outcome.WARNED
+    )
 
 
 def test_a_status_is_a_named_failure() -> None:
