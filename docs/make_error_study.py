@@ -61,10 +61,10 @@ def save_small(figure: Figure, path: Path) -> None:
 
 def study(scene: bk.Scene, reference: Reference) -> list[ErrorRecord]:
     """Return the rows: all elements and meshes by Newton, and the smaller ones by the augmented Lagrangian too."""
-    elements = (bk.ConstantCollocation(), bk.LinearGalerkin(), bk.QuadraticGalerkin())
+    elements = (bk.ConstantCollocation(), bk.Galerkin(1), bk.Galerkin(2))
     meshes = (uniform(ELEMENTS), graded(ELEMENTS), adaptive(ACCURACIES))
     newton = all_runs(scene, elements, meshes, [bk.SemismoothNewton()])
-    newton += all_runs(scene, [bk.HpGalerkin()], [adaptive(RISING, FINEST)], [bk.SemismoothNewton()])
+    newton += all_runs(scene, ["hp"], [adaptive(RISING, FINEST)], [bk.SemismoothNewton()])
     few = (uniform(ELEMENTS[:-1]), adaptive(ACCURACIES[:2]))
     augmented = all_runs(scene, elements, few, [bk.AugmentedLagrangian()])
     # the finest meshes are for constant elements, which are fast and need them

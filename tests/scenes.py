@@ -59,7 +59,7 @@ class Perforated:
 def paper(example: int, discretisation: Any = None, mesh: bk.MeshOptions | None = None) -> bk.Scene:
     """One of the paper's examples."""
     scene = bk.load_scene(f"paper-{example}")
-    discretisation = bk.QuadraticGalerkin() if discretisation is None else discretisation
+    discretisation = bk.Galerkin(2) if discretisation is None else discretisation
     return dataclasses.replace(scene, discretisation=discretisation, mesh=scene.mesh if mesh is None else mesh)
 
 
@@ -76,7 +76,7 @@ def wavy() -> bk.Scene:
             bk.Part("right", bk.Roller(), sides=("right",)),
             bk.Part("load", bk.Pressure(0.0172616), sides=("top",)),
         ),
-        discretisation=bk.QuadraticGalerkin(),
+        discretisation=bk.Galerkin(2),
     )
 
 
@@ -92,7 +92,7 @@ def disc(approach: float = 0.0160341) -> bk.Scene:
             bk.Part("top", bk.Roller(), sides=("top",)),
             bk.Part("left", bk.Roller(), sides=("left",)),
         ),
-        discretisation=bk.QuadraticGalerkin(),
+        discretisation=bk.Galerkin(2),
     )
 
 
@@ -108,7 +108,7 @@ def angle() -> bk.Scene:
             bk.Part("wall", bk.Clamped(), sides=("back",)),
             bk.Part("load", bk.Traction(y=-1e-3), sides=("end",)),
         ),
-        discretisation=bk.QuadraticGalerkin(),
+        discretisation=bk.Galerkin(2),
     )
 
 
@@ -182,7 +182,7 @@ def contact_values(solution: bk.Solution, example: int, name: str) -> Any:
     return np.einsum("pn,np->n", space.basis(xi), at_dofs[space.element_dofs[own]])
 
 
-DISCRETISATIONS = (bk.LinearGalerkin(), bk.QuadraticGalerkin(), bk.ConstantCollocation())
+DISCRETISATIONS = (bk.Galerkin(1), bk.Galerkin(2), bk.ConstantCollocation())
 
 
 def square(**changes: object) -> bk.Scene:
@@ -251,7 +251,7 @@ class EccentricRing:
         return Outline((bk.Disk(1.0).outline().loops[0], hole))
 
 
-LINEAR, CONSTANT = bk.LinearGalerkin(), bk.ConstantCollocation()
+LINEAR, CONSTANT = bk.Galerkin(1), bk.ConstantCollocation()
 FLOOR = bk.Part("floor", bk.Contact(bk.HalfPlane()), sides=("bottom",))
 
 

@@ -21,6 +21,7 @@ from bemkit.results.part_forces import RigidResult
 from bemkit.results.solution import Solution
 from bemkit.scene.assembly import Assembly
 from bemkit.scene.conditions import Part
+from bemkit.scene.discretisation import on_whole_body
 from bemkit.scene.load_history import load_steps
 from bemkit.scene.plane_motion import RigidBody
 from bemkit.scene.scene import Scene
@@ -145,7 +146,7 @@ def shown(subject: Drawable) -> Shown:
 
 
 def _body(scene: Scene, mesh: BoundaryMesh, displacement: FloatArray | None = None) -> ShownBody:
-    whole = scene.discretisation.of_images(mesh.whole.n_elements // mesh.n_elements)
+    whole = on_whole_body(scene.discretisation, mesh)
     space, half = whole.displacement_space(mesh.whole), scene.discretisation.displacement_space(mesh)
     if displacement is None:
         displacement = np.zeros((half.n_dofs // 2, 2))

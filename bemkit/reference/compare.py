@@ -20,7 +20,7 @@ from bemkit.geometry.quadrature import gauss_legendre
 from bemkit.geometry.spaces import element_nodes
 from bemkit.results.contact_table import FLICKER
 from bemkit.results.solution import Solution
-from bemkit.scene.discretisation import HpGalerkin, QuadraticGalerkin
+from bemkit.scene.discretisation import Galerkin
 from bemkit.scene.mesh_options import MeshOptions
 from bemkit.scene.scene import Scene
 
@@ -246,9 +246,9 @@ def _fine_solutions(scene: Scene, most_elements: int) -> list[Solution]:
     from bemkit.runs.run import run
 
     if scene.n_steps == 1:
-        options = MeshOptions(accuracy=FINEST, most_elements=most_elements)
-        return list(run_adaptive(replace(scene, discretisation=HpGalerkin(), mesh=options)))
-    scene, counts = replace(scene, discretisation=QuadraticGalerkin()), (most_elements // 2, most_elements)
+        options = MeshOptions(accuracy=FINEST, most_elements=most_elements, rising_degrees=True)
+        return list(run_adaptive(replace(scene, discretisation=Galerkin(2), mesh=options)))
+    scene, counts = replace(scene, discretisation=Galerkin(2)), (most_elements // 2, most_elements)
     return [run(replace(scene, mesh=MeshOptions(elements=n, grading=Algebraic(3.0)))) for n in counts]
 
 

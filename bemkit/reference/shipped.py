@@ -20,11 +20,11 @@ from bemkit.reference.compare import Answer, Places, Reference, Zone
 from bemkit.reference.disc import DiscBetweenPlates
 from bemkit.reference.pressure import places_along
 from bemkit.reference.wavy import WavyObstacle
-from bemkit.scene.discretisation import LinearGalerkin
+from bemkit.scene.discretisation import Galerkin
 from bemkit.scene.mesh_options import MeshOptions
 from bemkit.scene.scene import Scene
 from bemkit.scene.toml import load_single_body
-from bemkit.solvers.fallbacks import Fallbacks
+from bemkit.solvers.ssn import SemismoothNewton
 
 
 def find_reference(scene: Scene) -> Reference | None:
@@ -54,8 +54,8 @@ def _problem(scene: Scene) -> Scene:
         description="",
         reference="",
         mesh=MeshOptions(),
-        discretisation=LinearGalerkin(),
-        solver=Fallbacks(),
+        discretisation=Galerkin(1),
+        solver=SemismoothNewton(),
     )
 
 

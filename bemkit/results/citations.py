@@ -15,10 +15,10 @@ from bemkit.results.assembly_solution import AssemblySolution
 from bemkit.results.solution import Solution
 from bemkit.scene.assembly import Assembly
 from bemkit.scene.body import Body
-from bemkit.scene.discretisation import ConstantCollocation, Discretisation
+from bemkit.scene.discretisation import ConstantCollocation, Discretisation, Galerkin
 from bemkit.scene.registry import LAWS, SOLVERS
 from bemkit.scene.scene import Scene
-from bemkit.solvers.fallbacks import drivers_at_work
+from bemkit.solvers.ssn import PATH_MESSAGE, SPRINGS_MESSAGE
 from bemkit.version import __version__
 
 PACKAGE = "bemkit"
@@ -27,8 +27,6 @@ _NEWTON = ("HintermuellerItoKunisch2002", "HueeberStadlerWohlmuth2008", "Christe
 DRIVERS: Mapping[str, tuple[str, ...]] = MappingProxyType(
     {
         "semismooth-newton": _NEWTON,
-        "springs": ("Rockafellar1976",),
-        "solution-path": ("Lemke1965", "CottlePangStone1992"),
         "augmented-lagrangian": ("Paper", "Stadler2004"),
         "fixed-point": ("NecasJarusekHaslinger1980", *_NEWTON),
         "lemke": ("Lemke1965", "CottlePangStone1992", "StewartTrinkle1996"),
@@ -176,7 +174,8 @@ def cite(subject: Scene | Assembly | Solution | AssemblySolution) -> Citations:
     Parameters
     ----------
     subject : Scene, Assembly, Solution or AssemblySolution
-        A solution tells more than its scene: the linear solver that was chosen, and which drivers took part.
+        A solution tells more than its scene: the linear solver that was chosen, and whether the driver had to follow
+        paths of solutions or to hold bodies by springs.
 
     Returns
     -------
@@ -184,8 +183,7 @@ def cite(subject: Scene | Assembly | Solution | AssemblySolution) -> Citations:
         ``print`` shows the methods with their works; `Citations.bibtex` has them for a BibTeX file.
     """
     stated = subject if isinstance(subject, Scene | Assembly) else subject.stated
-    messages = [] if isinstance(subject, Scene | Assembly) else [record.message for record in subject.history]
-    methods = [Method("bemkit", (PACKAGE,)), *_of_bodies(stated), *_of_contact(stated, messages)]
+    methods = [Method("bemkit", (PACKAGE,)), *_of_bodies(stated), *_of_contact(stated)]
     if not isinstance(subject, Scene | Assembly):
         methods += _of_run(subject)
     return Citations(tuple(dict.fromkeys(methods)), stated.reference)
@@ -198,7 +196,9 @@ def _of_bodies(stated: Scene | Assembly) -> Iterator[Method]:
     if len(with_boundary) < len(bodies):
         yield Method("flexibility of the surface of a half-plane in closed form", ("Johnson1985",))
     for discretisation in (body.discretisation or stated.discretisation for body in with_boundary):
-        yield from _of_discretisation(discretisation, is_adaptive=is_adaptive)
+        degree = discretisation.largest_degree if isinstance(discretisation, Galerkin) else 0
+        has_layers = is_adaptive and (stated.mesh.rising_degrees or degree > 2)
+        yield from _of_discretisation(discretisation, has_layers=has_layers)
     sides = [side for body in with_boundary for side in body.shape.outline().sides]
     if any(not isinstance(side.curve, Segment) for side in sides):
         yield Method("integrals near curved elements", ("AfKlintebergBarnett2021",))
@@ -206,20 +206,20 @@ def _of_bodies(stated: Scene | Assembly) -> Iterator[Method]:
         yield Method("body forces in closed form", ("TimoshenkoGoodier1970",))
 
 
-def _of_discretisation(discretisation: Discretisation, *, is_adaptive: bool) -> Iterator[Method]:
+def _of_discretisation(discretisation: Discretisation, *, has_layers: bool) -> Iterator[Method]:
     if isinstance(discretisation, ConstantCollocation):
         yield Method("collocation with constant elements", ("Paper", "Somigliana1885", "Betti1872"))
     elif discretisation.is_symmetric:
         yield Method("symmetric Galerkin boundary elements", ("Paper", "Steinbach2008", "SauterSchwab2011", "Han1994"))
     else:
         yield Method(f"{discretisation.method} of {type(discretisation).__module__}", ())
-    if is_adaptive and discretisation.takes_layers:
+    if has_layers:
         yield Method("geometric layers and rising degrees", ("BabuskaGuo1986", "BanzStephan2015"))
         yield Method("error estimates from Legendre coefficients", ("Mavriplis1994",))
         yield Method("corners where contact tractions have no bound", ("Williams1952",))
 
 
-def _of_contact(stated: Scene | Assembly, messages: list[str]) -> Iterator[Method]:
+def _of_contact(stated: Scene | Assembly) -> Iterator[Method]:
     if isinstance(stated, Assembly) and (stated.contacts or stated.touching is not None):
         yield Method(
             "mortar coupling with dual multipliers",
@@ -235,8 +235,8 @@ def _of_contact(stated: Scene | Assembly, messages: list[str]) -> Iterator[Metho
     for law in (stated.law, *own):
         if keys := LAW_WORKS.get(LAWS.word_of(law)):
             yield Method(f"law {LAWS.word_of(law)}", keys)
-    for word in map(SOLVERS.word_of, drivers_at_work(stated.solver, messages)):
-        yield Method(f"driver {word}", DRIVERS.get(word, ()))
+    word = SOLVERS.word_of(stated.solver)
+    yield Method(f"driver {word}", DRIVERS.get(word, ()))
 
 
 def _of_run(solution: Solution | AssemblySolution) -> Iterator[Method]:
@@ -245,3 +245,8 @@ def _of_run(solution: Solution | AssemblySolution) -> Iterator[Method]:
         yield Method("GMRES with sums over a hierarchy", ("SaadSchultz1986", "BramblePasciakXu1990"))
     if any(item.is_needed and "multigrid" in item.name for item in solution.plan.items):
         yield Method("algebraic multigrid", ("RugeStueben1987",))
+    messages = [record.message for record in solution.history]
+    if any(message.startswith(PATH_MESSAGE) for message in messages):
+        yield Method("path of solutions by complementary pivoting", ("Lemke1965",))
+    if any(message.startswith(SPRINGS_MESSAGE) for message in messages):
+        yield Method("springs that become weaker (proximal point method)", ("Rockafellar1976",))

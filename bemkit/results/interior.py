@@ -8,6 +8,7 @@ from bemkit.geometry.reflection import reflected_to_whole
 from bemkit.geometry.spaces import BoundarySpace, ConstantSpace, ElementwiseSpace
 from bemkit.operators.somigliana.fields import InteriorFields
 from bemkit.results.solved_body import SolvedBody
+from bemkit.scene.discretisation import on_whole_body
 
 
 def interior_fields(solution: SolvedBody) -> InteriorFields:
@@ -51,7 +52,7 @@ def whole_boundary(solution: SolvedBody) -> tuple[BoundarySpace, FloatArray, Ele
     Each as its space and the dofs (n_scalar, 2) there [m], [Pa].
     """
     mesh, discretisation, boundary = solution.mesh, solution.scene.discretisation, solution.map_boundary
-    of_whole = discretisation.of_images(mesh.whole.n_elements // mesh.n_elements)
+    of_whole = on_whole_body(discretisation, mesh)
     space, half_space = of_whole.displacement_space(mesh.whole), discretisation.displacement_space(mesh)
     displacement = reflected_to_whole(half_space, space, boundary.displacement)
     has_dofs = len(boundary.traction_dofs) > mesh.n_elements

@@ -64,9 +64,8 @@ def run_adaptive(
     ValueError
         If the scene has no accuracy, degrees shall rise in a load history, or for the reasons of `bemkit.run`.
     """
-    return refined(
-        Level.first(scene), _SceneRefinement(_rule(scene), callback, EarlierSteps(done, finished)), scene.mesh
-    )
+    level = Level.first(scene)
+    return refined(level, _SceneRefinement(_rule(level), callback, EarlierSteps(done, finished)), scene.mesh)
 
 
 def run_assembly_adaptive(
@@ -103,24 +102,21 @@ def run_assembly_adaptive(
     ValueError
         If the assembly has no accuracy, or for the reasons of `bemkit.run`.
     """
-    rule, earlier = _rule(assembly), EarlierSteps(done, finished)
-    refinement = _AssemblyRefinement(rule, callback, earlier, several_bodies(executor))
-    return refined(Level.first(assembly), refinement, assembly.mesh)
+    level, earlier = Level.first(assembly), EarlierSteps(done, finished)
+    refinement = _AssemblyRefinement(_rule(level), callback, earlier, several_bodies(executor))
+    return refined(level, refinement, assembly.mesh)
 
 
-def _rule(problem: Scene | Assembly) -> MeshSequence[Any]:
+def _rule(level: Level[Any]) -> MeshSequence[Any]:
     """Return how better meshes are made: in layers for elements of high degree, if there is a single load."""
-    accuracy = required_accuracy(problem.mesh)
-    own = [problem.discretisation]
-    if isinstance(problem, Assembly):
-        own = [body.discretisation or problem.discretisation for body in problem.bodies]
-    if problem.n_steps > 1 and any(each.needs_accuracy for each in own):
+    mesh, n_steps = level.asked.mesh, level.asked.n_steps
+    accuracy = required_accuracy(mesh)
+    if n_steps > 1 and mesh.rising_degrees:
         raise InputError(
-            f"discretisation is 'hp', and there are {problem.n_steps} load steps: degrees rise for single loads alone: "
+            f"discretisation is 'hp', and there are {n_steps} load steps: degrees rise only for single loads: "
             "choose 'quadratic', or another fixed degree"
         )
-    takes_layers = all(each.takes_layers for each in own) and problem.n_steps == 1
-    return LayeredMeshes(accuracy) if takes_layers else DensityMeshes(accuracy)
+    return LayeredMeshes(accuracy) if level.is_layered else DensityMeshes(accuracy)
 
 
 @dataclass(frozen=True)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -44,9 +45,11 @@ GAIN = 6.0
 """Factor by which a degree and the layers that come with it reduce the error."""
 LARGEST_RISE, LAST_RISE = 2, 3
 """Degrees from mesh to mesh: the places where the status changes must keep up; and where that is the last mesh."""
-FIRST_NUMBER = 2
-"""Of the first mesh in layers: of degree 4, which tells the places where the status changes, and its own error, well
-enough for two digits more at once. Degree 3 takes hardly less time."""
+LOOK_DEGREE = 2
+"""Degree of the first look, which only finds the places where the status changes."""
+FIRST_DEGREE = 4
+"""Degree of the first mesh in layers: it finds the places where the status changes, and its own error, well enough for
+two digits more at once. Degree 3 takes hardly less time."""
 COARSE = 2e-3
 """Accuracy that the first mesh in layers may reach with degree 4; for less, if it may be the last, it has a degree
 more, and a layer more where loads jump."""
@@ -81,11 +84,11 @@ class LayeredMeshes:
     accuracy: float
 
     def error(self, solution: Solution | AssemblySolution) -> float:
-        """Return the larger one of the estimated errors of energy and of contact tractions."""
-        errors = solution.estimated_error, solution.estimated_traction_error
-        if errors[0] is None:
-            return float("inf")
-        return max(error for error in errors if error is not None)
+        """Return the larger estimated error, of energy or of contact tractions; infinite if one is missing."""
+        energy, tractions = solution.estimated_error, solution.estimated_traction_error
+        if tractions is None and solution.contact_traction_size == 0.0:
+            tractions = 0.0
+        return np.inf if energy is None or tractions is None else max(energy, tractions)
 
     def is_enough(self, solutions: Sequence[AnySolution]) -> bool:
         """Tell whether the error is small enough; not after the first look, whose zones end inside of elements."""
@@ -114,52 +117,79 @@ class LayeredMeshes:
             )
 
     def following(self, level: Level[AnyScene], solutions: Sequence[AnySolution]) -> Level[AnyScene] | None:
-        """Return meshes of the next degree, with more layers where that is not enough."""
-        solution = solutions[-1]
-        if level.number > 0 and solution.estimated_error is None:
+        """Return a finer first look, the first meshes in layers, or after these meshes of the next degree."""
+        solution, members = solutions[-1], level.members(solutions[-1])
+        if level.degree == LOOK_DEGREE:
+            return self._finer_look(level, members, solutions) or self._first_layers(level, members, solution)
+        if solution.estimated_error is None:
             return None
-        members, errors = level.members(solution), _Errors.of(level, solution)
+        errors = _Errors.of(level, solution)
         if self._is_stuck(solutions):
             if errors is not None:
                 self._check_lengths(members, errors)
             return None
-        n_unresolved = len(solution.transitions) - len(resolved_transitions(solution.contact, solution.transitions))
-        # both ends of a stick zone of one node between opposite slips
-        is_coarse = n_unresolved > sum(2 * reversal.n_sticking for reversal in slip_reversals(solution.contact))
-        has_copies = any(len(member.bodies) > 1 for member in members)
-        if level.number == 0 and len(solutions) < MOST_LOOKS and is_coarse and not has_copies:
-            return DensityMeshes(self.accuracy).following(level, solutions)
-        more = int(level.number == 0 and self._may_stop_at_once(solution))
-        fresh = [layered_partition(each.partition.base, _settled_cuts(each), n_at_jumps=1 + more) for each in members]
-        if level.number == 0:
-            return replace(level, partitions=tuple(fresh), number=FIRST_NUMBER + more)
         if errors is None:
             method = solution.solved_bodies[0].scene.discretisation.method
             raise InputError(f"{method} has no error estimate: take another discretisation")
-        has_moved = all(has_same_pieces(old, new) for old, new in zip(level.partitions, fresh, strict=True))
-        is_inner = np.concatenate([~is_at_end(partition) for partition in level.partitions])
-        needed = self._needed_rise(errors, is_inner) if has_moved else 0
-        moves_on = level.number == FIRST_NUMBER and self._moves_on(solution)
-        is_last = has_moved and needed <= LAST_RISE and not moves_on
-        rise = needed if is_last else min(needed, LARGEST_RISE)
-        if moves_on:  # the mesh after the next one may be the last: as coarse as that one allows
-            rise = min(rise, max(needed - LAST_RISE, 1))
-        number = level.number + rise
-        higher = [_degrees_of(each, each.bodies[0].scene.discretisation.at_level(number)) for each in members]
-        goal = self.accuracy / NEXT_ERROR if moves_on else SAFETY * self.accuracy
-        if not is_last:
-            goal = max(goal, self.error(solution) / GAIN**LARGEST_RISE)
+        return self._next_degree(level, members, solution, errors)
+
+    def _finer_look(
+        self, level: Level[AnyScene], members: Sequence[Member], solutions: Sequence[AnySolution]
+    ) -> Level[AnyScene] | None:
+        """Return denser meshes if single nodes stand for zones; None if none does, or another look does not help."""
+        table, transitions = solutions[-1].contact, solutions[-1].transitions
+        n_unresolved = len(transitions) - len(resolved_transitions(table, transitions))
+        # both ends of a stick zone of one node between opposite slips are resolved by layers
+        is_coarse = n_unresolved > sum(2 * reversal.n_sticking for reversal in slip_reversals(table))
+        has_copies = any(len(member.bodies) > 1 for member in members)
+        if not is_coarse or has_copies or len(solutions) >= MOST_LOOKS:
+            return None
+        return DensityMeshes(self.accuracy).following(level, solutions)
+
+    def _first_layers(
+        self, level: Level[AnyScene], members: Sequence[Member], solution: AnySolution
+    ) -> Level[AnyScene]:
+        """Return the first meshes in layers; one degree and one layer more if they may be the last ones."""
+        more = int(self._may_stop_at_once(solution))
+        return replace(level, partitions=_in_layers(members, n_at_jumps=1 + more), degree=FIRST_DEGREE + more)
+
+    def _next_degree(
+        self, level: Level[AnyScene], members: Sequence[Member], solution: AnySolution, errors: _Errors
+    ) -> Level[AnyScene]:
+        """Return meshes of a higher degree, with elements divided where that is not enough."""
+        fresh = _in_layers(members)
+        # the same pieces: the places where the status changes have only moved
+        is_settled = all(has_same_pieces(old, new) for old, new in zip(level.partitions, fresh, strict=True))
+        rise = self._rise(level, solution, errors, is_settled=is_settled)
+        higher = [
+            _degrees_of(member, level.with_degree(member.bodies[0].scene.discretisation, level.degree + rise.degrees))
+            for member in members
+        ]
+        excesses = errors.split(errors.excess(np.concatenate(higher), rise.goal))
         # layers shorter than what flickers would hold nothing but round-off
-        resolution = max(LAST_TIPS * self.accuracy if is_last else self.accuracy, FLICKER)
-        excesses = errors.split(errors.excess(np.concatenate(higher), goal))
+        resolution = max(LAST_TIPS * self.accuracy if rise.is_last else self.accuracy, FLICKER)
         refined = tuple(
             refined_partition(member.partition, excess, own, resolution)
             for member, excess, own in zip(members, excesses, fresh, strict=True)
         )
         degrees: tuple[int, ...] = ()
-        if has_moved and level.asked.discretisation.needs_accuracy and isinstance(solution, Solution):
+        if is_settled and level.asked.mesh.rising_degrees and isinstance(solution, Solution):
             degrees = self._degrees(errors, level.partition, refined[0], int(higher[0].max()))
-        return replace(level, partitions=refined, number=number, degrees=degrees)
+        return replace(level, partitions=refined, degree=level.degree + rise.degrees, degrees=degrees)
+
+    def _rise(self, level: Level[AnyScene], solution: AnySolution, errors: _Errors, *, is_settled: bool) -> _Rise:
+        """Return by how many degrees the next mesh rises, and the error to which its elements are divided."""
+        is_inner = np.concatenate([~is_at_end(partition) for partition in level.partitions])
+        needed = self._needed_rise(errors, is_inner) if is_settled else 0
+        moves_on = level.degree == FIRST_DEGREE and self._moves_on(solution)
+        is_last = is_settled and needed <= LAST_RISE and not moves_on
+        rise = needed if is_last else min(needed, LARGEST_RISE)
+        if moves_on:  # the mesh after the next one may be the last: as coarse as that one allows
+            rise = min(rise, max(needed - LAST_RISE, 1))
+        goal = self.accuracy / NEXT_ERROR if moves_on else SAFETY * self.accuracy
+        if not is_last:
+            goal = max(goal, self.error(solution) / GAIN**LARGEST_RISE)
+        return _Rise(rise, goal, is_last)
 
     def _may_stop_at_once(self, solution: AnySolution) -> bool:
         """Whether a first mesh in layers that is better than others may be the last."""
@@ -198,6 +228,14 @@ class LayeredMeshes:
         needed = np.log(max(errors.relative(inner), allowed) / allowed) / np.log(GAIN)
         is_inexact = errors.relative(np.ones_like(inner)) > allowed
         return max(int(np.ceil(needed)), int(is_inexact))
+
+
+class _Rise(NamedTuple):
+    """By how many degrees the next mesh rises, the error allowed on it, and whether it should be the last one."""
+
+    degrees: int
+    goal: float
+    is_last: bool
 
 
 @dataclass(frozen=True, eq=False)
@@ -291,6 +329,13 @@ def _moved_to_corners(
 def _degrees_of(member: Member, discretisation: Discretisation) -> IntArray:
     """Return the degree (n_elements,) of each element."""
     return element_degrees(discretisation.displacement_space(member.bodies[0].mesh))
+
+
+def _in_layers(members: Sequence[Member], n_at_jumps: int = 1) -> tuple[Partition, ...]:
+    """Return partitions made anew, of few elements in layers towards the places where the status changes."""
+    return tuple(
+        layered_partition(member.partition.base, _settled_cuts(member), n_at_jumps=n_at_jumps) for member in members
+    )
 
 
 def _settled_cuts(member: Member) -> dict[int, list[float]]:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from operator import is_
 from typing import Generic, NamedTuple, Protocol, TypeVar
 
 import numpy as np
@@ -13,17 +12,17 @@ import numpy as np
 from bemkit.arrays import FloatArray, IntArray
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.meshing.partition import Partition
+from bemkit.geometry.spaces import LARGEST_DEGREE
 from bemkit.results.assembly_solution import AssemblySolution
 from bemkit.results.solution import Solution
 from bemkit.results.solved_body import SolvedBody
 from bemkit.results.zone_ends import ZoneEnd
 from bemkit.scene.assembly import Assembly
-from bemkit.scene.body import Body
+from bemkit.scene.discretisation import Discretisation, Galerkin
 from bemkit.scene.scene import Scene
 
 AnyScene = TypeVar("AnyScene", Scene, Assembly)
 AnySolution = TypeVar("AnySolution", Solution, AssemblySolution)
-AnyStated = TypeVar("AnyStated", Scene, Assembly, Body)
 
 
 class Member(NamedTuple):
@@ -54,30 +53,29 @@ class Level(Generic[AnyScene]):
         The number of the partition of each body, by its name; a body alone has none.
     touching : tuple of tuple of str
         The parts of each partition that are in contact.
-    number : int
-        Which of the discretisations that follow each other; see `Discretisation.at_level`.
+    is_layered : bool
+        Whether further meshes are few elements of high degree in layers.
+    degree : int
+        Of the elements on layered meshes if degrees rise; 2 on the first mesh, which only looks for the places where
+        the contact status changes.
     degrees : tuple of int
-        Of each element of a body alone, where they are lower than those of that discretisation.
+        Of each element of a body alone, where they are lower than `degree`.
     """
 
     asked: AnyScene
     partitions: tuple[Partition, ...]
     keys: Mapping[str, int]
     touching: tuple[tuple[str, ...], ...]
-    number: int = 0
+    is_layered: bool = False
+    degree: int = 2
     degrees: tuple[int, ...] = ()
 
     @classmethod
     def first(cls, asked: AnyScene) -> Level[AnyScene]:
         """Divide outlines of whose solution nothing is known."""
         keys, scenes, touching = _divided_bodies(asked)
-        partitions = (
-            scene.mesh.first_partition(
-                scene.shape.outline(), scene.selections, parts, scene.symmetry, takes_layers=scene.takes_layers
-            )
-            for scene, parts in zip(scenes, touching, strict=True)
-        )
-        return cls(asked, tuple(partitions), keys, touching)
+        partitions = tuple(scene.first_partition(parts) for scene, parts in zip(scenes, touching, strict=True))
+        return cls(asked, partitions, keys, touching, all(scene.takes_layers for scene in scenes))
 
     @property
     def partition(self) -> Partition:
@@ -88,16 +86,23 @@ class Level(Generic[AnyScene]):
     @cached_property
     def scene(self) -> AnyScene:
         """What is solved, with the discretisations of this level."""
-        scene = self._at_level(self.asked)
+        if not self.is_layered:
+            return self.asked
+        scene = replace(self.asked, discretisation=self._discretisation(self.asked.discretisation))
         if isinstance(scene, Scene):
             return scene
-        bodies = tuple(self._at_level(body) for body in scene.bodies)
-        return scene if all(map(is_, bodies, scene.bodies)) else replace(scene, bodies=bodies)
+        own = ((body, body.discretisation) for body in scene.bodies)
+        bodies = (body if d is None else replace(body, discretisation=self._discretisation(d)) for body, d in own)
+        return replace(scene, bodies=tuple(bodies))
 
-    def _at_level(self, stated: AnyStated) -> AnyStated:
-        own = stated.discretisation
-        new = None if own is None else own.at_level(self.number).with_degrees(self.degrees)
-        return stated if new is own else replace(stated, discretisation=new)
+    def _discretisation(self, stated: Discretisation) -> Discretisation:
+        return Galerkin(self.degrees) if self.degrees else self.with_degree(stated, self.degree)
+
+    def with_degree(self, stated: Discretisation, degree: int) -> Discretisation:
+        """Return the discretisation of layered meshes of a degree; the one stated unless degrees rise."""
+        if self.asked.mesh.rising_degrees:
+            return Galerkin(min(degree, LARGEST_DEGREE))
+        return Galerkin(2) if degree == 2 else stated
 
     @property
     def n_elements(self) -> int:

@@ -133,7 +133,8 @@ def _best_last(
     """
     best = solutions[-1]
     if obstacle:
-        converged = (solution for solution in solutions if solution.is_converged)
+        # without estimates the finest mesh is the best
+        converged = [solution for solution in reversed(solutions) if solution.is_converged]
         best = min(converged, key=refinement.error, default=best)
     message = f"{len(solutions)} meshes, the last with {best.n_elements} elements. {best.message}"
     status = best.status

@@ -16,7 +16,7 @@ from bemkit.geometry.symmetry import Symmetry
 from bemkit.operators.linear.solvers import Automatic, LinearSolverChoice
 from bemkit.scene.body import Body, check_place, lines_across
 from bemkit.scene.conditions import Contact, Free, Part
-from bemkit.scene.discretisation import Discretisation, Galerkin, LinearGalerkin
+from bemkit.scene.discretisation import Discretisation, Galerkin
 from bemkit.scene.mesh_options import MeshOptions
 from bemkit.scene.objects import check_objects
 from bemkit.scene.plane_motion import RigidBody
@@ -24,7 +24,7 @@ from bemkit.scene.scene import Scene
 from bemkit.scene.steps import Stated, Step, check_laws, check_names
 from bemkit.scene.unit_names import UnitNames
 from bemkit.solvers.base import ContactSolver
-from bemkit.solvers.fallbacks import Fallbacks
+from bemkit.solvers.ssn import SemismoothNewton
 
 
 def body_and_part(side: str) -> tuple[str, str]:
@@ -196,11 +196,11 @@ class Assembly(Stated):
     law: FrictionLaw = field(default_factory=Frictionless)
     load_factors: tuple[float, ...] = (1.0,)
     steps: tuple[Step, ...] = ()
-    discretisation: Discretisation = field(default_factory=LinearGalerkin)
+    discretisation: Discretisation = field(default_factory=lambda: Galerkin(1))
     linear_solver: LinearSolverChoice = field(default_factory=Automatic)
     symmetry: Symmetry | None = None
     mesh: MeshOptions = field(default_factory=MeshOptions)
-    solver: ContactSolver = field(default_factory=Fallbacks)
+    solver: ContactSolver = field(default_factory=SemismoothNewton)
     units: UnitNames | None = None
     description: str = ""
     reference: str = ""
@@ -238,12 +238,10 @@ class Assembly(Stated):
     def _check_accuracy(self, accuracy: float) -> None:
         for body in self.bodies:
             discretisation = self.discretisation if body.discretisation is None else body.discretisation
-            if discretisation.needs_accuracy != self.discretisation.needs_accuracy:
-                kinds = ("a fixed degree", "'hp'")
-                of_body, of_assembly = kinds[::-1] if discretisation.needs_accuracy else kinds
+            if self.mesh.rising_degrees and body.discretisation is not None:
                 raise InputError(
-                    f"body {body.name!r} has {of_body}, the assembly {of_assembly}: degrees rise for all bodies or for "
-                    "none: give the assembly alone a discretisation"
+                    f"body {body.name!r} has a fixed degree, the assembly rising degrees: degrees rise for all bodies "
+                    "or for none: give only the assembly a discretisation"
                 )
             if not discretisation.estimates_error:
                 raise InputError(

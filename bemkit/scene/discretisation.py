@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Protocol
 
@@ -14,7 +14,7 @@ from bemkit.arrays import IntArray
 from bemkit.geometry.errors import GeometryError
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.neighbours import break_nodes
-from bemkit.geometry.spaces import LARGEST_DEGREE, BoundarySpace, ConstantSpace, LagrangeSpace, check_degree
+from bemkit.geometry.spaces import BoundarySpace, ConstantSpace, LagrangeSpace, check_degree
 from bemkit.operators.linear.solvers import ChosenLinearSolver, DenseCholesky, Hierarchical, LinearSolver, MatrixFree
 from bemkit.operators.material import Material
 from bemkit.operators.steklov_poincare import SteklovPoincare
@@ -51,31 +51,6 @@ class Discretisation(Protocol):
         Displacements must then be continuous, of degree p >= 1, and tractions of degree p - 1.
         """
         return False
-
-    @property
-    def takes_layers(self) -> bool:
-        """Whether meshes for an accuracy have few elements in geometric layers; many of fitted density otherwise."""
-        return False
-
-    @property
-    def needs_accuracy(self) -> bool:
-        """Whether it can only be used with an accuracy."""
-        return False
-
-    def of_images(self, n_images: int) -> Discretisation:
-        """Return the discretisation of the whole body, of which a mesh with a symmetry is one of `n_images` images."""
-        return self
-
-    def at_level(self, number: int) -> Discretisation:
-        """Return the discretisation of a mesh for an accuracy, by its number from 0 on in the sequence of meshes.
-
-        Numbers may be skipped, so that a larger number should mean a smaller error.
-        """
-        return self
-
-    def with_degrees(self, degrees: tuple[int, ...]) -> Discretisation:
-        """Return the discretisation with these degrees of the elements; itself unless degrees may differ."""
-        return self
 
     @abstractmethod
     def displacement_space(self, mesh: BoundaryMesh) -> BoundarySpace:
@@ -212,19 +187,6 @@ class Galerkin(SymmetricGalerkin):
         """True, except for elements of degree 1 among others: there is no estimate for them."""
         return len(set(self._degrees)) == 1 or min(self._degrees) > 1
 
-    @property
-    def takes_layers(self) -> bool:
-        """True from degree 3 on."""
-        return self.largest_degree > 2
-
-    def of_images(self, n_images: int) -> Discretisation:
-        """Return the discretisation with the degrees repeated for each image, if each element has its own."""
-        return replace(self, degree=self.degree * n_images) if isinstance(self.degree, tuple) else self
-
-    def at_level(self, number: int) -> Discretisation:
-        """Return quadratic elements on the first mesh if the degree is higher, later the discretisation itself."""
-        return QuadraticGalerkin() if number == 0 and self.takes_layers else self
-
     def displacement_space(self, mesh: BoundaryMesh) -> BoundarySpace:
         """Return the continuous functions of the degree; the nodes of the mesh are their first dofs.
 
@@ -249,6 +211,13 @@ class Galerkin(SymmetricGalerkin):
         return None if (degrees == degrees[0]).all() else degrees
 
 
+def on_whole_body(discretisation: Discretisation, mesh: BoundaryMesh) -> Discretisation:
+    """Return the discretisation of the whole body of a mesh with symmetry: images repeat the degrees of elements."""
+    if isinstance(discretisation, Galerkin) and isinstance(discretisation.degree, tuple):
+        return Galerkin(discretisation.degree * (mesh.whole.n_elements // mesh.n_elements))
+    return discretisation
+
+
 @lru_cache(maxsize=4)  # a space keeps what it has computed, so that equal ones should be the same object
 def _galerkin_displacements(galerkin: Galerkin, mesh: BoundaryMesh) -> BoundarySpace:
     return LagrangeSpace(mesh, degree=galerkin.largest_degree, element_degrees=galerkin.degrees_on(mesh))
@@ -260,56 +229,6 @@ def _galerkin_tractions(galerkin: Galerkin, mesh: BoundaryMesh) -> BoundarySpace
         return ConstantSpace(mesh)
     lower = None if (degrees := galerkin.degrees_on(mesh)) is None else np.maximum(degrees - 1, 1)
     return LagrangeSpace(mesh, break_nodes(mesh), degree=galerkin.largest_degree - 1, element_degrees=lower)
-
-
-@dataclass(frozen=True)
-class LinearGalerkin(Galerkin):
-    """Symmetric Galerkin of degree 1: displacements continuous and linear, tractions constant on each element."""
-
-    degree: int = field(default=1, init=False, repr=False)
-
-
-@dataclass(frozen=True)
-class QuadraticGalerkin(Galerkin):
-    """Symmetric Galerkin of degree 2: displacements continuous and quadratic, tractions linear on each element."""
-
-    degree: int = field(default=2, init=False, repr=False)
-
-
-@dataclass(frozen=True)
-class HpGalerkin(Galerkin):
-    """Symmetric Galerkin whose degree rises from mesh to mesh until an accuracy is reached (hp-adaptivity).
-
-    Parameters
-    ----------
-    degree : int
-        Degree on one mesh: 2 on the first; in a solution that of its mesh.
-
-    Raises
-    ------
-    GeometryError
-        If the degree is no whole number from 1 to 12.
-    """
-
-    degree: int | tuple[int, ...] = field(default=2, repr=False)
-
-    @property
-    def takes_layers(self) -> bool:
-        """True."""
-        return True
-
-    @property
-    def needs_accuracy(self) -> bool:
-        """True."""
-        return True
-
-    def at_level(self, number: int) -> Discretisation:
-        """Return degree 2 on the first mesh, and one degree more for each further number."""
-        return HpGalerkin(min(2 + number, LARGEST_DEGREE))
-
-    def with_degrees(self, degrees: tuple[int, ...]) -> Discretisation:
-        """Return the degrees themselves, if there are any."""
-        return HpGalerkin(degrees) if degrees else self
 
 
 @dataclass(frozen=True)

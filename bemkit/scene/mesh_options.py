@@ -3,24 +3,17 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import lru_cache
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from bemkit.arrays import FloatArray, IntArray
 from bemkit.errors import InputError
 from bemkit.geometry.mesh import BoundaryMesh
-from bemkit.geometry.meshing.discretise import Grading, Uniform, discretise
-from bemkit.geometry.meshing.division import divide
-from bemkit.geometry.outline import Outline, Selection
-from bemkit.geometry.symmetry import Symmetry
+from bemkit.geometry.meshing.discretise import Grading, Uniform
 from bemkit.result_warning import ResultWarning
-
-if TYPE_CHECKING:
-    from bemkit.geometry.meshing.partition import Partition
 
 DEFAULT_ELEMENTS = 320
 """Elements where neither a number nor an accuracy is given."""
@@ -64,6 +57,9 @@ class MeshOptions:
         unknowns count.
     most_seconds : float, optional [s]
         Time for all meshes: no mesh is begun that would exceed it. No limit if left out.
+    rising_degrees : bool
+        Whether the degree of Galerkin elements rises from mesh to mesh, from 2 on, until the accuracy is reached
+        (hp-adaptivity); the scene of a result has the degrees of its mesh. In scene files ``discretisation = "hp"``.
 
     Raises
     ------
@@ -77,6 +73,7 @@ class MeshOptions:
     accuracy: float | None = None
     most_elements: int | None = None
     most_seconds: float | None = None
+    rising_degrees: bool = False
 
     def __post_init__(self) -> None:
         if self.accuracy is None:
@@ -101,6 +98,11 @@ class MeshOptions:
             raise InputError(f"most_seconds is {self.most_seconds}: give a positive time")
 
     def _check_without_accuracy(self) -> None:
+        if self.rising_degrees:
+            raise InputError(
+                "rising_degrees is True (discretisation 'hp'): degrees rise until an accuracy is reached: give "
+                "mesh.accuracy, such as 1e-6, or a fixed degree"
+            )
         for name in ("most_elements", "most_seconds"):
             if getattr(self, name) is not None:
                 raise InputError(f"{name} is {getattr(self, name)}: it limits an accuracy, which is not given")
@@ -113,57 +115,6 @@ class MeshOptions:
     def n_elements(self) -> int:
         """Number of elements to begin with: `elements`, or those of the first mesh if the accuracy decides."""
         return FIRST_ELEMENTS if self.elements is None else self.elements
-
-    def first_partition(
-        self,
-        outline: Outline,
-        parts: Mapping[str, Selection],
-        contact: Collection[str],
-        symmetry: Symmetry | None = None,
-        *,
-        takes_layers: bool = False,
-    ) -> Partition:
-        """Divide an outline for the first time if the accuracy decides.
-
-        Parameters
-        ----------
-        outline : Outline
-        parts : mapping of str to Selection
-        contact : collection of str
-            Names of the contact parts.
-        symmetry : Symmetry, optional
-        takes_layers : bool
-            Whether the next mesh is made anew in layers: then this one only looks for places where the status changes.
-        """
-        if takes_layers and contact:
-            from bemkit.geometry.meshing.layers import looking_partition
-
-            base = divide(outline, parts)
-            return looking_partition(base if symmetry is None else base.half(symmetry), contact, FIRST_ELEMENTS)
-        from bemkit.geometry.meshing.partition import first_partition
-
-        return first_partition(outline, parts, FIRST_ELEMENTS, even=contact, symmetry=symmetry)
-
-    def divide(
-        self,
-        outline: Outline,
-        parts: Mapping[str, Selection],
-        contact: Collection[str],
-        symmetry: Symmetry | None = None,
-        *,
-        takes_layers: bool = False,
-    ) -> BoundaryMesh:
-        """Divide an outline, if the accuracy decides as `first_partition` does."""
-        if self.elements is None:
-            return self.first_partition(outline, parts, contact, symmetry, takes_layers=takes_layers).mesh
-        return discretise(
-            outline,
-            n_elements=self.elements,
-            parts=parts,
-            grading=self.grading,
-            density=self.density,
-            symmetry=symmetry,
-        )
 
 
 @lru_cache(maxsize=4)  # the plan and the choice of a linear solver ask for it, and it takes a while on large meshes

@@ -29,35 +29,49 @@ class Registry:
         Word to ``"module:Class"``; a module is imported when its word is first met.
     group : str
         Name of the entry-point group by which installed packages add classes; empty if there is none.
-    variants : mapping of (str, str, str) to str, optional
-        A word, a key and a value of that key that together name another word.
-    retired : mapping of str to str, optional
-        Words of former versions, and what to take instead.
+    presets : mapping of str to (str, mapping), optional
+        Words for a class with options: the word of the class, and the values of its keys.
+    hints : mapping of str to str, optional
+        Words that name no class, and what to write instead.
     protocol : str, optional
         The protocol that the classes fulfil, as ``"module:Class"``; none if they are all alternatives there are.
-    listed : str, optional
-        The word of the class that a list of words or tables makes; a tuple of them is its only field.
     """
 
     role: str
     built_in: Mapping[str, str] = field(repr=False)
     group: str = ""
-    variants: Mapping[tuple[str, str, str], str] = field(default_factory=dict, repr=False)
-    retired: Mapping[str, str] = field(default_factory=dict, repr=False)
+    presets: Mapping[str, tuple[str, Mapping[str, Any]]] = field(default_factory=dict, repr=False)
+    hints: Mapping[str, str] = field(default_factory=dict, repr=False)
     protocol: str = ""
-    listed: str = ""
 
     def holds(self, alternatives: Iterable[object]) -> bool:
         """Whether a type declared by these alternatives stands for the role: its protocol, or several classes."""
         names = {reference_of(each) for each in alternatives}
         return names <= {self.protocol, *self.built_in.values()} and (self.protocol in names or len(names) > 1)
 
-    def without_variant(self, table: Mapping[str, Any]) -> dict[str, Any]:
-        """Return a table whose kind is the word that its kind and another key name together."""
-        for (kind, key, value), word in self.variants.items():
-            if table.get("kind") == kind and table.get(key) == value:
-                return {name: item for name, item in table.items() if name != key} | {"kind": word}
-        return dict(table)
+    def with_options(self, table: Mapping[str, Any]) -> dict[str, Any]:
+        """Return a table in which the word of a preset is that of its class, with its options.
+
+        Raises
+        ------
+        InputError
+            If there are other keys beside such a word.
+        """
+        word = table.get("kind")
+        if not isinstance(word, str) or word not in self.presets:
+            return dict(table)
+        kind, options = self.presets[word]
+        if len(table) > 1:
+            keys = ", ".join(key for key in table if key != "kind")
+            raise InputError(f"{word!r} has no keys, but {keys} is given: leave it out, or write kind = {kind!r}")
+        return {"kind": kind, **options}
+
+    def written(self, kind: str, options: Mapping[str, Any]) -> str | dict[str, Any]:
+        """Return the word or the table that names a class with options in scene files."""
+        for word, preset in self.presets.items():
+            if preset == (kind, options):
+                return word
+        return {"kind": kind, **options} if options else kind
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "built_in", MappingProxyType(self.built_in))
@@ -71,20 +85,21 @@ class Registry:
             If nothing of that name is built in or installed, listing the known words; or if what is installed under
             the name cannot be imported or is not a dataclass.
         """
+        kind = self.presets[kind][0] if kind in self.presets else kind
         if kind in self.built_in:
             return self._load(EntryPoint(kind, self.built_in[kind], self.group))
         installed = self._installed()
         if kind in installed:
             return self._load(installed[kind])
-        if kind in self.retired:
-            raise InputError(f"the {self.role} {kind!r} was removed: {self.retired[kind]}")
+        if kind in self.hints:
+            raise InputError(f"the {self.role} {kind!r} {self.hints[kind]}")
         known = self.words()
         hint = closest(kind, known, SYNONYMS)
         raise InputError(f"unknown {self.role} {shorten(kind)}: the known ones are {', '.join(known)}{hint}")
 
     def words(self) -> tuple[str, ...]:
         """Return all words: the built-in ones, then those that installed packages add."""
-        return tuple(dict.fromkeys([*self.built_in, *self._installed()]))
+        return tuple(dict.fromkeys([*self.presets, *self.built_in, *self._installed()]))
 
     def kind_of(self, value: object) -> str:
         """Return the word that names the class of a value.
@@ -105,11 +120,13 @@ class Registry:
         raise InputError(f"the {self.role} {type(value).__name__} has no name in scene files: {hint}")
 
     def word_of(self, value: object) -> str:
-        """Return the kind of a value, or the name of its class if that has no name in scene files."""
+        """Return the word for a value or its class, or the name of its class if that has no name in scene files."""
         try:
-            return self.kind_of(value)
+            kind = self.kind_of(value)
         except InputError:
             return type(value).__name__
+        presets = (word for word, (name, options) in self.presets.items() if name == kind and options == vars(value))
+        return next(presets, kind)
 
     def _installed(self) -> dict[str, EntryPoint]:
         return {point.name: point for point in entry_points(group=self.group)} if self.group else {}
@@ -231,17 +248,18 @@ LAWS = Registry(
     protocol="bemkit.contact.laws:FrictionLaw",
 )
 
+RISING = "hp"
+"""Word of scene files, instead of a discretisation, for degrees that rise: `MeshOptions.rising_degrees`."""
+
 DISCRETISATIONS = Registry(
     "discretisation",
     {
         "galerkin": "bemkit.scene.discretisation:Galerkin",
-        "hp": "bemkit.scene.discretisation:HpGalerkin",
-        "linear": "bemkit.scene.discretisation:LinearGalerkin",
-        "quadratic": "bemkit.scene.discretisation:QuadraticGalerkin",
         "constant": "bemkit.scene.discretisation:ConstantCollocation",
     },
     "bemkit.discretisations",
-    {("galerkin", "degree", "hp"): "hp"},
+    presets={"linear": ("galerkin", {"degree": 1}), "quadratic": ("galerkin", {"degree": 2})},
+    hints={RISING: "is a choice for all bodies of a scene: set mesh.rising_degrees = true and mesh.accuracy"},
     protocol="bemkit.scene.discretisation:Discretisation",
 )
 
@@ -253,24 +271,20 @@ LINEAR_SOLVERS = Registry(
         "hierarchical": "bemkit.operators.linear.solvers:Hierarchical",
         "matrix-free": "bemkit.operators.linear.solvers:MatrixFree",
     },
-    retired={"krylov": "use 'hierarchical', faster and smaller for constant elements, or 'automatic'"},
+    hints={"krylov": "was removed: use 'hierarchical', faster and smaller for constant elements, or 'automatic'"},
     protocol="bemkit.operators.linear.solvers:LinearSolver",
 )
 
 SOLVERS = Registry(
     "solver",
     {
-        "fallbacks": "bemkit.solvers.fallbacks:Fallbacks",
         "semismooth-newton": "bemkit.solvers.ssn:SemismoothNewton",
-        "springs": "bemkit.solvers.springs:Springs",
-        "solution-path": "bemkit.solvers.solution_path:SolutionPath",
         "augmented-lagrangian": "bemkit.solvers.alm:AugmentedLagrangian",
         "fixed-point": "bemkit.solvers.fixed_point:FixedPoint",
-        "lemke": "bemkit.solvers.lemke:LemkePivoting",
+        "lemke": "bemkit.testing.lemke:LemkePivoting",
     },
     "bemkit.solvers",
     protocol="bemkit.solvers.base:ContactSolver",
-    listed="fallbacks",
 )
 
 REGISTRIES = (

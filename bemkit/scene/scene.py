@@ -6,8 +6,9 @@ form can be turned into the other. All quantities are in one consistent set of u
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -18,6 +19,8 @@ from bemkit.contact.problem import LawError
 from bemkit.errors import InputError
 from bemkit.formulas import choices
 from bemkit.geometry.mesh import BoundaryMesh
+from bemkit.geometry.meshing.discretise import discretise
+from bemkit.geometry.meshing.division import divide
 from bemkit.geometry.outline import Outline, Selection
 from bemkit.geometry.shapes import Shape
 from bemkit.geometry.symmetry import Symmetry
@@ -25,13 +28,16 @@ from bemkit.operators.linear.solvers import Automatic, LinearSolverChoice
 from bemkit.operators.material import Material
 from bemkit.scene.body_forces import BodyForce
 from bemkit.scene.conditions import Clamped, Contact, Part, PrescribedDisplacement, Roller
-from bemkit.scene.discretisation import Discretisation, LinearGalerkin
+from bemkit.scene.discretisation import Discretisation, Galerkin
 from bemkit.scene.mesh_options import MeshOptions
 from bemkit.scene.plane_motion import FarField
 from bemkit.scene.steps import Stated, Step, check_laws, check_names
 from bemkit.scene.unit_names import UnitNames, check_length_of_file
 from bemkit.solvers.base import ContactSolver
-from bemkit.solvers.fallbacks import Fallbacks
+from bemkit.solvers.ssn import SemismoothNewton
+
+if TYPE_CHECKING:
+    from bemkit.geometry.meshing.partition import Partition
 
 
 class NoContactError(InputError):
@@ -96,10 +102,10 @@ class Scene(Stated):
     symmetry: Symmetry | None = None
     body_forces: tuple[BodyForce, ...] = ()
     far: FarField | None = None
-    discretisation: Discretisation = field(default_factory=LinearGalerkin)
+    discretisation: Discretisation = field(default_factory=lambda: Galerkin(1))
     linear_solver: LinearSolverChoice = field(default_factory=Automatic)
     mesh: MeshOptions = field(default_factory=MeshOptions)
-    solver: ContactSolver = field(default_factory=Fallbacks)
+    solver: ContactSolver = field(default_factory=SemismoothNewton)
     units: UnitNames | None = None
     description: str = ""
     reference: str = ""
@@ -112,11 +118,6 @@ class Scene(Stated):
         check_laws({f"law of part {name!r}": law for name, law in self.laws.items()}, self.steps)
         if self.mesh.accuracy is not None:
             self._check_accuracy(self.mesh.accuracy)
-        elif self.discretisation.needs_accuracy:
-            raise InputError(
-                "discretisation is 'hp', whose degree rises until an accuracy is reached: give mesh.accuracy, such as "
-                "1e-6, or a fixed degree"
-            )
         outline = self.shape.outline()
         if outline.surface is not None or self.far is not None:
             _check_half_plane(outline, self.far, self.discretisation, self.mesh, self.parts)
@@ -134,7 +135,7 @@ class Scene(Stated):
                     raise InputError(f"part {part.name!r}: unknown side {side!r}: the sides are {choices(side, names)}")
 
     def _check_without_contact(self) -> None:
-        for name, default in (("law", Frictionless()), ("solver", Fallbacks())):
+        for name, default in (("law", Frictionless()), ("solver", SemismoothNewton())):
             if getattr(self, name) != default:
                 raise InputError(
                     f"{name} is {getattr(self, name)!r}, but no part is in contact: leave the {name} out, or give one "
@@ -142,6 +143,10 @@ class Scene(Stated):
                 )
 
     def _check_accuracy(self, accuracy: float) -> None:
+        if self.mesh.rising_degrees and not isinstance(self.discretisation, Galerkin):
+            raise InputError(
+                f"mesh.rising_degrees is True: {self.discretisation} has no degree: choose Galerkin elements"
+            )
         if not self.discretisation.estimates_error:
             raise InputError(
                 f"mesh.accuracy is {accuracy}: {self.discretisation.method} has no error estimate: choose the "
@@ -202,8 +207,42 @@ class Scene(Stated):
 
     @property
     def takes_layers(self) -> bool:
-        """Whether meshes that follow an accuracy are few elements in geometric layers."""
-        return self.discretisation.takes_layers and self.n_steps == 1
+        """Whether meshes that follow an accuracy are few elements of high degree in geometric layers."""
+        degree = self.discretisation.largest_degree if isinstance(self.discretisation, Galerkin) else 0
+        return self.n_steps == 1 and self.mesh.accuracy is not None and (self.mesh.rising_degrees or degree > 2)
+
+    def first_partition(self, contact: Collection[str]) -> Partition:
+        """Divide the boundary for the first time if an accuracy decides.
+
+        Parameters
+        ----------
+        contact : collection of str
+            Names of the parts that may touch something. They are divided evenly; where the next mesh is made anew in
+            layers, this one only looks for places where their status changes.
+        """
+        outline = self.shape.outline()
+        if self.takes_layers and contact:
+            from bemkit.geometry.meshing.layers import looking_partition
+
+            base = divide(outline, self.selections)
+            base = base if self.symmetry is None else base.half(self.symmetry)
+            return looking_partition(base, contact, self.mesh.n_elements)
+        from bemkit.geometry.meshing.partition import first_partition
+
+        return first_partition(outline, self.selections, self.mesh.n_elements, even=contact, symmetry=self.symmetry)
+
+    def divided(self, contact: Collection[str]) -> BoundaryMesh:
+        """Return the mesh by number of elements, or the first mesh for an accuracy; see `first_partition`."""
+        if self.mesh.elements is None:
+            return self.first_partition(contact).mesh
+        return discretise(
+            self.shape.outline(),
+            n_elements=self.mesh.elements,
+            parts=self.selections,
+            grading=self.mesh.grading,
+            density=self.mesh.density,
+            symmetry=self.symmetry,
+        )
 
     def build_mesh(self) -> BoundaryMesh:
         """Divide the boundary into elements, with one mesh part for each part of the scene.
@@ -213,9 +252,7 @@ class Scene(Stated):
         GeometryError
             If parts overlap or are empty, or there are too few elements, or the scene lacks its symmetry.
         """
-        names = [part.name for part in self.contact_parts]
-        outline, layers = self.shape.outline(), self.takes_layers
-        mesh = self.mesh.divide(outline, self.selections, names, self.symmetry, takes_layers=layers)
+        mesh = self.divided([part.name for part in self.contact_parts])
         if self.symmetry is not None:
             from bemkit.scene.symmetry import check_symmetry
 
@@ -240,7 +277,7 @@ def _check_half_plane(
                 "'half-plane' or 'periodic-half-plane'"
             )
         return
-    if not (discretisation.is_symmetric and getattr(discretisation, "degree", 0) == 1) or discretisation.needs_accuracy:
+    if discretisation != Galerkin(1) or mesh.rising_degrees:
         raise InputError(
             f"discretisation is {discretisation}, but tractions on a half-plane are constant on each element: choose "
             "the discretisation 'linear', or leave it out"

@@ -20,7 +20,7 @@ from bemkit.errors import InputError
 from bemkit.formulas import Expression
 from bemkit.scene.assembly import Assembly
 from bemkit.scene.declared_types import default_of, heading_of, hints_of, is_required, options_of, registry_of
-from bemkit.scene.registry import Registry
+from bemkit.scene.registry import RISING, Registry
 from bemkit.scene.scene import Scene
 from bemkit.scene.serialisation import unstructure
 
@@ -52,6 +52,8 @@ def scene_schema() -> Schema:
     """
     definitions = _Definitions()
     one, several = definitions.table(Scene), definitions.table(Assembly)
+    for table in (one, several):
+        table["properties"]["discretisation"] = _or_word(table["properties"]["discretisation"], RISING)
     return {
         "$schema": DRAFT,
         "title": "bemkit scene",
@@ -136,13 +138,9 @@ class _Definitions:
         """Return the schema of a word alone, or a table with a kind: what is wrong in it is told of its kind alone."""
         tables = {word: self._kind(registry, word) for word in registry.words() if _can_be_loaded(registry, word)}
         alone = [word for word, table in tables.items() if not table["required"]]
-        role, listed = f"{registry.role[0].upper()}{registry.role[1:]}", {}
-        if registry.listed:
-            listed = {"items": {"$ref": f"#/definitions/{_slug(registry.role)}"}, "minItems": 1}
         return {
-            "description": f"{role}: a word, or a table with its kind{', or a list of them' if listed else ''}.",
-            "type": ["string", "object", *(["array"] if listed else [])],
-            **listed,
+            "description": f"{registry.role[0].upper()}{registry.role[1:]}: a word, or a table with its kind.",
+            "type": ["string", "object"],
             "required": ["kind"],
             "properties": {"kind": {"enum": list(tables)}} | _hints(tables),
             "allOf": [
@@ -152,12 +150,22 @@ class _Definitions:
         }
 
     def _kind(self, registry: Registry, word: str) -> Schema:
+        if word in registry.presets:
+            kind, options = registry.presets[word]
+            return {
+                "description": f"{kind} with {options}",
+                "type": "object",
+                "required": [],
+                "properties": {"kind": {"const": word}},
+            }
         table = self.table(registry.find(word))
-        properties = {"kind": {"const": word}} | table["properties"]
-        for kind, key, value in registry.variants:
-            if kind == word:
-                properties[key] = _any_of([properties[key], {"const": value}])
-        return table | {"properties": properties}
+        return table | {"properties": {"kind": {"const": word}} | table["properties"]}
+
+
+def _or_word(described: Schema, word: str) -> Schema:
+    """Return the schema of a key that may also be a word of no class."""
+    (own,) = described.pop("allOf")
+    return {"if": {"const": word}, "else": own} | described
 
 
 def _can_be_loaded(registry: Registry, word: str) -> bool:

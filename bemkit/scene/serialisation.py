@@ -150,9 +150,7 @@ def _unstructure_dataclass(value: Any, declared: Any, path: str, keep_defaults: 
         kind = registry.kind_of(value)
     except InputError as error:
         raise UnstructureError(f"{path}: {error}") from error
-    if table and kind == registry.listed:
-        return next(iter(table.values()))
-    return {"kind": kind, **table} if table else kind
+    return registry.written(kind, table)
 
 
 def _written_fields(value: Any, keep_defaults: bool) -> Iterator[tuple[Field[Any], Any]]:
@@ -311,13 +309,10 @@ def _one_of(value: object, declared: Any, path: str) -> Any:
 def _tagged(value: object, declared: Any, path: str) -> Any:
     """Return an object whose class is named by a word alone, or by the kind of a table."""
     registry = cast(Registry, registry_of(declared))  # the reader is chosen by it
-    if isinstance(value, list) and registry.listed:
-        listed = _tuple(value, tuple[declared, ...], path)
-        return _at(path, registry.find(registry.listed), listed)
     table = {"kind": value} if isinstance(value, str) else value
-    table = registry.without_variant(_exactly(table, dict, f"a {registry.role} as a word or as a table with its kind"))
+    table = registry.with_options(_exactly(table, dict, f"a {registry.role} as a word or as a table with its kind"))
     if "kind" not in table:
-        raise InputError(f"kind is missing: add kind = one of {', '.join(registry.built_in)}")
+        raise InputError(f"kind is missing: add kind = one of {', '.join(registry.words())}")
     kind_path = _join(path, "kind")
     named_class = _at(kind_path, registry.find, _structured(table.pop("kind"), str, kind_path))
     return _structured(table, named_class, path)

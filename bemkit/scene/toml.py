@@ -14,14 +14,13 @@ from typing import TYPE_CHECKING, Any, Literal, TypeVar, cast
 
 from bemkit.errors import InputError, printable
 from bemkit.formulas import closest
-from bemkit.scene.discretisation import Discretisation, Galerkin, HpGalerkin
+from bemkit.scene.discretisation import Discretisation, Galerkin
 from bemkit.scene.load_history import load_steps
 from bemkit.scene.mesh_options import MeshOptions
-from bemkit.scene.registry import FILE_KINDS, SOLVERS
+from bemkit.scene.registry import FILE_KINDS, RISING, SOLVERS
 from bemkit.scene.scene import Scene
 from bemkit.scene.serialisation import StructureError, UnstructureError, structure, unstructure
 from bemkit.solvers.base import ContactSolver
-from bemkit.solvers.fallbacks import Fallbacks
 
 if TYPE_CHECKING:
     from bemkit.scene.assembly import Assembly
@@ -156,7 +155,7 @@ def scene_from_table(table: dict[str, Any], folder: Path | None = None) -> Scene
     SceneError
         If it is no valid scene; the message begins with the key.
     """
-    table = _with_places_of_files(table, folder, "")
+    table = _with_rising_degrees(_with_places_of_files(table, folder, ""))
     try:
         scene = structure(table, _kind_of(table))
         if scene.steps:
@@ -174,6 +173,14 @@ def _kind_of(table: dict[str, Any]) -> type[Scene | Assembly]:
     from bemkit.scene.assembly import Assembly
 
     return Assembly
+
+
+def _with_rising_degrees(table: dict[str, Any]) -> dict[str, Any]:
+    """Return a table in which the word for rising degrees is an option of the mesh."""
+    mesh = table.get("mesh", {})
+    if table.get("discretisation") != RISING or not isinstance(mesh, dict):
+        return table
+    return {**table, "discretisation": "quadratic", "mesh": {**mesh, "rising_degrees": True}}
 
 
 def _with_places_of_files(table: dict[str, Any], folder: Path | None, path: str) -> dict[str, Any]:
@@ -214,6 +221,9 @@ def scene_to_toml(scene: Scene | Assembly) -> str:
         table = unstructure(scene, keep_defaults=True)
     except UnstructureError as error:
         raise SceneError(str(error)) from error
+    if scene.mesh.rising_degrees and scene.discretisation == Galerkin(2):
+        table["discretisation"] = RISING
+        del table["mesh"]["rising_degrees"]
     if not isinstance(scene, Scene):
         for body in table["bodies"]:
             body["parts"] = _named(body.get("parts", []), _PART_KEYS)
@@ -253,7 +263,8 @@ def with_overrides(
     discretisation, solver : str, optional
         Words as in scene files.
     degree : int or "hp", optional
-        Of Galerkin elements, instead of a discretisation; "hp" rises until an accuracy is reached.
+        Of Galerkin elements, instead of a discretisation; "hp", as for a discretisation, rises until the accuracy is
+        reached.
     rho : float, optional
         Penalty of the solver in units of E'/L; sets all penalties it has.
 
@@ -268,15 +279,20 @@ def with_overrides(
         raise SceneError(f"degree is {degree} and discretisation is {discretisation}: give one of them")
     changes: dict[str, Any] = {}
     try:
+        rises = scene.mesh.rising_degrees
+        if RISING in (discretisation, degree):
+            changes["discretisation"], rises = Galerkin(2), True
+        elif discretisation is not None:
+            changes["discretisation"], rises = structure(discretisation, cast(Any, Discretisation)), False
+        elif degree is not None:
+            changes["discretisation"], rises = Galerkin(cast(int, degree)), False
         if elements is not None:
             options = MeshOptions() if scene.mesh.elements is None else scene.mesh
             changes["mesh"] = replace(options, elements=elements)
-        if accuracy is not None:
-            changes["mesh"] = MeshOptions(accuracy=accuracy)
-        if discretisation is not None:
-            changes["discretisation"] = structure(discretisation, cast(Any, Discretisation))
-        if degree is not None:
-            changes["discretisation"] = HpGalerkin() if degree == "hp" else Galerkin(degree)
+        elif accuracy is not None:
+            changes["mesh"] = MeshOptions(accuracy=accuracy, rising_degrees=rises)
+        elif rises != scene.mesh.rising_degrees:
+            changes["mesh"] = replace(scene.mesh, rising_degrees=rises)
         if solver is not None:
             changes["solver"] = structure(solver, cast(Any, ContactSolver))
         if rho is not None:
@@ -290,16 +306,10 @@ def with_overrides(
 
 
 def _with_rho(solver: Any, rho: float) -> Any:
-    if isinstance(solver, Fallbacks):
-        return Fallbacks(tuple(_with_rho(each, rho) if _penalties(each) else each for each in solver.drivers))
-    names = _penalties(solver)
+    names = [entry.name for entry in fields(solver) if entry.name in ("rho", "rho_n", "rho_t")]
     if not names:
         raise SceneError(f"rho is {rho}: the solver {SOLVERS.kind_of(solver)} has no penalty: leave rho out")
     return replace(solver, **dict.fromkeys(names, rho))
-
-
-def _penalties(solver: Any) -> list[str]:
-    return [entry.name for entry in fields(solver) if entry.name in ("rho", "rho_n", "rho_t")]
 
 
 def _ordered(table: dict[str, Any], keys: tuple[str, ...]) -> dict[str, Any]:

@@ -65,12 +65,14 @@ class Target:
         return ", ".join(f"{name} {wanted:.0e}" for name, wanted in self.errors.items())
 
 
-def by_accuracy(discretisation: bk.Galerkin, *accuracies: float) -> tuple[Choice, ...]:
-    """Return runs that follow accuracies."""
-    return tuple(Choice(bk.MeshOptions(accuracy=accuracy), discretisation) for accuracy in accuracies)
+def by_accuracy(discretisation: bk.Galerkin | None, *accuracies: float) -> tuple[Choice, ...]:
+    """Return runs that follow accuracies, with degrees that rise if none is given."""
+    rises = discretisation is None
+    options = (bk.MeshOptions(accuracy=accuracy, rising_degrees=rises) for accuracy in accuracies)
+    return tuple(Choice(mesh, discretisation or bk.Galerkin(2)) for mesh in options)
 
 
-LINEAR, QUADRATIC, HP = bk.LinearGalerkin(), bk.QuadraticGalerkin(), bk.HpGalerkin()
+LINEAR, QUADRATIC, HP = bk.Galerkin(1), bk.Galerkin(2), None
 FIRST_LOOK = Choice(bk.MeshOptions(elements=36, density={"bottom": 6.0}, grading=bk.Algebraic(1.2)), QUADRATIC)
 TARGETS = (
     Target({"sigma_n": 1e-2}, 0.02, (FIRST_LOOK, *by_accuracy(HP, 3e-2))),

@@ -112,7 +112,7 @@ def main() -> None:
         repetitions = 9 if n_elements <= 500 else 3
         lu, cholesky, collocation, galerkin = operators(n_elements, repetitions)
         constant, _ = solve_time(n_elements, bk.ConstantCollocation(), repetitions)
-        linear, _ = solve_time(n_elements, bk.LinearGalerkin(), repetitions)
+        linear, _ = solve_time(n_elements, bk.Galerkin(1), repetitions)
         table.add_row(
             str(n_elements),
             *(f"{1e3 * value:.1f}" for value in (lu, cholesky)),

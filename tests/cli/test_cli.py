@@ -26,7 +26,7 @@ from bemkit.cli.console import ConvergenceTable, format_size
 from bemkit.cli.main import commands, main
 from bemkit.operators.linear.solvers import Hierarchical
 from bemkit.results.result_file import read_result
-from bemkit.scene.discretisation import QuadraticGalerkin
+from bemkit.scene.discretisation import Galerkin
 from bemkit.scene.mesh_options import MeshOptions
 from bemkit.scene.steps import Step
 from bemkit.scene.toml import load_scene, scene_from_toml, scene_to_toml, shipped_files
@@ -132,7 +132,7 @@ def test_a_run_that_does_not_converge_says_so_and_exits_with_1(capsys: pytest.Ca
 def test_an_accuracy_out_of_reach_exits_with_3_and_keeps_what_was_reached(capsys: pytest.CaptureFixture[str]) -> None:
     options = MeshOptions(accuracy=1e-9, most_elements=60)
     Path("far.toml").write_text(
-        scene_to_toml(dataclasses.replace(load_scene("paper-1"), mesh=options, discretisation=QuadraticGalerkin()))
+        scene_to_toml(dataclasses.replace(load_scene("paper-1"), mesh=options, discretisation=Galerkin(2)))
     )
     assert call("run", "far.toml", "-o", "far.h5", "--json", "far.json") == 3
     shown = " ".join(capsys.readouterr().out.split())  # lines are folded

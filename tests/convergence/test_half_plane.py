@@ -239,7 +239,7 @@ def block(n_half_widths: float) -> bk.Solution:
             bk.Part("load", bk.Pressure(1.0 / size), ("bottom",)),
             bk.Part("side", bk.Roller(), ("left", "right")),
         ),
-        discretisation=bk.QuadraticGalerkin(),
+        discretisation=bk.Galerkin(2),
         mesh=bk.MeshOptions(accuracy=3e-4),
     )
     solution = bk.run(scene)

@@ -15,7 +15,7 @@ from bemkit.runs.adaptive import run_adaptive
 from tests.scenes import angle, contact_error, paper, reference_values
 from tests.slow import slow_except
 
-ELEMENTS: dict[str, Any] = {"linear": bk.LinearGalerkin(), "quadratic": bk.QuadraticGalerkin()}
+ELEMENTS: dict[str, Any] = {"linear": bk.Galerkin(1), "quadratic": bk.Galerkin(2)}
 
 
 def slope(sizes: list[int], errors: list[float]) -> float:
@@ -93,7 +93,7 @@ def test_quadratic_displacements_hold_pure_bending_exactly(exponent: float) -> N
                 sides=("left",),
             ),
         ),
-        discretisation=bk.QuadraticGalerkin(),
+        discretisation=bk.Galerkin(2),
         mesh=bk.MeshOptions(elements=24, grading=bk.Algebraic(exponent)),
     )
     solution = bk.run(scene)
@@ -117,7 +117,7 @@ def test_quadratic_elements_pass_the_contact_patch_test() -> None:
             bk.Part("lid", bk.PrescribedDisplacement(y=-1e-3), sides=("top",)),
             bk.Part("wall", bk.Roller(), sides=("left",)),
         ),
-        discretisation=bk.QuadraticGalerkin(),
+        discretisation=bk.Galerkin(2),
         mesh=bk.MeshOptions(elements=26, grading=bk.Algebraic(2.0)),
     )
     contact = bk.run(scene).contact

@@ -81,9 +81,7 @@ def test_pin_in_a_hole_of_an_infinite_sheet(clearance: float, half_angle: float,
         parts=(core, bk.Part("surface", bk.Free(), quadrants("outer"))),
     )  # fmt: skip
     pair, options = bk.ContactPair(("pin.surface", "sheet.hole")), bk.MeshOptions(accuracy=0.005)
-    scene = bk.Assembly(
-        title="Pin", bodies=(sheet, pin), contacts=(pair,), discretisation=bk.QuadraticGalerkin(), mesh=options
-    )
+    scene = bk.Assembly(title="Pin", bodies=(sheet, pin), contacts=(pair,), discretisation=bk.Galerkin(2), mesh=options)
     solution = bk.run(scene)
     assert solution.is_converged
     (contact,) = solution.contacts
@@ -113,7 +111,7 @@ def test_cylinders_approach_each_other_as_the_closed_form_says() -> None:
             bodies=(lower, upper),
             rigid=(plate,),
             contacts=(bk.ContactPair(("upper.bottom", "lower.top")), bk.ContactPair(("upper.top", "plate"))),
-            discretisation=bk.QuadraticGalerkin(),
+            discretisation=bk.Galerkin(2),
             mesh=bk.MeshOptions(accuracy=0.01),
         )
     )

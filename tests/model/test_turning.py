@@ -26,7 +26,7 @@ def tunnel(inside: bk.Condition, **options: object) -> bk.Assembly:
     lining = bk.Body(
         name="lining", shape=bk.Ring(0.7, 1.0), material=STEEL, parts=(part, OUTSIDE), mesh=bk.MeshOptions(18)
     )
-    settings: dict[str, object] = {"discretisation": bk.LinearGalerkin(), "law": bk.Frictionless(), **options}
+    settings: dict[str, object] = {"discretisation": bk.Galerkin(1), "law": bk.Frictionless(), **options}
     contacts = (bk.ContactPair(("rock.wall", "lining.out")),)
     return bk.Assembly(title="tunnel", bodies=(ROCK, lining), contacts=contacts, **settings)  # type: ignore[arg-type]
 
@@ -34,7 +34,7 @@ def tunnel(inside: bk.Condition, **options: object) -> bk.Assembly:
 TWISTED = tunnel(bk.Pressure(1.0, 0.1))
 
 
-@pytest.mark.parametrize("discretisation", [bk.ConstantCollocation(), bk.LinearGalerkin()], ids=["constant", "linear"])
+@pytest.mark.parametrize("discretisation", [bk.ConstantCollocation(), bk.Galerkin(1)], ids=["constant", "linear"])
 def test_a_load_that_turns_a_round_body_is_not_held_by_its_mesh(discretisation: bk.Discretisation) -> None:
     solution = bk.run(replace(TWISTED, discretisation=discretisation))
     assert solution.status is bk.Status.UNSOLVABLE_LOAD
@@ -85,7 +85,7 @@ def test_corners_keep_a_body_from_turning() -> None:
     loads = bk.Part("push", bk.Traction(0.0, bk.Expression("-1 - x")), sides=("top",))
     block = bk.Body(name="block", shape=square, material=STEEL, parts=(loads,), mesh=bk.MeshOptions(16))
     contacts = (bk.ContactPair(("block.bottom", "base.top")),)
-    assembly = bk.Assembly(title="block", bodies=(base, block), contacts=contacts, discretisation=bk.LinearGalerkin())
+    assembly = bk.Assembly(title="block", bodies=(base, block), contacts=contacts, discretisation=bk.Galerkin(1))
     assert bk.run(assembly).is_converged
 
 

@@ -21,7 +21,7 @@ def test_what_was_asked_for_is_taken() -> None:
     choice = choose_linear_solver(requested)
     assert choice.solver is requested
     assert choice.reason == "asked for"
-    scene = replace(SCENE, discretisation=bk.LinearGalerkin(), linear_solver=requested)
+    scene = replace(SCENE, discretisation=bk.Galerkin(1), linear_solver=requested)
     assert bk.run(scene).plan.linear_solver is requested
 
 
@@ -30,7 +30,7 @@ def test_the_plan_says_which_and_why() -> None:
         items = make_plan(scene, scene.build_mesh()).items
         return next(item.reason for item in items if item.name == "linear solver of the body")
 
-    scene = replace(SCENE, discretisation=bk.LinearGalerkin())
+    scene = replace(SCENE, discretisation=bk.Galerkin(1))
     assert reason(scene).startswith("Cholesky, because S is positive definite")
     assert reason(replace(scene, linear_solver=bk.DenseCholesky())).startswith("asked for")
     assert reason(replace(scene, discretisation=bk.ConstantCollocation())).startswith(

@@ -10,7 +10,7 @@ import pytest
 import bemkit as bk
 from tests.slow import slow_except
 
-DISCRETISATIONS = {"constant": bk.ConstantCollocation(), "linear": bk.LinearGalerkin()}
+DISCRETISATIONS = {"constant": bk.ConstantCollocation(), "linear": bk.Galerkin(1)}
 
 
 def solved(example: int, discretisation: str, friction: float, solver: bk.ContactSolver | None = None) -> bk.Solution:

@@ -15,7 +15,7 @@ from bemkit.arrays import FloatArray
 from tests.slow import slow_except
 
 REFERENCE = Path(__file__).parents[1] / "reference" / "data"
-DISCRETISATIONS = {"constant": bk.ConstantCollocation(), "linear": bk.LinearGalerkin()}
+DISCRETISATIONS = {"constant": bk.ConstantCollocation(), "linear": bk.Galerkin(1)}
 SOLVERS = {"ssn": bk.SemismoothNewton(), "alm": bk.AugmentedLagrangian()}
 
 

@@ -36,7 +36,7 @@ def pressed(obstacle: bk.Obstacle, *parts: bk.Part) -> bk.Scene:
         parts=(bk.Part("bottom", bk.Clamped(), ("bottom",)), bk.Part("top", bk.Contact(obstacle), ("top",)), *parts),
         law=bk.Coulomb(0.3),
         mesh=bk.MeshOptions(elements=80),
-        discretisation=bk.QuadraticGalerkin(),
+        discretisation=bk.Galerkin(2),
     )
 
 
@@ -48,7 +48,7 @@ def ring(interference: float) -> bk.Scene:
         parts=(bk.Part("hole", bk.Contact(bk.Circle((0.0, 0.0), 1.0 + interference)), INNER),),
         law=bk.Coulomb(0.3),
         mesh=bk.MeshOptions(elements=48),
-        discretisation=bk.QuadraticGalerkin(),
+        discretisation=bk.Galerkin(2),
     )
 
 

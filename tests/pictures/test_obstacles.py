@@ -42,7 +42,7 @@ def block(obstacle: bk.Obstacle) -> bk.Scene:
             bk.Part("bottom", bk.Contact(obstacle), ("bottom",)),
         ),
         mesh=bk.MeshOptions(elements=40),
-        discretisation=bk.QuadraticGalerkin(),
+        discretisation=bk.Galerkin(2),
     )
 
 

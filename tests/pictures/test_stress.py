@@ -28,7 +28,7 @@ def points_of(solution: bk.Solution) -> StressPoints:
 
 
 def test_points_stay_as_far_from_short_elements_as_a_picture_shows() -> None:
-    scene = replace(bk.load_scene("bending"), mesh=bk.MeshOptions(elements=400), discretisation=bk.LinearGalerkin())
+    scene = replace(bk.load_scene("bending"), mesh=bk.MeshOptions(elements=400), discretisation=bk.Galerkin(1))
     solution = bk.run(scene)
     spacing = 20.0 * float(solution.mesh.lengths.max())
     low, high = solution.mesh.nodes.min(axis=0), solution.mesh.nodes.max(axis=0)
@@ -42,7 +42,9 @@ def test_points_stay_as_far_from_short_elements_as_a_picture_shows() -> None:
 def test_beside_constant_elements_stresses_have_no_kinks() -> None:
     """Along the wall of Example 1, beside fields of degrees up to 6: there 0.7 lengths away they were off by 0.03."""
     scene = bk.load_scene("paper-1")
-    true = bk.run(replace(scene, discretisation=bk.HpGalerkin(), mesh=bk.MeshOptions(accuracy=1e-4)))
+    true = bk.run(
+        replace(scene, discretisation=bk.Galerkin(2), mesh=bk.MeshOptions(rising_degrees=True, accuracy=1e-4))
+    )
     found = stress_points(bk.run(scene), 0.02, shown(true).frame)
     x, y = found.points.T
     beside = (x > 0.9) & (x < 0.999) & (y > 0.1) & (y < 0.9)
@@ -146,7 +148,7 @@ def test_bodies_without_an_end_are_drawn_as_far_as_the_frame() -> None:
         material=STRESS_MATERIAL,
         parts=(bk.Part("wall", bk.Pressure(1.0)),),
         mesh=bk.MeshOptions(elements=24),
-        discretisation=bk.QuadraticGalerkin(),
+        discretisation=bk.Galerkin(2),
     )
     found = points_of(bk.run(scene))
     radius = np.hypot(*found.points.T)

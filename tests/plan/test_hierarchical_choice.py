@@ -78,7 +78,7 @@ def test_compressed_equations_of_galerkin_are_refused(degree: int) -> None:
 
 
 def test_automatic_keeps_galerkin_dense() -> None:
-    assert chosen(scene_of(5000, discretisation=bk.LinearGalerkin())).hierarchical is None
+    assert chosen(scene_of(5000, discretisation=bk.Galerkin(1))).hierarchical is None
 
 
 def test_half_planes_have_equations_of_their_own() -> None:

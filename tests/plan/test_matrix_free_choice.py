@@ -55,7 +55,7 @@ def test_galerkin_takes_what_automatic_takes() -> None:
     choice = choose_linear_solver(ASKED)
     assert choice.solver == choose_linear_solver(bk.Automatic()).solver
     assert "not matrix-free, but" in choice.reason
-    scene = scene_of(40, discretisation=bk.LinearGalerkin())
+    scene = scene_of(40, discretisation=bk.Galerkin(1))
     with pytest.raises(ValueError, match="a map does not choose"):
         bk.GalerkinMap(scene.build_mesh(), scene.material, linear_solver=ASKED)
 

@@ -77,9 +77,7 @@ def test_computed_solutions_approach_the_references(name: str) -> None:
         meshes = (bk.MeshOptions(elements=12), bk.MeshOptions(elements=24))
     coarse, fine = (
         errors_of(answer_of(solution, reference.places), reference)
-        for solution in (
-            bk.run(dataclasses.replace(scene, discretisation=bk.QuadraticGalerkin(), mesh=m)) for m in meshes
-        )
+        for solution in (bk.run(dataclasses.replace(scene, discretisation=bk.Galerkin(2), mesh=m)) for m in meshes)
     )
     limits = {"energy": 1e-6, "sigma_n": 2e-3, "sigma_t": 4e-3, "displacement": 2e-4, "transitions": 3e-3}
     for measure, limit in limits.items():
@@ -97,7 +95,7 @@ def test_fields_are_those_of_the_elements() -> None:
     constant = bk.run(dataclasses.replace(scene, mesh=bk.MeshOptions(elements=16)))
     steps = answer_of(constant, reference.places).sigma_n
     assert len(set(steps.tolist())) == constant.contact.n_contact
-    linear = bk.run(dataclasses.replace(scene, mesh=bk.MeshOptions(elements=16), discretisation=bk.LinearGalerkin()))
+    linear = bk.run(dataclasses.replace(scene, mesh=bk.MeshOptions(elements=16), discretisation=bk.Galerkin(1)))
     expected = np.interp(places.s, linear.contact.s, linear.contact.u_n)
     np.testing.assert_allclose(answer_of(linear, reference.places).u_n, expected, rtol=1e-12)
 
@@ -109,7 +107,7 @@ def test_a_reference_belongs_to_its_problem_alone() -> None:
         title="mine",
         mesh=bk.MeshOptions(elements=20),
         solver=bk.AugmentedLagrangian(),
-        discretisation=bk.QuadraticGalerkin(),
+        discretisation=bk.Galerkin(2),
     )
     assert find_reference(other_mesh) is not None
     assert find_reference(dataclasses.replace(scene, law=bk.Coulomb(0.51))) is None

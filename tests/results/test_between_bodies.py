@@ -149,7 +149,7 @@ def test_a_contact_without_forces_is_measured_by_what_its_own_bodies_move(presse
 
 
 def test_a_contact_with_a_rigid_obstacle_is_that_of_one_body() -> None:
-    scene = replace(bk.load_scene("paper-1"), discretisation=bk.QuadraticGalerkin(), mesh=bk.MeshOptions(elements=40))
+    scene = replace(bk.load_scene("paper-1"), discretisation=bk.Galerkin(2), mesh=bk.MeshOptions(elements=40))
     body = bk.Body(name="square", shape=scene.shape, material=scene.material, parts=scene.parts)
     assembly = bk.Assembly(
         title="x", bodies=(body,), law=scene.law, discretisation=scene.discretisation, mesh=scene.mesh

@@ -22,7 +22,7 @@ def block(x: float, obstacle: bk.Obstacle = CYLINDER) -> bk.Scene:
             bk.Part("floor", bk.Contact(obstacle), ("bottom",)),
             bk.Part("top", bk.PrescribedDisplacement(x=x, y=-0.01), ("top",)),
         ),
-        discretisation=bk.QuadraticGalerkin(),
+        discretisation=bk.Galerkin(2),
         mesh=bk.MeshOptions(elements=60, density={"bottom": 4.0}),
     )
 

@@ -28,18 +28,16 @@ def resultants(body: bk.Solution) -> dict[str, np.ndarray]:
     return {force.name: np.array([force.force_x, force.force_y, force.moment]) for force in body.part_forces}
 
 
-@pytest.mark.parametrize(
-    "discretisation", [bk.ConstantCollocation(), bk.LinearGalerkin(), bk.QuadraticGalerkin(), bk.Galerkin(5)]
-)
-def test_supports_carry_the_loads(discretisation: bk.LinearGalerkin) -> None:
+@pytest.mark.parametrize("discretisation", [bk.ConstantCollocation(), bk.Galerkin(1), bk.Galerkin(2), bk.Galerkin(5)])
+def test_supports_carry_the_loads(discretisation: bk.Galerkin) -> None:
     forces = resultants(bk.run(replace(BLOCK, discretisation=discretisation)))
     np.testing.assert_allclose(forces["load"], [-0.2, -1.0, -0.1], rtol=1e-12)
     np.testing.assert_allclose(sum(forces.values()), 0.0, atol=1e-11)
     assert abs(forces["wall"][1]) < 0.02  # what a corner with the clamped base leaves of a smooth wall
 
 
-@pytest.mark.parametrize("discretisation", [bk.ConstantCollocation(), bk.QuadraticGalerkin()])
-def test_supports_carry_the_weight(discretisation: bk.LinearGalerkin) -> None:
+@pytest.mark.parametrize("discretisation", [bk.ConstantCollocation(), bk.Galerkin(2)])
+def test_supports_carry_the_weight(discretisation: bk.Galerkin) -> None:
     weight = bk.Gravity(density=1.0, acceleration=(3.0, -10.0))
     forces = resultants(bk.run(replace(BLOCK, discretisation=discretisation, body_forces=(weight,))))
     np.testing.assert_allclose(forces["base"] + forces["wall"] + forces["load"], [-6.0, 20.0, 16.0], rtol=1e-9)

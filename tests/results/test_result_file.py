@@ -286,7 +286,7 @@ def test_a_damaged_list_of_contents_is_named() -> None:
         (replaced("mesh/nodes", data=np.zeros((40, 2))), "inconsistent content"),
         (replaced("mesh/elements", data=np.full((40, 2), 10**12)), "inconsistent content"),
         (replaced("mesh/part_elements", data=np.full(3, -5)), "inconsistent content"),
-        (replaced("scene", data=np.bytes_(b"title = 3")), "scene inside: title"),
+        (replaced("scene", data=np.bytes_(b"title = 3")), "scene inside: 4 mistakes.*title: 3 does not fit"),
         (replaced("scene", data=np.bytes_(b"\xff\xfe")), "scene is not UTF-8"),
         (replaced("scene", data=np.bytes_(b"x" * 1_000_001)), "scene is not a text of at most"),
         (replaced("scene", data="text of variable length"), "scene holds .*object"),

@@ -62,8 +62,8 @@ def pushed(law: bk.FrictionLaw, accuracy: float) -> bk.Scene:
             bk.Part("floor", bk.Contact(bk.HalfPlane()), sides=("bottom",)),
             bk.Part("top", bk.PrescribedDisplacement(x=2e-3, y=-1e-2), sides=("top",)),
         ),
-        discretisation=bk.HpGalerkin(),
-        mesh=bk.MeshOptions(accuracy=accuracy),
+        discretisation=bk.Galerkin(2),
+        mesh=bk.MeshOptions(rising_degrees=True, accuracy=accuracy),
     )
 
 

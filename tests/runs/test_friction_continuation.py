@@ -8,7 +8,7 @@ import bemkit as bk
 from bemkit.studies.stability.independent_check import check_solution
 from tests.slow import slow_except
 
-ELEMENTS = [bk.ConstantCollocation(), bk.LinearGalerkin(), bk.QuadraticGalerkin()]
+ELEMENTS = [bk.ConstantCollocation(), bk.Galerkin(1), bk.Galerkin(2)]
 MOST_SOLVES, MOST_ON_FINE_MESHES = 150, 250
 """The path from all nodes sticking takes 110 to 250 on Example 1, and 740 on the bonded punch. On fine meshes that from
 a quarter of the friction takes up to 229."""

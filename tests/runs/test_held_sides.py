@@ -36,7 +36,7 @@ SCENES = {
         bk.PrescribedDisplacement(x=None, y=-0.01), FOOT, bk.Part("wall", bk.Roller(), ("left",)), law=bk.Coulomb(0.3)
     ),
 }
-ELEMENTS = {"linear": bk.LinearGalerkin(), "quadratic": bk.QuadraticGalerkin()}
+ELEMENTS = {"linear": bk.Galerkin(1), "quadratic": bk.Galerkin(2)}
 
 
 def solved(name: str, word: str, exponent: float = 1.0, n_elements: int = 40) -> bk.Solution:

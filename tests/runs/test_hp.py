@@ -33,8 +33,8 @@ EXAMPLES = ("paper-1", "paper-2", "wavy-obstacle", "disc-between-plates")
 
 @lru_cache
 def risen(name: str, accuracy: float, degree: int | None = None) -> tuple[bk.Solution, ...]:
-    discretisation = bk.HpGalerkin() if degree is None else bk.Galerkin(degree)
-    mesh = bk.MeshOptions(accuracy=accuracy)
+    discretisation = bk.Galerkin(2 if degree is None else degree)
+    mesh = bk.MeshOptions(accuracy=accuracy, rising_degrees=degree is None)
     return run_adaptive(dataclasses.replace(bk.load_scene(name), discretisation=discretisation, mesh=mesh))
 
 
@@ -162,9 +162,9 @@ def test_the_first_mesh_in_layers_is_the_last_where_it_may_be() -> None:
     held = tuple(
         dataclasses.replace(part, condition=bk.Clamped()) if part.name == "foundation" else part for part in scene.parts
     )
-    mesh = bk.MeshOptions(accuracy=3e-4)
+    mesh = bk.MeshOptions(accuracy=3e-4, rising_degrees=True)
     no_law = dataclasses.replace(scene, law=bk.Frictionless())
-    scene = dataclasses.replace(no_law, parts=held, discretisation=bk.HpGalerkin(), mesh=mesh)
+    scene = dataclasses.replace(no_law, parts=held, discretisation=bk.Galerkin(2), mesh=mesh)
     # without contact tractions nothing tells
     assert [degree_of(solution) for solution in run_adaptive(scene)][:2] == [2, 4]
 
@@ -192,7 +192,9 @@ def test_the_last_mesh_has_no_layers_for_another_one() -> None:
 def test_what_is_smooth_takes_one_mesh() -> None:
     scene = bk.load_scene("bending")
     solutions = run_adaptive(
-        dataclasses.replace(scene, discretisation=bk.HpGalerkin(), mesh=bk.MeshOptions(accuracy=1e-10))
+        dataclasses.replace(
+            scene, discretisation=bk.Galerkin(2), mesh=bk.MeshOptions(rising_degrees=True, accuracy=1e-10)
+        )
     )
     assert len(solutions) == 1
     assert solutions[0].is_converged
@@ -238,9 +240,9 @@ def test_the_first_look_is_even_on_contact_parts_and_has_layers_at_their_ends() 
 def test_a_first_look_is_taken_where_layers_follow() -> None:
     """The plan says so, too; quadratic elements, whose density follows, take more of them."""
     quadratic = dataclasses.replace(
-        bk.load_scene("paper-1"), discretisation=bk.QuadraticGalerkin(), mesh=bk.MeshOptions(accuracy=1e-3)
+        bk.load_scene("paper-1"), discretisation=bk.Galerkin(2), mesh=bk.MeshOptions(accuracy=1e-3)
     )
-    layered = dataclasses.replace(quadratic, discretisation=bk.HpGalerkin())
+    layered = dataclasses.replace(quadratic, mesh=dataclasses.replace(quadratic.mesh, rising_degrees=True))
     assert risen("paper-1", 3e-5)[0].mesh.n_elements == layered.build_mesh().n_elements
     assert layered.build_mesh().n_elements < 0.6 * quadratic.build_mesh().n_elements
 
@@ -301,17 +303,17 @@ def test_curves_turn_little_on_an_element() -> None:
 
 def test_words_for_rising_degrees() -> None:
     scene = with_overrides(bk.load_scene("paper-1"), degree="hp", accuracy=1e-6)
-    assert scene.discretisation == bk.HpGalerkin()
+    assert (scene.discretisation, scene.mesh.rising_degrees) == (bk.Galerkin(2), True)
     text = scene_to_toml(scene)
     assert 'discretisation = "hp"' in text
     assert scene_from_toml(text) == scene
-    longer = text.replace('discretisation = "hp"', 'discretisation = { kind = "galerkin", degree = "hp" }')
-    assert scene_from_toml(longer) == scene
+    longer = text.replace('discretisation = "hp"', 'discretisation = "quadratic"')
+    assert scene_from_toml(longer.replace("[mesh]", "[mesh]\nrising_degrees = true")) == scene
     assert with_overrides(bk.load_scene("paper-1"), discretisation="hp", accuracy=1e-6) == scene
 
 
 def test_rising_degrees_need_an_accuracy() -> None:
-    with pytest.raises(SceneError, match=r"discretisation is .hp., whose degree rises .*: give mesh\.accuracy"):
+    with pytest.raises(SceneError, match=r"discretisation .hp.\): degrees rise until .*: give mesh\.accuracy"):
         with_overrides(bk.load_scene("paper-1"), degree="hp")
 
 
@@ -324,7 +326,9 @@ def test_an_accuracy_beyond_round_off_is_refused() -> None:
 
 def test_budgets_are_kept() -> None:
     scene = dataclasses.replace(
-        bk.load_scene("paper-1"), discretisation=bk.HpGalerkin(), mesh=bk.MeshOptions(accuracy=1e-8, most_elements=100)
+        bk.load_scene("paper-1"),
+        discretisation=bk.Galerkin(2),
+        mesh=bk.MeshOptions(rising_degrees=True, accuracy=1e-8, most_elements=100),
     )
     last = bk.run(scene)
     assert last.status is bk.Status.ACCURACY_NOT_REACHED
@@ -388,8 +392,8 @@ def test_a_mesh_that_cannot_be_made_loses_nothing(monkeypatch: pytest.MonkeyPatc
 
     monkeypatch.setattr(LayeredMeshes, "following", refusing)
     scene = bk.load_scene("paper-1")
-    mesh = bk.MeshOptions(accuracy=1e-6)
-    solution = bk.run(dataclasses.replace(scene, discretisation=bk.HpGalerkin(), mesh=mesh))
+    mesh = bk.MeshOptions(accuracy=1e-6, rising_degrees=True)
+    solution = bk.run(dataclasses.replace(scene, discretisation=bk.Galerkin(2), mesh=mesh))
     assert solution.status is bk.Status.ACCURACY_NOT_REACHED
     assert "no finer mesh can be made (no room)" in solution.message
 
@@ -403,7 +407,7 @@ def pushed(side: str, y: float) -> bk.Part:
     return bk.Part("pushed", condition, sides=(side,), where=lambda x, _: (x > middle[0]) & (x < middle[1]))
 
 
-def two_blocks(accuracy: float, law: bk.FrictionLaw, discretisation: bk.Discretisation) -> bk.Assembly:
+def two_blocks(accuracy: float, law: bk.FrictionLaw, degree: int | None = None) -> bk.Assembly:
     """Two mirrored blocks, pressed together in the middle: their ends lift off."""
     material = bk.Material(youngs_modulus=1.0, poisson_ratio=0.3)
     upper = bk.Body(
@@ -419,8 +423,8 @@ def two_blocks(accuracy: float, law: bk.FrictionLaw, discretisation: bk.Discreti
         bodies=(upper, lower),
         contacts=(bk.ContactPair(("upper.bottom", "lower.top")),),
         law=law,
-        discretisation=discretisation,
-        mesh=bk.MeshOptions(accuracy=accuracy),
+        discretisation=bk.Galerkin(degree or 2),
+        mesh=bk.MeshOptions(accuracy=accuracy, rising_degrees=degree is None),
     )
 
 
@@ -432,8 +436,8 @@ def half_of_two_blocks(accuracy: float) -> bk.Scene:
         material=bk.Material(youngs_modulus=1.0, poisson_ratio=0.3),
         law=bk.Frictionless(),
         parts=(bk.Part("base", bk.Contact(bk.HalfPlane()), sides=("bottom",)), pushed("top", -1e-3)),
-        discretisation=bk.HpGalerkin(),
-        mesh=bk.MeshOptions(accuracy=accuracy),
+        discretisation=bk.Galerkin(2),
+        mesh=bk.MeshOptions(rising_degrees=True, accuracy=accuracy),
     )
 
 
@@ -447,7 +451,7 @@ def half_of_two_blocks(accuracy: float) -> bk.Scene:
 )
 def test_degrees_of_two_bodies_rise_together(accuracy: float, law: bk.FrictionLaw) -> None:
     """Mirrored bodies do not rub, and each is one on a frictionless plane: places of change, energies, tractions."""
-    both, one = bk.run(two_blocks(accuracy, law, bk.HpGalerkin())), bk.run(half_of_two_blocks(0.1 * accuracy))
+    both, one = bk.run(two_blocks(accuracy, law)), bk.run(half_of_two_blocks(0.1 * accuracy))
     assert both.is_converged, both.message
     assert both.certificate.worst <= 1e-9
     assert both.estimated_traction_error is not None
@@ -467,7 +471,11 @@ def test_a_bolt_in_a_plate_needs_few_elements_for_five_digits() -> None:
     """Curved sides with friction: places and energies settle faster than the accuracy asked for."""
     plate = bk.load_scene("pin-in-plate")
     rough, fine = (
-        bk.run(dataclasses.replace(plate, discretisation=bk.HpGalerkin(), mesh=bk.MeshOptions(accuracy=accuracy)))
+        bk.run(
+            dataclasses.replace(
+                plate, discretisation=bk.Galerkin(2), mesh=bk.MeshOptions(rising_degrees=True, accuracy=accuracy)
+            )
+        )
         for accuracy in (1e-4, 1e-5)
     )
     assert fine.is_converged
@@ -498,20 +506,20 @@ def test_copies_have_one_mesh_as_fine_as_the_worst_needs() -> None:
         bodies=(base, foot),
         touching=bk.Touching(within=1e-9),
         law=bk.Coulomb(0.5),
-        discretisation=bk.HpGalerkin(),
-        mesh=bk.MeshOptions(accuracy=1e-2),
+        discretisation=bk.Galerkin(2),
+        mesh=bk.MeshOptions(rising_degrees=True, accuracy=1e-2),
     )
     solution = bk.run(feet)
     assert solution.is_converged, solution.message
     _, one, two = solution.solved_bodies
     np.testing.assert_allclose(one.mesh.lengths, two.mesh.lengths, rtol=1e-12)
     assert one.energy != pytest.approx(two.energy, rel=1e-6)
-    quadratic = bk.run(dataclasses.replace(feet, discretisation=bk.QuadraticGalerkin()))
+    quadratic = bk.run(dataclasses.replace(feet, discretisation=bk.Galerkin(2)))
     assert solution.energy == pytest.approx(quadratic.energy, rel=2e-4)  # the square of both accuracies
 
 
 def test_degrees_of_bodies_do_not_rise_in_histories() -> None:
-    history = dataclasses.replace(two_blocks(1e-3, bk.Frictionless(), bk.HpGalerkin()), load_factors=(0.5, 1.0))
+    history = dataclasses.replace(two_blocks(1e-3, bk.Frictionless()), load_factors=(0.5, 1.0))
     with pytest.raises(InputError, match="discretisation is 'hp', and there are 2 load steps"):
         bk.run(history)
 

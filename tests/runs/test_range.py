@@ -18,7 +18,7 @@ from bemkit.model.units import OutOfRangeError
 from bemkit.runs import history
 from bemkit.scene.toml import with_overrides
 
-ELEMENTS = [bk.LinearGalerkin(), bk.ConstantCollocation()]
+ELEMENTS = [bk.Galerkin(1), bk.ConstantCollocation()]
 
 
 def block(

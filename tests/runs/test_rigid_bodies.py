@@ -37,7 +37,7 @@ PRESSED = bk.Assembly(
     bodies=(BLOCK,),
     rigid=(PUNCH,),
     contacts=(bk.ContactPair(("block.top", "punch")),),
-    discretisation=bk.QuadraticGalerkin(),
+    discretisation=bk.Galerkin(2),
 )
 SOME = bk.Coulomb(0.3)
 
@@ -117,7 +117,7 @@ V = bk.Assembly(
         ),
     ),
     contacts=(bk.ContactPair(("left.face", "disc")), bk.ContactPair(("disc", "right.face"))),
-    discretisation=bk.QuadraticGalerkin(),
+    discretisation=bk.Galerkin(2),
 )
 
 

@@ -24,7 +24,7 @@ from tests.slow import slow_except
 
 @lru_cache
 def adapted(example: int, word: str, accuracy: float) -> tuple[bk.Solution, ...]:
-    discretisation = {"linear": bk.LinearGalerkin(), "quadratic": bk.QuadraticGalerkin()}[word]
+    discretisation = {"linear": bk.Galerkin(1), "quadratic": bk.Galerkin(2)}[word]
     return run_adaptive(paper(example, discretisation, bk.MeshOptions(accuracy=accuracy)))
 
 
@@ -256,7 +256,7 @@ def test_the_time_of_the_next_mesh_follows_from_the_plans() -> None:
     """Ten times the elements take longer, but not a thousand times: small meshes cost more than dense algebra."""
     meshes = DensityMeshes(accuracy=1e-3)
     refinement = _SceneRefinement(meshes, None, EarlierSteps())
-    level = Level.first(paper(1, bk.LinearGalerkin(), bk.MeshOptions(accuracy=1e-3)))
+    level = Level.first(paper(1, bk.Galerkin(1), bk.MeshOptions(accuracy=1e-3)))
     solution = bk.run(level.scene, mesh=level.partition.mesh)
     assert refinement.expected_seconds(level, solution, 1.0) == pytest.approx(1.0)
     finer = dataclasses.replace(

@@ -21,9 +21,7 @@ def stack(ratio: float, law: bk.FrictionLaw) -> bk.Assembly:
         )
         bodies.append(slab)
     contacts = tuple(bk.ContactPair(sides=(f"slab {k + 1}.bottom", f"slab {k}.top")) for k in range(3))
-    return bk.Assembly(
-        title="A stack", bodies=bodies, contacts=contacts, law=law, discretisation=bk.QuadraticGalerkin()
-    )
+    return bk.Assembly(title="A stack", bodies=bodies, contacts=contacts, law=law, discretisation=bk.Galerkin(2))
 
 
 @pytest.mark.parametrize("law", [bk.Frictionless(), bk.Coulomb(0.3)], ids=["frictionless", "coulomb"])

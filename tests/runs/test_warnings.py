@@ -29,7 +29,7 @@ from bemkit.runs.adaptive import run_adaptive
 from bemkit.runs.history import run_history
 from bemkit.runs.run import run
 from bemkit.scene.conditions import Clamped, Contact, Part, PrescribedDisplacement, Traction
-from bemkit.scene.discretisation import LinearGalerkin
+from bemkit.scene.discretisation import Galerkin
 from bemkit.scene.mesh_options import MeshOptions
 from bemkit.scene.scene import Scene
 from bemkit.scene.toml import load_scene, with_overrides
@@ -58,7 +58,7 @@ def test_doubts_about_meshes_are_found_when_asked_for(monkeypatch: pytest.Monkey
         return find_warnings(solution)
 
     monkeypatch.setattr("bemkit.runs.history.find_warnings", counted)
-    first, last = run_adaptive(paper(1, bk.HpGalerkin(), MeshOptions(accuracy=2e-3)))
+    first, last = run_adaptive(paper(1, bk.Galerkin(2), MeshOptions(accuracy=2e-3, rising_degrees=True)))
     assert asked == []
     assert first.warnings == find_warnings(first)
     assert last.warnings == find_warnings(last)
@@ -155,7 +155,7 @@ def bowl(approach: float = 1e-4, **changes: object) -> Scene:
     )
     scene = Scene(
         title="bowl", shape=Rectangle(2.0, 1.0, corner=(-1.0, 0.0)), material=Material(1.0, 0.3), parts=parts,
-        law=Coulomb(0.1), discretisation=LinearGalerkin(), mesh=MeshOptions(elements=24),
+        law=Coulomb(0.1), discretisation=Galerkin(1), mesh=MeshOptions(elements=24),
     )  # fmt: skip
     return dataclasses.replace(scene, **changes)  # type: ignore[arg-type]
 
@@ -224,7 +224,7 @@ def test_an_estimate_that_cannot_be_made_is_doubted(solution: Solution) -> None:
 
 def test_a_held_side_of_one_element_is_doubted() -> None:
     block = Scene(
-        title="block", shape=Rectangle(8.0, 1.0), material=Material(1.0, 0.3), discretisation=LinearGalerkin(),
+        title="block", shape=Rectangle(8.0, 1.0), material=Material(1.0, 0.3), discretisation=Galerkin(1),
         parts=(Part("wall", Clamped(), ("left",)), Part("load", Traction(x=1.0), ("right",))),
         mesh=MeshOptions(elements=18),
     )  # fmt: skip
@@ -313,7 +313,7 @@ def test_the_first_warning_of_each_kind_and_subject_is_kept() -> None:
 def test_two_corners_and_two_parts_keep_a_warning_each_in_a_load_history() -> None:
     """Texts that differ in digits only were once taken for one warning."""
     scene = Scene(
-        title="block", shape=Rectangle(8.0, 1.0), material=Material(1.0, 0.3), discretisation=LinearGalerkin(),
+        title="block", shape=Rectangle(8.0, 1.0), material=Material(1.0, 0.3), discretisation=Galerkin(1),
         parts=(
             Part("side-1", Clamped(), ("left",)),
             Part("side-2", PrescribedDisplacement(x=1e-3, y=0.0), ("right",)),

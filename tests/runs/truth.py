@@ -28,7 +28,7 @@ def cauchy_error(solution: bk.Solution, n_graded: int = 5) -> float:
         at_corner = break_nodes(fine_mesh)[fine_mesh.elements].any(axis=1)
         marked = np.flatnonzero(at_corner) if step else np.arange(fine_mesh.n_elements)
         fine_mesh, parent, span = bisected(fine_mesh, parent, span, marked)
-    fine = bk.run(dataclasses.replace(scene, discretisation=bk.QuadraticGalerkin()), mesh=fine_mesh)
+    fine = bk.run(dataclasses.replace(scene, discretisation=bk.Galerkin(2)), mesh=fine_mesh)
     u_space, u, t_space, t = fields(solution)
     _, fine_u, fine_t_space, fine_t = fields(fine)
     displacements = QuadraticSpace(fine_mesh)

@@ -14,12 +14,11 @@ from bemkit import (
     Coulomb,
     Expression,
     Free,
+    Galerkin,
     Gravity,
     GridCopies,
     HalfPlane,
-    HpGalerkin,
     InputError,
-    LinearGalerkin,
     ListedCopies,
     Material,
     MeshOptions,
@@ -158,16 +157,11 @@ def test_shipped_assemblies_survive_their_text(name: str) -> None:
         ({"rigid": (replace(PUNCH, name="lower"),)}, "'lower' is the name of two bodies: give each its own name"),
         ({"mesh": MeshOptions(accuracy=1e-3), "discretisation": ConstantCollocation()}, "has no error estimate"),
         (
-            {"mesh": MeshOptions(accuracy=1e-3), "bodies": (replace(LOWER, discretisation=HpGalerkin()), SMALL)},
-            "body 'lower' has 'hp', the assembly a fixed degree: degrees rise for all bodies or for none",
-        ),
-        (
             {
-                "mesh": MeshOptions(accuracy=1e-3),
-                "discretisation": HpGalerkin(),
-                "bodies": (replace(LOWER, discretisation=LinearGalerkin()), SMALL),
+                "mesh": MeshOptions(accuracy=1e-3, rising_degrees=True),
+                "bodies": (replace(LOWER, discretisation=Galerkin(1)), SMALL),
             },
-            "body 'lower' has a fixed degree, the assembly 'hp': degrees rise for all bodies or for none",
+            "body 'lower' has a fixed degree, the assembly rising degrees: degrees rise for all bodies or for none",
         ),
         (
             {"mesh": MeshOptions(accuracy=1e-3), "bodies": (replace(LOWER, mesh=MeshOptions(elements=8)), SMALL)},

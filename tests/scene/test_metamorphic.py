@@ -20,7 +20,7 @@ DRIVERS: dict[str, bk.ContactSolver] = {
     "augmented, current bound": bk.AugmentedLagrangian(bound=BoundUpdate.CURRENT),
     "fixed point": bk.FixedPoint(),
 }
-DISCRETISATIONS = {"constant": bk.ConstantCollocation(), "linear": bk.LinearGalerkin()}
+DISCRETISATIONS = {"constant": bk.ConstantCollocation(), "linear": bk.Galerkin(1)}
 CORNERS = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.5, 1.0], [0.0, 1.0], [0.0, 0.5]])
 SIDES = ("floor", "wall", "press", "top", "push", "left")
 

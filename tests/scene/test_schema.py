@@ -76,8 +76,9 @@ def test_what_is_wrong_is_marked_where_it_stands(name: str, right: str, wrong: s
 def test_a_word_in_another_key_names_another_kind() -> None:
     text, word = SHIPPED["paper-1"], 'discretisation = "constant"'
     assert word in text
-    for degree in ("'hp'", "5"):
-        assert errors_in(text.replace(word, f"discretisation = {{ kind = 'galerkin', degree = {degree} }}")) == []
+    for other in ("'hp'", "'linear'", "{ kind = 'galerkin', degree = 5 }"):
+        assert errors_in(text.replace(word, f"discretisation = {other}")) == []
+    assert errors_in(text.replace(word, "discretisation = 'hq'")) != []
     (wrong,) = errors_in(text.replace(word, "discretisation = { kind = 'galerkin', degree = 'h' }"))
     assert wrong.startswith("$.discretisation.degree: 'h' is not")
 

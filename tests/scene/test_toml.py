@@ -20,18 +20,15 @@ from bemkit.geometry.meshing.discretise import Algebraic, Geometric, Uniform
 from bemkit.geometry.shapes import Disk, ExteriorOf, PlateWithHole, Polygon, Rectangle, Ring, Sector
 from bemkit.operators.material import Material, Plane
 from bemkit.scene.conditions import Clamped, Contact, Part, PrescribedDisplacement, Pressure, Roller, Traction
-from bemkit.scene.discretisation import ConstantCollocation, LinearGalerkin
+from bemkit.scene.discretisation import ConstantCollocation, Galerkin
 from bemkit.scene.mesh_options import MeshOptions
 from bemkit.scene.scene import Scene
 from bemkit.scene.serialisation import StructureError
 from bemkit.scene.toml import SceneError, load_scene, scene_from_toml, scene_to_toml, shipped_scenes, with_overrides
 from bemkit.solvers.alm import AugmentedLagrangian, BoundUpdate, InnerNewton
-from bemkit.solvers.fallbacks import Fallbacks
 from bemkit.solvers.fixed_point import FixedPoint
-from bemkit.solvers.lemke import LemkePivoting
-from bemkit.solvers.solution_path import SolutionPath
-from bemkit.solvers.springs import Springs
 from bemkit.solvers.ssn import SemismoothNewton
+from bemkit.testing.lemke import LemkePivoting
 
 BLOCK = """
 title = "Square on a rigid foundation"
@@ -115,10 +112,6 @@ solvers = st.one_of(
     st.builds(AugmentedLagrangian, rho_n=st.none() | positive, rho_t=st.none() | positive),
     st.builds(FixedPoint, max_steps=st.integers(1, 500)),
     st.just(LemkePivoting()),
-    st.builds(SolutionPath, st.booleans()),
-    st.just(Springs(first=0.1)),
-    st.just(Fallbacks()),
-    st.just(Fallbacks((SemismoothNewton(max_steps=4), SolutionPath(from_start=True), FixedPoint()))),
     st.just(AugmentedLagrangian(bound=BoundUpdate.CURRENT, inner=InnerNewton(max_steps=7))),
 )
 gradings = st.one_of(st.just(Uniform()), st.builds(Algebraic, st.floats(1.0, 4.0)), st.just(Geometric(0.25, 3)))
@@ -140,7 +133,7 @@ def scenes(draw: st.DrawFn) -> Scene:
         material=Material(draw(positive), draw(st.floats(-0.9, 0.5)), draw(st.sampled_from(Plane))),
         parts=tuple(parts),
         law=draw(laws),
-        discretisation=draw(st.sampled_from([LinearGalerkin(), ConstantCollocation()])),
+        discretisation=draw(st.sampled_from([Galerkin(1), ConstantCollocation()])),
         mesh=MeshOptions(draw(st.integers(3, 10_000)), draw(gradings), draw(st.just({}) | st.just({sides[0]: 2.0}))),
         solver=draw(solvers),
     )
@@ -188,18 +181,7 @@ def test_one_word_or_a_table_name_a_solver() -> None:
     assert scene_from_toml(BLOCK).solver == SemismoothNewton()
     changed = BLOCK.replace('solver = "semismooth-newton"', table)
     assert scene_from_toml(changed).solver == AugmentedLagrangian(rho_n=1e4, rho_t=100.0)
-    assert scene_from_toml(BLOCK.replace('solver = "semismooth-newton"', "")).solver == Fallbacks()
-
-
-def test_a_list_names_solvers_one_after_the_other() -> None:
-    listed = 'solver = ["semismooth-newton", { kind = "solution-path", from_start = true }]'
-    scene = scene_from_toml(BLOCK.replace('solver = "semismooth-newton"', listed))
-    assert scene.solver == Fallbacks((SemismoothNewton(), SolutionPath(from_start=True)))
-    assert scene_from_toml(scene_to_toml(scene)).solver == scene.solver
-    with pytest.raises(SceneError, match=r"solver\[1\].kind: unknown solver 'newton'"):
-        scene_from_toml(BLOCK.replace('solver = "semismooth-newton"', 'solver = ["lemke", "newton"]'))
-    with pytest.raises(SceneError, match="solver: drivers is empty; give at least one driver"):
-        scene_from_toml(BLOCK.replace('solver = "semismooth-newton"', "solver = []"))
+    assert scene_from_toml(BLOCK.replace('solver = "semismooth-newton"', "")).solver == SemismoothNewton()
 
 
 def test_friction_may_vary_from_node_to_node() -> None:
@@ -232,11 +214,15 @@ CONTACT = '{ kind = "contact", obstacle = { kind = "half-plane", point = [0.0, 0
         ("= 320", "= 1000000000", "mesh: elements is 1000000000: give a number from 3"),
         ("= 320", "= 3.5", "mesh.elements: 3.5 does not fit: give a whole number"),
         ('"uniform"', '"unifrom"', "mesh.grading.kind: unknown grading 'unifrom'.*did you mean 'uniform'"),
-        ('"constant"', '"konstant"', "discretisation.kind: unknown discretisation.*linear, quadratic, constant"),
+        (
+            '"constant"',
+            '"konstant"',
+            "discretisation.kind: unknown discretisation.*linear, quadratic, .*constant",
+        ),
         (
             '"semismooth-newton"',
             '"newton"',
-            "solver.kind: unknown solver 'newton': the known ones are fallbacks, semismooth-newton",
+            "solver.kind: unknown solver 'newton': the known ones are semismooth-newton",
         ),
         ('"coulomb"', '"culomb"', "law.kind: unknown friction law 'culomb'.*did you mean 'coulomb'"),
         ("friction_coefficient = 0.5", "", "law.friction_coefficient: missing"),
@@ -310,6 +296,27 @@ def test_synonyms_name_the_key_or_word_that_is_meant(old: str, new: str, message
     assert "\n" not in str(caught.value)  # a key that is missing because it is misspelt is one mistake
 
 
+def test_words_of_degrees_stand_for_galerkin_elements() -> None:
+    for word, degree in (("linear", 1), ("quadratic", 2)):
+        for written in (f'"{word}"', f'{{ kind = "{word}" }}', f'{{ kind = "galerkin", degree = {degree} }}'):
+            scene = scene_from_toml(BLOCK.replace('"constant"', written))
+            assert scene.discretisation == Galerkin(degree)
+            assert f'discretisation = "{word}"' in scene_to_toml(scene)
+    with pytest.raises(SceneError, match="discretisation: 'linear' has no keys, but degree is given: leave it out, or"):
+        scene_from_toml(BLOCK.replace('"constant"', '{ kind = "linear", degree = 3 }'))
+
+
+def test_rising_degrees_are_those_of_all_bodies() -> None:
+    text = BLOCK.replace('"constant"', '"hp"').replace('elements = 320\ngrading = "uniform"', "accuracy = 1e-3")
+    scene = scene_from_toml(text)
+    assert (scene.discretisation, scene.mesh) == (Galerkin(2), MeshOptions(accuracy=1e-3, rising_degrees=True))
+    assert 'discretisation = "hp"' in scene_to_toml(scene)
+    with pytest.raises(SceneError, match=r"discretisation .hp. is a choice for all bodies .*: set mesh"):
+        scene_from_toml(text.replace('"hp"', '{ kind = "hp" }'))
+    with pytest.raises(SceneError, match=r"mesh.rising_degrees is True: ConstantCollocation.* has no degree"):
+        scene_from_toml(text.replace('"hp"', '"constant"').replace("[mesh]", "[mesh]\nrising_degrees = true"))
+
+
 def test_errors_of_tables_can_be_sent_to_other_processes() -> None:
     error = StructureError(["one: wrong", "two: wrong"])
     again = pickle.loads(pickle.dumps(error))
@@ -377,9 +384,9 @@ def test_overrides_of_the_command_line() -> None:
     scene = load_scene("paper-1")
     changed = with_overrides(scene, elements=64, discretisation="linear", solver="augmented-lagrangian", rho=10.0)
     assert changed.mesh.elements == 64
-    assert changed.discretisation == LinearGalerkin()
+    assert changed.discretisation == Galerkin(1)
     assert changed.solver == AugmentedLagrangian(rho_n=10.0, rho_t=10.0)
-    assert with_overrides(scene, rho=2.0).solver == Fallbacks((SemismoothNewton(rho=2.0), *Fallbacks().drivers[1:]))
+    assert with_overrides(scene, rho=2.0).solver == SemismoothNewton(rho=2.0)
     assert with_overrides(scene) == scene
     with pytest.raises(SceneError, match="elements is 1"):
         with_overrides(scene, elements=1)

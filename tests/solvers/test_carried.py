@@ -43,11 +43,11 @@ DRIVEN = pytest.mark.parametrize("driver", DRIVERS, ids=lambda driver: type(driv
 @DRIVEN
 @pytest.mark.parametrize(
     ("discretisation", "distance"),
-    [(bk.LinearGalerkin(), 1e-12), (bk.QuadraticGalerkin(), 1e-3), (bk.ConstantCollocation(), 0.3)],
+    [(bk.Galerkin(1), 1e-12), (bk.Galerkin(2), 1e-3), (bk.ConstantCollocation(), 0.3)],
     ids=["linear", "quadratic", "constant"],
 )
 def test_a_body_that_gives_way_to_its_obstacle_is_solved_without_contact_forces(
-    driver: bk.ContactSolver, discretisation: bk.LinearGalerkin, distance: float
+    driver: bk.ContactSolver, discretisation: bk.Galerkin, distance: float
 ) -> None:
     """No load pushes the disc to the wall: neither springs nor round-off of what the support causes."""
     solution = bk.run(carried_disc(distance, solver=driver, discretisation=discretisation))
@@ -88,7 +88,7 @@ def test_the_wall_carries_the_push_however_small(driver: bk.ContactSolver, push:
 def test_a_carried_disc_is_right_or_has_no_answer(
     driver: bk.ContactSolver, law: bk.FrictionLaw, distance: float
 ) -> None:
-    for discretisation in (bk.LinearGalerkin(), bk.QuadraticGalerkin(), bk.ConstantCollocation()):
+    for discretisation in (bk.Galerkin(1), bk.Galerkin(2), bk.ConstantCollocation()):
         for push in (0.0, 1e-15, 1e-10, 1e-5, 1e-2):
             scene = carried_disc(distance, push, law=law, solver=driver, discretisation=discretisation)
             assert_right_or_unsolved(scene, distance, push)

@@ -16,7 +16,7 @@ FEET = {
     "three feet": "x < 0.03 or x > 0.97 or (x > 0.47 and x < 0.53)",
     "two wide feet": "x < 0.06 or x > 0.94",
 }
-ELEMENTS = [bk.ConstantCollocation(), bk.LinearGalerkin(), bk.QuadraticGalerkin()]
+ELEMENTS = [bk.ConstantCollocation(), bk.Galerkin(1), bk.Galerkin(2)]
 DRIVERS = [bk.SemismoothNewton(), bk.AugmentedLagrangian(), bk.FixedPoint()]
 
 

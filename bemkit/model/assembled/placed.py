@@ -135,8 +135,7 @@ def place(assembly: Assembly, meshes: Mapping[str, BoundaryMesh] | None = None) 
 def _divided(scene: Scene, assembly: Assembly, body: Body) -> BoundaryMesh:
     even = [*(part.name for part in scene.contact_parts), *assembly.contact_parts(body)]
     try:
-        outline, layers = scene.shape.outline(), scene.takes_layers
-        return scene.mesh.divide(outline, scene.selections, even, scene.symmetry, takes_layers=layers)
+        return scene.divided(even)
     except GeometryError as error:
         raise type(error)(f"body {body.name!r}: {error}") from error
 

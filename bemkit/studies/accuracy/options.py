@@ -10,8 +10,9 @@ from bemkit.formulas import closest
 from bemkit.plan import make_plan
 from bemkit.reference.compare import MEASURES, Reference, over_resolved
 from bemkit.reference.shipped import find_reference
-from bemkit.scene.discretisation import Discretisation, Galerkin, HpGalerkin, LinearGalerkin, QuadraticGalerkin
+from bemkit.scene.discretisation import Discretisation, Galerkin
 from bemkit.scene.mesh_options import MeshOptions
+from bemkit.scene.registry import RISING
 from bemkit.scene.scene import Scene
 from bemkit.scene.serialisation import structure
 from bemkit.scene.toml import scene_to_toml
@@ -71,15 +72,14 @@ class StudyOptions:
             [scene.solver if type(each) is type(scene.solver) else each for each in map(_solver, drivers)],
         )
 
-    def _element_types(self) -> list[Discretisation]:
+    def _element_types(self) -> list[Discretisation | str]:
         if self.degrees is None:
             words = _words(self.discretisation or DEFAULT_ELEMENTS, "discretisation")
-            return [structure(word, cast(Any, Discretisation)) for word in words]
+            return [word if word == RISING else structure(word, cast(Any, Discretisation)) for word in words]
         if self.discretisation is not None:
             raise StudyError(f"degrees is {self.degrees!r} and discretisation is {self.discretisation!r}: give one")
-        named: dict[str, Discretisation] = {"hp": HpGalerkin(), "1": LinearGalerkin(), "2": QuadraticGalerkin()}
         words = _words(self.degrees, "degrees")
-        return [named.get(word) or Galerkin(_numbers(word, "degrees", int, "1,2,4,8,hp")[0]) for word in words]
+        return [word if word == RISING else Galerkin(_numbers(word, "degrees", int, "1,2,4,8,hp")[0]) for word in words]
 
     def labels(self, scene: Scene) -> dict[str, str]:
         """Return what must be the same when records of an earlier study are taken over."""
@@ -106,7 +106,7 @@ class StudyOptions:
         if found is not None:
             return found
         options = MeshOptions(elements=SUGGESTED, density=scene.mesh.density)
-        fine = replace(scene, discretisation=QuadraticGalerkin(), mesh=options)
+        fine = replace(scene, discretisation=Galerkin(2), mesh=options)
         plan = make_plan(fine, fine.build_mesh())
         cost = f"about {_MESHES_TOGETHER * plan.seconds:.1g} s and {plan.memory / 1e9:.1g} GB"
         raise StudyError(

@@ -13,13 +13,12 @@ from bemkit.hdf5 import FileFormat
 from bemkit.reference.compare import MEASURES
 from bemkit.results.outputs import csv_text
 from bemkit.results.record_file import RecordFile
+from bemkit.scene.registry import RISING
 
 N_FITTED = 3
 """Meshes, from the finest on, to which an order is fitted."""
 N_EXPONENTIAL = 4
 """Meshes to which an exponential rate is fitted: three lie on either curve nearly as well."""
-RISING = "hp"
-"""The elements whose errors may fall exponentially: of a fixed degree they never do, whatever four meshes look like."""
 EQUALITY_TOLERANCE = 1e-6
 """Relative difference below which errors are equal: drivers agree on a state to their tolerances only."""
 STAGES = ("mesh", "assemble", "condense", "solve", "recover")
@@ -122,6 +121,7 @@ def fitted_rate(records: Sequence[ErrorRecord], measure: str) -> Rate:
     """
     last = records[-N_EXPONENTIAL:]
     n, errors = _sizes_and_errors(last, measure)
+    # errors of a fixed degree never fall exponentially, whatever four meshes look like
     is_rising = all(record.discretisation == RISING for record in last)
     if is_rising and len(last) == N_EXPONENTIAL and _is_good(n, errors) and np.all(np.diff(errors) < 0.0):
         algebraic, exponential = (np.polyfit(x, np.log(errors), 1, full=True)[:2] for x in (np.log(n), np.sqrt(n)))

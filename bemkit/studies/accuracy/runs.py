@@ -111,13 +111,14 @@ class Run:
 
 def all_runs(
     scene: Scene,
-    discretisations: Sequence[Discretisation],
+    discretisations: Sequence[Discretisation | str],
     meshes: Sequence[MeshSequence],
     solvers: Sequence[ContactSolver],
 ) -> tuple[Run, ...]:
     """Combine element types, meshes and drivers.
 
-    Constant elements have no error estimate and so no adaptive meshes, rising degrees no others.
+    The word "hp" among the element types is for rising degrees. Constant elements have no error estimate and so no
+    adaptive meshes, rising degrees no others.
 
     The scene's own mesh, discretisation and solver do not matter. What it does not allow becomes a refused row.
 
@@ -131,18 +132,10 @@ def all_runs(
         raise StudyError("no part of the scene is in contact: errors are measured along the contact boundary")
     try:
         runs = tuple(
-            Run(
-                _word_of(element),
-                element.method,
-                sequence.name,
-                SOLVERS.word_of(solver),
-                float(size),
-                scene,
-                {"discretisation": element, "mesh": sequence.options(scene, size), "solver": solver},
-            )
+            _run(scene, element, sequence, solver, size)
             for element in discretisations
             for sequence in meshes
-            if (element.estimates_error if sequence.needs_estimate else not element.needs_accuracy)
+            if _goes_with(element, sequence)
             for solver in solvers
             for size in sequence.sizes
         )
@@ -160,9 +153,27 @@ def all_runs(
     return runs
 
 
+def _goes_with(element: Discretisation | str, sequence: MeshSequence) -> bool:
+    if isinstance(element, str):
+        return sequence.needs_estimate
+    return element.estimates_error or not sequence.needs_estimate
+
+
+def _run(
+    scene: Scene, element: Discretisation | str, sequence: MeshSequence, solver: ContactSolver, size: float
+) -> Run:
+    options = sequence.options(scene, size)
+    if isinstance(element, str):
+        word, element, options = element, Galerkin(2), replace(options, rising_degrees=True)
+    else:
+        word = _word_of(element)
+    changes = {"discretisation": element, "mesh": options, "solver": solver}
+    return Run(word, element.method, sequence.name, SOLVERS.word_of(solver), float(size), scene, changes)
+
+
 def _word_of(element: Discretisation) -> str:
     """Return what names an element type in a study: its word in scene files, or its degree where that says more."""
-    word = DISCRETISATIONS.kind_of(element)
+    word = DISCRETISATIONS.word_of(element)
     return f"degree {element.degree}" if word == "galerkin" and isinstance(element, Galerkin) else word
 
 

@@ -13,7 +13,7 @@ import bemkit as bk
 from bemkit.model.contact_model import build_model
 from bemkit.model.prepared import prepare
 from bemkit.solvers.alm import BoundUpdate
-from bemkit.solvers.lemke import LemkePivoting
+from bemkit.testing.lemke import LemkePivoting
 from tests.slow import slow_except, slow_only
 
 DRIVERS: dict[str, bk.ContactSolver] = {
@@ -40,7 +40,7 @@ def patch(
         shape=bk.Rectangle(2.0, 1.0),
         material=bk.Material(YOUNG, POISSON),
         law=bk.Coulomb(friction),
-        discretisation=bk.LinearGalerkin() if discretisation is None else discretisation,
+        discretisation=bk.Galerkin(1) if discretisation is None else discretisation,
         parts=(
             bk.Part("floor", bk.Contact(bk.HalfPlane()), sides=("bottom",)),
             bk.Part("top", top, sides=("top",)),

@@ -218,7 +218,7 @@ def test_narrow_terminals_show_less_and_nothing_is_cut(capsys: pytest.CaptureFix
 
 def test_progress_goes_to_standard_error(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("FORCE_COLOR", "1")  # as if standard error were a terminal
-    runs = all_runs(bk.load_scene("paper-1"), [bk.LinearGalerkin()], [uniform((20,))], [bk.SemismoothNewton()])
+    runs = all_runs(bk.load_scene("paper-1"), [bk.Galerkin(1)], [uniform((20,))], [bk.SemismoothNewton()])
     found = find_reference(bk.load_scene("paper-1"))
     assert found is not None
     tasks = error_tasks(runs, found, 1)

@@ -19,7 +19,7 @@ from bemkit.studies.accuracy.records import STAGES, ErrorRecord, by_series, fitt
 from bemkit.studies.accuracy.runs import Run, adaptive, all_runs, error_tasks, graded, uniform
 from bemkit.studies.engine import StudyError, Task, compute
 
-LINEAR, QUADRATIC, CONSTANT = bk.LinearGalerkin(), bk.QuadraticGalerkin(), bk.ConstantCollocation()
+LINEAR, QUADRATIC, CONSTANT = bk.Galerkin(1), bk.Galerkin(2), bk.ConstantCollocation()
 NEWTON, AUGMENTED = bk.SemismoothNewton(), bk.AugmentedLagrangian()
 
 

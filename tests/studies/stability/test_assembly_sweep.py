@@ -104,7 +104,7 @@ def sheared():
         rigid=(disc,),
         contacts=(bk.ContactPair(("block.top", "disc"), reach=0.5),),
         law=bk.SlipWeakening(0.3, 0.2, 1e-3),
-        discretisation=bk.LinearGalerkin(),
+        discretisation=bk.Galerkin(1),
         steps=(bk.Step(1.0), bk.Step(3.0, shear, increments=2)),
     )
 

@@ -37,7 +37,7 @@ def solved(*, is_symmetric: bool = False) -> bk.Solution:
         law=bk.Coulomb(0.5),
         symmetry=bk.Symmetry(x=0.5) if is_symmetric else None,
         body_forces=symmetric if is_symmetric else FORCES,
-        discretisation=bk.QuadraticGalerkin(),
+        discretisation=bk.Galerkin(2),
         mesh=bk.MeshOptions(60),
     )
     return bk.run(scene)

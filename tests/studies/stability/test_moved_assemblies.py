@@ -51,7 +51,7 @@ def assembly(*, reflects: bool = False) -> bk.Assembly:
             bk.ContactPair(("one.right", "two.left"), gap=-0.0101, law=bk.Tresca(2e-5)),
         ),
         law=bk.Coulomb(FRICTION),
-        discretisation=bk.QuadraticGalerkin(),
+        discretisation=bk.Galerkin(2),
     )
 
 

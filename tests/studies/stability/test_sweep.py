@@ -62,7 +62,7 @@ def test_every_axis_is_tested_here() -> None:
     ids=["paper-1", "paper-2"],
 )
 def test_the_ends_of_every_axis_are_right_or_named(
-    name: str, number: int, discretisation: bk.LinearGalerkin | bk.ConstantCollocation
+    name: str, number: int, discretisation: bk.Galerkin | bk.ConstantCollocation
 ) -> None:
     scene = small_paper_scene(number, 48, discretisation=discretisation)
     for row in sweep(scene, [shortened(name)]):
@@ -200,7 +200,7 @@ def test_differences_on_other_meshes_are_means_and_see_missing_parts() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("discretisation", [LINEAR, CONSTANT], ids=["linear", "constant"])
 @pytest.mark.parametrize("name", ["paper-1", "paper-2"])
-def test_no_row_of_the_whole_sweep_is_wrong(name: str, discretisation: bk.LinearGalerkin) -> None:
+def test_no_row_of_the_whole_sweep_is_wrong(name: str, discretisation: bk.Galerkin) -> None:
     scene = dataclasses.replace(bk.load_scene(name), discretisation=discretisation)
     assert check_solution(bk.run(scene)).is_good
     wrong = [row for row in sweep(scene, AXES) if row.verdict == "wrong"]

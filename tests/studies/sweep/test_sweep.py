@@ -114,7 +114,7 @@ def test_rows_of_several_bodies(vary: dict[str, list[float]], n_bodies: int, bod
 
 
 def test_rows_with_an_accuracy_have_their_own_meshes(bodies_made: list[str]) -> None:
-    scene = replace(SCENE, mesh=bk.MeshOptions(accuracy=0.1), discretisation=bk.LinearGalerkin())
+    scene = replace(SCENE, mesh=bk.MeshOptions(accuracy=0.1), discretisation=bk.Galerkin(1))
     table = bk.sweep(scene, {FRICTION: [0.3, 0.6]})
     assert not bodies_made
     assert all(0.0 < row.estimated_error < 0.1 for row in table.rows)

@@ -17,7 +17,7 @@ from bemkit.scene.body import Body
 from bemkit.scene.body_forces import BodyForce, Gravity, Heating, Rotation
 from bemkit.scene.conditions import Clamped, Contact, Part, PrescribedDisplacement, Pressure, Roller, Traction
 from bemkit.scene.copies import Copies
-from bemkit.scene.discretisation import ConstantCollocation, Discretisation, Galerkin, LinearGalerkin, QuadraticGalerkin
+from bemkit.scene.discretisation import ConstantCollocation, Discretisation, Galerkin
 from bemkit.scene.mesh_options import MeshOptions
 from bemkit.studies.stability.random_scenes.draw import Draw
 
@@ -112,8 +112,8 @@ class Members:
     def _discretisation(self) -> Discretisation:
         draw = self.draw
         weights: dict[Discretisation, float] = {
-            LinearGalerkin(): 2.0,
-            QuadraticGalerkin(): 2.0,
+            Galerkin(1): 2.0,
+            Galerkin(2): 2.0,
             Galerkin(int(draw.integers(3, 6))): 1.0,
             ConstantCollocation(): 1.0,
         }

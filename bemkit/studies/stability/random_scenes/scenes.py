@@ -15,22 +15,13 @@ from bemkit.geometry.symmetry import Symmetry
 from bemkit.operators.linear.solvers import Automatic, DenseCholesky, LinearSolverChoice
 from bemkit.operators.material import Material, Plane
 from bemkit.scene.conditions import Condition, Contact, Part, PrescribedDisplacement, Pressure, Roller, Traction
-from bemkit.scene.discretisation import (
-    ConstantCollocation,
-    Discretisation,
-    Galerkin,
-    HpGalerkin,
-    LinearGalerkin,
-    QuadraticGalerkin,
-)
+from bemkit.scene.discretisation import ConstantCollocation, Discretisation, Galerkin
 from bemkit.scene.load_history import with_scaled_loads
 from bemkit.scene.mesh_options import MeshOptions
 from bemkit.scene.scene import Scene
 from bemkit.solvers.alm import AugmentedLagrangian
 from bemkit.solvers.base import ContactSolver
-from bemkit.solvers.fallbacks import Fallbacks
 from bemkit.solvers.fixed_point import FixedPoint
-from bemkit.solvers.lemke import LemkePivoting
 from bemkit.solvers.ssn import SemismoothNewton
 from bemkit.studies.stability.random_scenes.bodies import Body, random_body
 from bemkit.studies.stability.random_scenes.draw import Draw, RandomCase
@@ -38,6 +29,7 @@ from bemkit.studies.stability.random_scenes.half_planes import random_half_plane
 from bemkit.studies.stability.random_scenes.histories import pressed_and_sheared
 from bemkit.studies.stability.random_scenes.inside import random_body_forces
 from bemkit.studies.stability.random_scenes.parts import random_actions, random_contact, random_law
+from bemkit.testing.lemke import LemkePivoting
 
 HALF_PLANES = 0.12
 """Share of half-planes among the scenes."""
@@ -82,13 +74,13 @@ def _inside(index: int, seed: int, layout: dict[str, Any], modulus: float) -> di
 
 def _scene(draw: Draw, title: str, modulus: float, layout: dict[str, Any]) -> Scene:
     constant = ConstantCollocation(slopes=not draw.chance(0.2))
-    discretisation: Discretisation = draw.one_of((LinearGalerkin(), QuadraticGalerkin(), constant))
+    discretisation: Discretisation = draw.one_of((Galerkin(1), Galerkin(2), constant))
     material = _material(draw, modulus)
     if draw.chance(0.15):
         discretisation = Galerkin(int(draw.integers(3, 9)))
     mesh = _mesh(draw, layout["shape"], discretisation)
     if mesh.accuracy is not None and draw.chance(0.3):
-        discretisation = HpGalerkin()
+        discretisation, mesh = Galerkin(2), replace(mesh, rising_degrees=True)
     factors: tuple[float, ...] = (1.0,)
     if draw.chance(0.12):
         factors = draw.one_of(((0.5, 1.0), (0.3, 0.6, 1.0), (1.0, 0.5), (1.0, -0.3, 0.7), (1.0, 0.0), (2.0,)))
@@ -97,7 +89,7 @@ def _scene(draw: Draw, title: str, modulus: float, layout: dict[str, Any]) -> Sc
     solver, linear_solver = _solver(draw), _linear_solver(draw)
     if not any(part for part in layout["parts"] if "contact" in part.name or part.name == "shaft"):
         layout = {name: value for name, value in layout.items() if name != "law"}
-        solver = Fallbacks()
+        solver = SemismoothNewton()
     return Scene(
         title=title,
         material=material,
@@ -125,7 +117,7 @@ def _mesh(draw: Draw, shape: Any, discretisation: Discretisation) -> MeshOptions
     if discretisation.estimates_error and draw.chance(0.04):
         return MeshOptions(accuracy=draw.decades(-2.0, -0.7), most_elements=int(draw.integers(40, 100)))
     low, high = draw.one_by_weight({(3, 9): 0.08, (10, 40): 0.67, (41, 80): 0.2, (81, 160): 0.05})
-    if isinstance(discretisation, Galerkin) and discretisation.takes_layers:
+    if isinstance(discretisation, Galerkin) and discretisation.largest_degree > 2:
         low, high = 3, 30  # of many nodes each
     gradings: dict[Grading, float] = {
         Uniform(): 6.0,
@@ -141,8 +133,8 @@ def _mesh(draw: Draw, shape: Any, discretisation: Discretisation) -> MeshOptions
 
 def _solver(draw: Draw) -> ContactSolver:
     drivers: dict[ContactSolver, float] = {
-        Fallbacks(): 8.0,
-        Fallbacks((SemismoothNewton(rho=draw.decades(-3.0, 3.0)), *Fallbacks().drivers[1:])): 1.0,
+        SemismoothNewton(): 8.0,
+        SemismoothNewton(rho=draw.decades(-3.0, 3.0)): 1.0,
         AugmentedLagrangian(max_steps=60): 1.5,
         FixedPoint(max_steps=60): 1.5,
         LemkePivoting(): 1.5,
