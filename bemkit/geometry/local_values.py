@@ -7,13 +7,11 @@ combined to those against its own p + 1 basis functions.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-
 import numpy as np
 
 from bemkit.arrays import FloatArray, IntArray
-from bemkit.geometry.quadrature import gauss_legendre
-from bemkit.geometry.spaces import BoundarySpace, LagrangeSpace
+from bemkit.geometry.quadrature import gauss_legendre, gauss_lobatto
+from bemkit.geometry.spaces import BoundarySpace, LagrangeSpace, lagrange_polynomials
 
 
 def element_degrees(space: BoundarySpace) -> IntArray:
@@ -39,24 +37,33 @@ def values_on_elements(space: BoundarySpace, dofs: FloatArray, elements: IntArra
 
 def from_own_nodes(space: BoundarySpace, at_dofs: FloatArray, elements: IntArray | None = None) -> FloatArray:
     """Return the values (m, n_local, ...) at the local nodes from those (m, n_local, ...) at the dofs of elements."""
-    lifting = _lifting(space)
-    if lifting is None:
+    if element_degrees(space).min() == space.degree:
         return at_dofs
-    return np.asarray(np.einsum("elk,ek...->el...", lifting[slice(None) if elements is None else elements], at_dofs))
+    own = _values_of_own_functions(space, elements)
+    return np.asarray(np.einsum("ekl,ek...->el...", own, at_dofs))
 
 
 def summed_at_dofs(space: BoundarySpace, integrals: FloatArray, elements: IntArray) -> FloatArray:
     """Return integrals (n_scalar, ...) against the global basis from those (m, n_local, ...) against the local one."""
-    lifting = _lifting(space)
-    if lifting is not None:
-        integrals = np.einsum("elk,el...->ek...", lifting[elements], integrals)
+    if element_degrees(space).min() < space.degree:
+        integrals = np.einsum("ekl,el...->ek...", _values_of_own_functions(space, elements), integrals)
     result = np.zeros((space.n_dofs // 2, *integrals.shape[2:]))
     np.add.at(result, space.element_dofs[elements], integrals)
     return result
 
 
-def _lifting(space: BoundarySpace) -> FloatArray | None:
-    return space.lifting if isinstance(space, LagrangeSpace) else None
+def _values_of_own_functions(space: BoundarySpace, elements: IntArray | None) -> FloatArray:
+    """Return the values (m, n_dofs, n_local) of the functions of the dofs of elements at the local nodes.
+
+    At the ends they are 0 or 1 to the last bit: elements of different degrees agree exactly at the node between them.
+    """
+    degrees = element_degrees(space)[slice(None) if elements is None else elements]
+    values = np.zeros((degrees.size, space.degree + 1, space.degree + 1))
+    for degree in np.unique(degrees).tolist():
+        local = np.array([*range(degree), space.degree])
+        of_degree = lagrange_polynomials(gauss_lobatto(degree), space.local_nodes)
+        values[np.flatnonzero(degrees == degree)[:, None], local] = of_degree
+    return values
 
 
 def dof_weights(space: BoundarySpace, elements: IntArray) -> FloatArray:
@@ -75,25 +82,6 @@ def dof_weights(space: BoundarySpace, elements: IntArray) -> FloatArray:
     xi, weights = gauss_legendre(space.degree + 2 if bool(space.mesh.is_straight[elements].all()) else 16)
     local = (space.mesh.jacobian(elements, xi) * weights) @ space.basis(xi).T
     return summed_at_dofs(space, local, elements)
-
-
-def of_one_degree(
-    spaces: Sequence[BoundarySpace], elements: IntArray
-) -> Iterator[tuple[IntArray, tuple[BoundarySpace, ...]]]:
-    """Yield elements grouped by their degrees in several spaces, each with the spaces restricted to these degrees."""
-    if not any(isinstance(space, LagrangeSpace) and space.element_degrees is not None for space in spaces):
-        yield elements, tuple(spaces)
-        return
-    kinds, group = np.unique([element_degrees(space)[elements] for space in spaces], axis=1, return_inverse=True)
-    for number, degrees in enumerate(kinds.T.tolist()):
-        pairs = zip(spaces, degrees, strict=True)
-        yield elements[group.ravel() == number], tuple(_with_degree(space, degree) for space, degree in pairs)
-
-
-def _with_degree(space: BoundarySpace, degree: int) -> BoundarySpace:
-    if isinstance(space, LagrangeSpace) and space.element_degrees is not None:
-        return space.of_degree(degree)
-    return space
 
 
 def mean_tractions(space: BoundarySpace, traction: FloatArray) -> FloatArray:

@@ -60,9 +60,27 @@ def local_coefficients(space: BoundarySpace) -> FloatArray:
     (n_local, degree + 1) array, read-only
         Row p holds the coefficients of P_0 ... P_degree of the local basis function p.
     """
-    if isinstance(space, LagrangeSpace | _OneDegree):
+    if isinstance(space, LagrangeSpace):
         return _lagrange_coefficients(space.degree)
     return _coefficients(space.basis, space.degree)
+
+
+def element_coefficients(space: BoundarySpace) -> FloatArray:
+    """Return the Legendre coefficients of the functions of the dofs of each element.
+
+    Returns
+    -------
+    (n_elements, n_local, degree + 1) array, read-only
+        In the order of ``element_dofs``; zero for the repeated dofs of elements of lower degree, but for the last one.
+    """
+    if not isinstance(space, LagrangeSpace) or space.element_degrees is None:
+        return np.broadcast_to(local_coefficients(space), (space.mesh.n_elements, *local_coefficients(space).shape))
+    coefficients = np.zeros((space.mesh.n_elements, space.degree + 1, space.degree + 1))
+    for degree in np.unique(space.element_degrees).tolist():
+        local = np.array([*range(degree), space.degree])
+        elements = np.flatnonzero(space.element_degrees == degree)
+        coefficients[np.ix_(elements, local, np.arange(degree + 1))] = _lagrange_coefficients(degree)
+    return read_only(coefficients)
 
 
 def _coefficients(basis: Callable[[FloatArray], FloatArray], degree: int) -> FloatArray:
@@ -267,65 +285,6 @@ class LagrangeSpace:
 
     def basis(self, xi: FloatArray) -> FloatArray:
         """Evaluate the Lagrange polynomials, each one at its own node and zero at the others."""
-        return lagrange_polynomials(self.local_nodes, xi)
-
-    @cached_property
-    def lifting(self) -> FloatArray | None:
-        """(n_elements, n_local, n_local) matrices from values at the dofs to those at `local_nodes`; None if equal."""
-        if self.element_degrees is None:
-            return None
-        matrices = np.zeros((self.mesh.n_elements, self.degree + 1, self.degree + 1))
-        for degree in np.unique(self.element_degrees).tolist():
-            columns = np.array([*range(degree), self.degree])
-            values = lagrange_polynomials(gauss_lobatto(degree), self.local_nodes)
-            elements = np.flatnonzero(self.element_degrees == degree)
-            matrices[elements[:, None], :, columns] = values[None]
-        return matrices
-
-    def of_degree(self, degree: int) -> _OneDegree:
-        """Return the space with the basis and the dofs of its elements of one degree."""
-        return _OneDegree(self, degree)
-
-
-@dataclass(frozen=True, eq=False)
-class _OneDegree:
-    """A space of several degrees with the local basis of one of them; rows of other elements are meaningless."""
-
-    space: LagrangeSpace
-    degree: int
-
-    @property
-    def mesh(self) -> BoundaryMesh:
-        """The mesh of the whole space."""
-        return self.space.mesh
-
-    @property
-    def broken(self) -> BoolArray | None:
-        """As of the whole space."""
-        return self.space.broken
-
-    @property
-    def is_continuous(self) -> bool:
-        """As of the whole space."""
-        return self.space.is_continuous
-
-    @property
-    def n_dofs(self) -> int:
-        """Number of vector dofs of the whole space."""
-        return self.space.n_dofs
-
-    @property
-    def local_nodes(self) -> FloatArray:
-        """(degree + 1,) array: the Gauss-Lobatto points."""
-        return gauss_lobatto(self.degree)
-
-    @cached_property
-    def element_dofs(self) -> IntArray:
-        """(n_elements, degree + 1) array of scalar dofs."""
-        return self.space.element_dofs[:, [*range(self.degree), -1]]
-
-    def basis(self, xi: FloatArray) -> FloatArray:
-        """Evaluate the Lagrange polynomials."""
         return lagrange_polynomials(self.local_nodes, xi)
 
 

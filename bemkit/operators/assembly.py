@@ -1,25 +1,38 @@
-"""Assembly of bilinear forms: one sweep over the element pairs serves all matrices that are wanted."""
+"""Assembly of bilinear forms: one sweep over the element pairs serves all matrices that are wanted.
+
+A matrix is T_test I T_trial^T: the integrals I of the Legendre polynomials of all pairs of elements between the series
+T of the functions (`bemkit.geometry.series`). The sweep delivers I in chunks of rows, which become rows of the matrix.
+On a mesh with a symmetry the test elements are those of the mesh, the trial elements those of the whole body.
+"""
 
 from __future__ import annotations
 
-import bisect
 import itertools
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass
+from functools import cached_property
 from threading import Lock
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
-from bemkit.arrays import FloatArray, IntArray
+from bemkit.arrays import FloatArray, IntArray, consecutive_runs
 from bemkit.geometry.errors import GeometryError
-from bemkit.geometry.local_values import of_one_degree
+from bemkit.geometry.local_values import element_degrees
+from bemkit.geometry.reflection import antisymmetric_dofs
+from bemkit.geometry.series import columns_of, series
 from bemkit.geometry.spaces import BoundarySpace
-from bemkit.operators.integrals.pairs import Degrees
+from bemkit.operators.integrals.pairs import Degrees, PairIntegrals
 from bemkit.operators.integrals.sweep import FEW, PairSweep
 from bemkit.operators.linear.threads import for_each_chunk
-from bemkit.operators.matrix_rows import Block, Columns, Kind, Rows, Target
-from bemkit.operators.pair_form import PairForm
+from bemkit.operators.pair_form import Functions, PairForm, Term
 from bemkit.operators.stopwatch import assembling
+
+if TYPE_CHECKING:
+    from scipy.sparse import csc_array, csr_array
+
+_Key: TypeAlias = "tuple[Functions, bool, int | None]"
+"""Functions, whether the kernel is the double layer, and the component."""
 
 
 @assembling()
@@ -42,9 +55,9 @@ def assemble_together(forms: Sequence[PairForm]) -> tuple[list[FloatArray], int]
         msg = "the operators live on different meshes: assemble those of one mesh at a time"
         raise GeometryError(msg)
     everything = np.arange(mesh.n_elements)
-    matrices = [Target.zeros(form, everything, everything) for form in forms]
-    n_pairs = _fill(matrices, everything, everything)
-    return [matrix.dofs_matrix() for matrix in matrices], n_pairs
+    targets = [_Target.zeros(form, everything, everything) for form in forms]
+    n_pairs = _fill(targets, everything, everything)
+    return [target.by_vector_dofs() for target in targets], n_pairs
 
 
 @assembling()
@@ -57,61 +70,200 @@ def assemble_block(form: PairForm, rows: IntArray, columns: IntArray) -> FloatAr
         np.flatnonzero(np.isin(space.element_dofs, dofs // 2).any(axis=1))
         for space, dofs in ((form.test, rows), (form.trial, columns))
     ]
-    target = Target.zeros(form, *elements)
+    target = _Target.zeros(form, *elements)
     _fill([target], *elements)
-    places = [
+    positions = [
         np.searchsorted(nodes, dofs // 2) * 2 + dofs % 2
         for nodes, dofs in zip((target.test_nodes, target.trial_nodes), (rows, columns), strict=True)
     ]
-    return np.asarray(target.dofs_matrix()[np.ix_(*places)])
+    return np.asarray(target.by_vector_dofs()[np.ix_(*positions)])
 
 
-def _fill(targets: Sequence[Target], test_elements: IntArray, trial_elements: IntArray) -> int:
+@dataclass(frozen=True, eq=False)
+class _Target:
+    """The matrix (n_test, 2, n_trial, 2) of a form, by some of its scalar dofs, in increasing order, and components."""
+
+    form: PairForm
+    test_nodes: IntArray
+    trial_nodes: IntArray
+    matrix: FloatArray
+
+    @classmethod
+    def zeros(cls, form: PairForm, test_elements: IntArray, trial_elements: IntArray) -> _Target:
+        """Return the matrix of the dofs of some elements before anything is added."""
+        test, trial = _dofs_on(form.test, test_elements), _dofs_on(form.trial, trial_elements)
+        return cls(form, test, trial, np.zeros((test.size, 2, trial.size, 2)))
+
+    @cached_property
+    def terms(self) -> list[Term]:
+        """The parts of the form."""
+        return self.form.terms()
+
+    def by_vector_dofs(self) -> FloatArray:
+        """Return the matrix by vector dofs; rows and columns of dofs that are zero by symmetry are set to zero."""
+        if self.form.test.mesh.symmetry is not None:
+            self.matrix[antisymmetric_dofs(self.form.test).reshape(-1, 2)[self.test_nodes]] = 0.0
+            self.matrix[:, :, antisymmetric_dofs(self.form.trial).reshape(-1, 2)[self.trial_nodes]] = 0.0
+        return self.matrix.reshape(2 * self.test_nodes.size, -1)
+
+
+def _dofs_on(space: BoundarySpace, elements: IntArray) -> IntArray:
+    """Return the scalar dofs of some elements, in increasing order."""
+    if elements.size == space.mesh.n_elements:
+        return np.arange(space.n_dofs // 2)
+    return np.unique(space.element_dofs[elements])
+
+
+def _fill(targets: Sequence[_Target], test_elements: IntArray, trial_elements: IntArray) -> int:
     """Add the pairs of some elements, of any degrees; return how many there are.
 
     Each two degrees have a sweep of their own, but few straight elements, whose pairs share more if they are in one.
     """
-    mesh, forms = targets[0].form.test.mesh, [target.form for target in targets]
-    spaces = [space for form in forms for space in (form.test, form.trial)]
-    tests, trials = (list(of_one_degree(spaces, elements)) for elements in (test_elements, trial_elements))
-    n_trial = trial_elements.size * (mesh.whole.n_elements // mesh.n_elements)
-    if n_trial <= FEW and mesh.is_straight.all():
-        return _fill_kinds(targets, tests, trials)
-    return sum(_fill_kinds(targets, [test], [trial]) for test, trial in itertools.product(tests, trials))
-
-
-def _fill_kinds(targets: Sequence[Target], tests: Sequence[Kind], trials: Sequence[Kind]) -> int:
-    """Sweep over the pairs of elements of some degrees; return their number."""
     mesh = targets[0].form.test.mesh
-    columns = [Columns(target, trials, 2 * k + 1) for k, target in enumerate(targets)]
-    blocks = [
-        [Rows(target, elements, seen[2 * k], columns[k]) for k, target in enumerate(targets)]
-        for elements, seen in tests
-    ]
-    degrees = Degrees()
-    for target, k in zip(targets, range(0, 2 * len(targets), 2), strict=True):
-        degrees |= replace(target.form, test=_highest(tests, k), trial=_highest(trials, k + 1)).degrees
-    images = range(0, mesh.whole.n_elements, mesh.n_elements)
-    test = np.concatenate([elements for elements, _ in tests])
-    trial = np.concatenate([image + elements for elements, _ in trials for image in images])
-    sweep = PairSweep(mesh.whole, degrees, test, trial)
-    edges: list[int] = np.cumsum([0, *(elements.size for elements, _ in tests)]).tolist()
-    half = 0.5 * mesh.whole.lengths
-    lock = Lock()
-
-    def fill(rows: slice) -> int:
-        pairs = Block(sweep.chunk(rows), half[test[rows]], half[trial])
-        kind = bisect.bisect_right(edges, rows.start) - 1
-        for block in blocks[kind]:
-            gathered = block.gathered(pairs)
-            with lock:  # two chunks share the rows of the node between them
-                block.add(slice(rows.start - edges[kind], rows.stop - edges[kind]), gathered)
-        return pairs.test_half.size * trial.size
-
-    n_integrals = test.size * trial.size * degrees.n_products
-    return sum(for_each_chunk(fill, sweep.row_slices(edges), n_integrals=n_integrals))
+    n_images = mesh.whole.n_elements // mesh.n_elements
+    if trial_elements.size * n_images <= FEW and mesh.is_straight.all():
+        return _Sweep(targets, test_elements, trial_elements, {}).add_pairs()
+    spaces = list({space: None for target in targets for space in (target.form.test, target.form.trial)})
+    groups = [_groups_of_one_degree(spaces, elements) for elements in (test_elements, trial_elements)]
+    known: dict[tuple[Functions, int | None], csc_array] = {}
+    return sum(_Sweep(targets, test, trial, known).add_pairs() for test, trial in itertools.product(*groups))
 
 
-def _highest(kinds: Sequence[Kind], space: int) -> BoundarySpace:
-    """Return one of their spaces as the elements of the highest degree see it."""
-    return max((seen[space] for _, seen in kinds), key=lambda each: each.degree)
+def _groups_of_one_degree(spaces: Sequence[BoundarySpace], elements: IntArray) -> list[IntArray]:
+    """Return the elements in groups of equal degrees in all spaces."""
+    degrees = np.stack([element_degrees(space)[elements] for space in spaces])
+    kinds, group = np.unique(degrees, axis=1, return_inverse=True)
+    return [elements[group.ravel() == number] for number in range(kinds.shape[1])]
+
+
+def _n_polynomials(functions: Functions, elements: IntArray) -> int:
+    """Return how many Legendre polynomials functions need on some elements."""
+    highest = int(element_degrees(functions.space)[elements].max())
+    return max(1, highest + 1 - int(functions.derivative))
+
+
+class _Sweep:
+    """One sweep over pairs of elements, whose integrals are added to some matrices.
+
+    Parameters
+    ----------
+    targets : list of _Target
+    test, trial : (n_test,), (n_trial,) int arrays
+        Elements of the mesh; trial elements act with all their images.
+    known : dict
+        Series of functions and components, shared by sweeps: those that are missing are added.
+    """
+
+    def __init__(
+        self,
+        targets: Sequence[_Target],
+        test: IntArray,
+        trial: IntArray,
+        known: dict[tuple[Functions, int | None], csc_array],
+    ) -> None:
+        self.targets, self.test, self.known = targets, test, known
+        self.mesh = mesh = targets[0].form.test.mesh
+        self.trial = (np.arange(0, mesh.whole.n_elements, mesh.n_elements)[:, None] + trial).ravel()
+        self.components = (None,) if mesh.symmetry is None else (0, 1)
+        self.degrees = Degrees()
+        self.tested: dict[Functions, csc_array] = {}
+        self.acting: dict[_Key, csr_array] = {}
+        for target in targets:
+            tested, n_test = target.form.tested, _n_polynomials(target.form.tested, test)
+            if tested not in self.tested:
+                self.tested[tested] = columns_of(self._series(tested, None), mesh.n_elements, test, n_test)
+            for term in target.terms:
+                n_trial = _n_polynomials(term.trial, trial)
+                highest = n_test - 1, n_trial - 1
+                self.degrees |= Degrees(double=highest) if term.is_double else Degrees(log=highest)
+                for component in self.components:
+                    key = term.trial, term.is_double, component
+                    if key not in self.acting:
+                        self.acting[key] = self._acting(target, term.trial, component, n_trial)
+
+    def _acting(self, target: _Target, functions: Functions, component: int | None, n_trial: int) -> csr_array:
+        """Return the series of trial functions, (n_nodes, n_trial_elements * n_polynomials)."""
+        whole = self._series(functions, component)
+        own = columns_of(whole, self.mesh.whole.n_elements, self.trial, n_trial).tocsr()
+        return own if target.trial_nodes.size == own.shape[0] else own[target.trial_nodes]
+
+    def _series(self, functions: Functions, component: int | None) -> csc_array:
+        key = functions, component
+        if key not in self.known:
+            self.known[key] = series(functions.space, derivative=functions.derivative, component=component)
+        return self.known[key]
+
+    def add_pairs(self) -> int:
+        """Add the integrals of all pairs; return how many pairs there are."""
+        sweep = PairSweep(self.mesh.whole, self.degrees, self.test, self.trial)
+        lock = Lock()
+
+        def add(rows: slice) -> None:
+            acted = self._acted(sweep.chunk(rows))
+            tested = {functions: _chunk_of(whole, self.test.size, rows) for functions, whole in self.tested.items()}
+            for target in self.targets:
+                nodes, own = tested[target.form.tested]
+                folded = self._folded(target, acted, rows).reshape(own.shape[1], -1)
+                values = (own @ folded).reshape(-1, *target.matrix.shape[1:])
+                with lock:  # two chunks share the rows of the node between them
+                    for positions, at in consecutive_runs(np.searchsorted(target.test_nodes, nodes)):
+                        target.matrix[at] += values[positions]
+
+        n_pairs = self.test.size * self.trial.size
+        for_each_chunk(add, sweep.row_slices(), n_integrals=n_pairs * self.degrees.n_products)
+        return n_pairs
+
+    def _acted(self, integrals: PairIntegrals) -> dict[_Key, FloatArray]:
+        """Return I T_trial^T for all kinds of trial functions: (n_nodes, n_kernels, n_polynomials, n_test)."""
+        log = _by_trial(integrals.log, integrals.quotient.real, integrals.quotient.imag)
+        double = _by_trial(integrals.double)
+        acted = {}
+        for key, own in self.acting.items():
+            kernels = double if key[1] else log
+            n_trial = own.shape[1] // self.trial.size
+            flat = kernels[:, :n_trial].reshape(own.shape[1], -1)
+            acted[key] = (own @ flat).reshape(-1, *kernels.shape[2:])
+        return acted
+
+    def _folded(self, target: _Target, acted: dict[_Key, FloatArray], rows: slice) -> FloatArray:
+        """Return the kernels of a form acting on its trial functions: (n_test, n_polynomials, 2, n_nodes, 2)."""
+        lengths = self.mesh.lengths[self.test[rows]]
+        n_polynomials = self.tested[target.form.tested].shape[1] // self.test.size
+        folded = np.zeros((lengths.size, n_polynomials, 2, target.trial_nodes.size, 2))
+        for c, d in np.ndindex(2, 2):
+            entries: FloatArray | None = None
+            for term in target.terms:
+                key = term.trial, term.is_double, self.components[d % len(self.components)]
+                for number in np.flatnonzero(term.tensors[:, c, d]).tolist():
+                    part = term.tensors[number, c, d] * acted[key][:, number, :n_polynomials]
+                    entries = part if entries is None else np.add(entries, part, out=entries)
+                if term.shift and entries is not None:  # a constant sees the means of both functions
+                    constant = term.tensors[0, c, d] * term.shift
+                    entries[:, 0] += (constant * self._integrals(key))[:, None] * lengths
+            if entries is not None:
+                folded[:, :, c, :, d] = entries.transpose(2, 1, 0)
+        return folded
+
+    def _integrals(self, key: _Key) -> FloatArray:
+        """Return the integrals (n_nodes,) of trial functions over the trial elements."""
+        own = self.acting[key]
+        lengths = np.zeros((self.trial.size, own.shape[1] // self.trial.size))
+        lengths[:, 0] = self.mesh.whole.lengths[self.trial]
+        return np.asarray(own @ lengths.ravel())
+
+
+def _by_trial(*kernels: FloatArray) -> FloatArray:
+    """Return integrals (n_a, n_b, n_test, n_trial) of some kernels as (n_trial, n_b, n_kernels, n_a, n_test)."""
+    n_a, n_b, n_test, n_trial = kernels[0].shape
+    result = np.empty((n_trial, n_b, len(kernels), n_a, n_test))
+    for number, kernel in enumerate(kernels):
+        result[:, :, number] = kernel.transpose(3, 1, 0, 2)
+    return result
+
+
+def _chunk_of(whole: csc_array, n_elements: int, rows: slice) -> tuple[IntArray, csc_array]:
+    """Return the dofs of some elements, ascending, and their series on these elements."""
+    n_each = whole.shape[1] // n_elements
+    own = whole[:, rows.start * n_each : rows.stop * n_each]
+    nodes, positions = np.unique(own.indices, return_inverse=True)
+    return nodes.astype(np.intp), type(own)((own.data, positions, own.indptr), shape=(nodes.size, own.shape[1]))

@@ -23,10 +23,10 @@ from bemkit.operators.forms import (
     HypersingularForm,
     SingleLayerForm,
     definite,
-    mass_entries,
+    mass_matrix,
 )
 from bemkit.operators.material import Material
-from bemkit.operators.pair_form import PairForm, Tag
+from bemkit.operators.pair_form import PairForm, Tag, require_one_mesh
 
 Matrix: TypeAlias = "FloatArray | csr_array[np.float64]"
 
@@ -186,12 +186,11 @@ class Mass(BoundaryOperator):
     """The identity in weak form, <u, q>; its matrix is sparse."""
 
     def __init__(self, trial: BoundarySpace, test: BoundarySpace) -> None:
-        self._entries = mass_entries(trial, test)
+        require_one_mesh(trial, test)
         super().__init__(trial, test, definite(trial) if trial is test else frozenset())
 
     def _build(self) -> Matrix:
-        values, rows, columns = self._entries
-        return csr_array((values, (rows, columns)), shape=self.shape)
+        return mass_matrix(self.trial, self.test)
 
 
 def single_layer(trial: BoundarySpace, test: BoundarySpace, material: Material) -> SingleLayer:

@@ -14,30 +14,25 @@ so that all of them are combinations of the scalar integrals of `integrals`. The
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
-from typing import NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bemkit.arrays import FloatArray, IntArray, read_only
 from bemkit.geometry.errors import GeometryError
-from bemkit.geometry.local_values import of_one_degree
-from bemkit.geometry.quadrature import gauss_legendre
 from bemkit.geometry.reflection import antisymmetric_dofs
-from bemkit.geometry.spaces import BoundarySpace, local_coefficients
-from bemkit.operators.integrals.pairs import Degrees
-from bemkit.operators.pair_form import PairForm, Tag, TrialTerm, require_one_mesh
+from bemkit.geometry.series import columns_of, series
+from bemkit.geometry.spaces import BoundarySpace
+from bemkit.operators.pair_form import Functions, PairForm, Tag, Term, require_one_mesh
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_array
 
 
-def _derivative(coefficients: FloatArray) -> FloatArray:
-    """Return the Legendre coefficients of d/dxi of each row; a constant keeps one zero coefficient."""
-    return np.asarray(coefficients @ _derivatives_of_polynomials(coefficients.shape[1]))
-
-
-@lru_cache(maxsize=16)
-def _derivatives_of_polynomials(n: int) -> FloatArray:
-    """Return the Legendre coefficients, read-only, of dP_k/dxi in row k < n; one column at least."""
-    return read_only(np.asarray(np.polynomial.legendre.legder(np.eye(n), axis=1), np.float64))
+_IDENTITY = np.eye(2)
+_TURN = np.array([[0.0, 1.0], [-1.0, 0.0]])
+"""J."""
+_HALF_QUOTIENT = 0.5 * np.array([[[1.0, 0.0], [0.0, -1.0]], [[0.0, 1.0], [1.0, 0.0]]])
+"""Q without its constant half of the identity, by the real and the imaginary part of r / conj(r)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,24 +45,13 @@ class SingleLayerForm(PairForm):
         is_one = self.trial is self.test
         return definite(self.trial, self.material.effective_poisson_ratio < 0.5) if is_one else frozenset()
 
-    @property
-    def degrees(self) -> Degrees:
-        """The integrals it needs."""
-        return Degrees(log=(self.test.degree, self.trial.degree))
-
-    @property
-    def test_coefficients(self) -> FloatArray:
-        """Those of the basis."""
-        return local_coefficients(self.test)
-
-    def trial_terms(self) -> list[TrialTerm]:
-        """Return the one term of V."""
+    def terms(self) -> list[Term]:
+        """Return the one term of V; the constant half of Q is part of the shift."""
         nu = self.material.effective_poisson_ratio
         factor = 1.0 / (8.0 * np.pi * self.material.shear_modulus * (1.0 - nu))
-        log, half = -factor * (3.0 - 4.0 * nu), 0.5 * factor
-        tensor = np.array([[half, log, 0.0], [-1j * half, 1j * log, 0.0]])
+        tensors = factor * np.stack([-(3.0 - 4.0 * nu) * _IDENTITY, *_HALF_QUOTIENT])
         shift = -float(np.log(self.test.mesh.diameter)) - 0.5 / (3.0 - 4.0 * nu)
-        return [TrialTerm(local_coefficients(self.trial), tensor, shift=shift)]
+        return [Term(Functions(self.trial), tensors, shift)]
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,28 +62,17 @@ class DoubleLayerForm(PairForm):
         super().__post_init__()
         _require_continuous(self.trial, "double_layer", "trial")
 
-    @property
-    def degrees(self) -> Degrees:
-        """The integrals it needs."""
-        test, trial = self.test.degree, self.trial.degree
-        return Degrees(log=(test, trial - 1), double=(test, trial))
+    def terms(self) -> list[Term]:
+        """Return the kernels that act on du/ds, and the scalar double layer of u.
 
-    @property
-    def test_coefficients(self) -> FloatArray:
-        """Those of the basis."""
-        return local_coefficients(self.test)
-
-    def trial_terms(self) -> list[TrialTerm]:
-        """Return the scalar double layer of u, and the kernels that act on du/ds."""
-        coefficients = local_coefficients(self.trial)
+        The constant half of Q is left away: du/ds has no mean on a closed curve.
+        """
         nu = self.material.effective_poisson_ratio
         factor = 1.0 / (4.0 * np.pi * (1.0 - nu))
-        log, half = factor * (1.0 - 2.0 * nu), 0.5 * factor
-        slope = np.array([[-1j * half, 1j * log, 0.0], [-half, -log, 0.0]])
-        scalar = np.array([[0.0, 0.0, 1.0], [0.0, 0.0, 1j]])
+        tensors = factor * _TURN @ np.stack([(1.0 - 2.0 * nu) * _IDENTITY, *_HALF_QUOTIENT])
         return [
-            TrialTerm(_derivative(coefficients), slope, of_slopes=(False, True)),
-            TrialTerm(coefficients, scalar),
+            Term(Functions(self.trial, derivative=True), tensors),
+            Term(Functions(self.trial), _IDENTITY[None]),
         ]
 
 
@@ -121,21 +94,15 @@ class HypersingularForm(PairForm):
         return frozenset(symmetric | {kernel})
 
     @property
-    def degrees(self) -> Degrees:
-        """The integrals it needs."""
-        return Degrees(log=(self.test.degree - 1, self.trial.degree - 1))
+    def tested(self) -> Functions:
+        """dv/ds."""
+        return Functions(self.test, derivative=True)
 
-    @property
-    def test_coefficients(self) -> FloatArray:
-        """Those of the derivative of the basis."""
-        return _derivative(local_coefficients(self.test))
-
-    def trial_terms(self) -> list[TrialTerm]:
-        """Return the one term of W, on du/ds and dv/ds."""
+    def terms(self) -> list[Term]:
+        """Return the one term of W; du/ds and dv/ds have no mean, so that the constant half of Q is left away."""
         factor = self.material.shear_modulus / (2.0 * np.pi * (1.0 - self.material.effective_poisson_ratio))
-        half = 0.5 * factor
-        tensor = np.array([[half, -factor, 0.0], [-1j * half, -1j * factor, 0.0]])
-        return [TrialTerm(_derivative(local_coefficients(self.trial)), tensor, of_slopes=(True, True))]
+        tensors = factor * np.stack([-_IDENTITY, *_HALF_QUOTIENT])
+        return [Term(Functions(self.trial, derivative=True), tensors)]
 
 
 def definite(space: BoundarySpace, is_positive: bool = True) -> frozenset[Tag]:
@@ -153,36 +120,27 @@ def _require_continuous(space: BoundarySpace, operator: str, role: str) -> None:
         raise GeometryError(msg)
 
 
-class MassEntries(NamedTuple):
-    """The entries of the identity <u, q> with their rows and columns, (n,) each; entries at one place add up."""
+def mass_matrix(trial: BoundarySpace, test: BoundarySpace) -> csr_array:
+    """Return the identity <u, q>, a sparse (test.n_dofs, trial.n_dofs) array [m].
 
-    values: FloatArray
-    rows: IntArray
-    columns: IntArray
+    Rows and columns of dofs that are zero by symmetry are zero.
 
-    def times(self, functions: FloatArray, n_test: int) -> FloatArray:
-        """Return <u, q> for all test functions q: (n_test, m), u in the columns of (n_trial, m)."""
-        result = np.zeros((n_test, functions.shape[1]))
-        np.add.at(result, self.rows, self.values[:, None] * functions[self.columns])
-        return result
+    Notes
+    -----
+    T_test D T_trial^T with the Legendre coefficients T of the functions and the squared norms D of the polynomials.
+    """
+    from scipy.sparse import coo_array
 
-
-def mass_entries(trial: BoundarySpace, test: BoundarySpace) -> MassEntries:
-    """Return the entries of the identity <u, q>."""
     require_one_mesh(trial, test)
-    found = []
-    for elements, (own_test, own_trial) in of_one_degree([test, trial], np.arange(test.mesh.n_elements)):
-        points, weights = gauss_legendre(own_test.degree + own_trial.degree + 1)
-        local = (own_test.basis(points) * weights) @ own_trial.basis(points).T
-        values = (0.5 * test.mesh.lengths[elements])[:, None, None, None] * local[:, :, None] * np.ones(2)
-        component = np.arange(2)
-        rows = 2 * own_test.element_dofs[elements][:, :, None, None] + component + np.zeros_like(values, np.intp)
-        columns = 2 * own_trial.element_dofs[elements][:, None, :, None] + component + np.zeros_like(values, np.intp)
-        values[antisymmetric_dofs(test)[rows] | antisymmetric_dofs(trial)[columns]] = 0.0
-        found.append((values.ravel(), rows.ravel(), columns.ravel()))
-    return MassEntries(*(np.concatenate(each) for each in zip(*found, strict=True)))
-
-
-def mass_product(trial: BoundarySpace, test: BoundarySpace, functions: FloatArray) -> FloatArray:
-    """Return <u, q> for all test functions q: (test.n_dofs, m), u in the columns of (trial.n_dofs, m)."""
-    return mass_entries(trial, test).times(functions, test.n_dofs)
+    wholes = series(test), series(trial)
+    n = min(whole.shape[1] for whole in wholes) // test.mesh.n_elements
+    elements = np.arange(test.mesh.n_elements)
+    norms = np.sqrt(test.mesh.lengths[:, None] / (2.0 * np.arange(n) + 1.0)).ravel()
+    # both factors carry the norms, so that the matrix of one space is symmetric to the last bit
+    tested, acting = ((columns_of(whole, elements.size, elements, n) * norms).tocsr() for whole in wholes)
+    scalar = (tested @ acting.T).tocoo()
+    component = np.arange(2)[:, None]
+    rows, columns = ((2 * dofs + component).ravel() for dofs in (scalar.row, scalar.col))
+    keeps = ~(antisymmetric_dofs(test)[rows] | antisymmetric_dofs(trial)[columns])
+    values = np.tile(scalar.data, 2)[keeps]
+    return coo_array((values, (rows[keeps], columns[keeps])), shape=(test.n_dofs, trial.n_dofs)).tocsr()

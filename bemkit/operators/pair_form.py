@@ -5,36 +5,48 @@ from __future__ import annotations
 import enum
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
+from typing import NamedTuple
 
-from bemkit.arrays import ComplexArray, FloatArray
+from bemkit.arrays import FloatArray
 from bemkit.geometry.errors import GeometryError
 from bemkit.geometry.spaces import BoundarySpace
-from bemkit.operators.integrals.pairs import Degrees
 from bemkit.operators.material import Material
 
 
+class Functions(NamedTuple):
+    """The functions of a boundary space, or their derivatives by the arc length."""
+
+    space: BoundarySpace
+    derivative: bool = False
+
+
 @dataclass(frozen=True, eq=False)
-class TrialTerm:
-    """One part of an operator: a 2 x 2 tensor of combinations of the scalar integrals of P_a (test) and P_b (trial).
+class Term:
+    """A part of a bilinear form: the integral of v^T G w over pairs of elements, with a 2 x 2 kernel G(x, y).
+
+    With r = x - y, the kernel is a sum of scalar ones (see `bemkit.operators.integrals.sweep`) times constant tensors,
+
+        G = tensors[0] (log|r| + shift) + tensors[1] Re(r / conj(r)) + tensors[2] Im(r / conj(r)),
+
+    or the double layer k of the Laplace equation times one, G = tensors[0] k.
 
     Parameters
     ----------
-    coefficients : (n_local, n_polynomials) array
-        Legendre coefficients of what the kernel acts on: the trial functions or their derivatives.
-    tensor : (2, 3) complex array
-        By the components of the test function, and by the integrals of the quotient, the logarithm and the double
-        layer. What acts on the components of the trial function is one complex number, its real part on x and its
-        imaginary part on y.
-    of_slopes : (bool, bool)
-        Whether it acts on tangential derivatives of the test and of the trial functions.
+    trial : Functions
+        w, at the points y.
+    tensors : (3, 2, 2) or (1, 2, 2) array
+        By the scalar kernels and the components of v and w.
     shift : float
-        What is added to the logarithm.
     """
 
-    coefficients: FloatArray
-    tensor: ComplexArray
-    of_slopes: tuple[bool, bool] = (False, False)
+    trial: Functions
+    tensors: FloatArray
     shift: float = 0.0
+
+    @property
+    def is_double(self) -> bool:
+        """Whether it is the double layer of the Laplace equation."""
+        return len(self.tensors) == 1
 
 
 class Tag(enum.Enum):
@@ -76,18 +88,13 @@ class PairForm(ABC):
         return frozenset()
 
     @property
-    @abstractmethod
-    def degrees(self) -> Degrees:
-        """The integrals it needs."""
-
-    @property
-    @abstractmethod
-    def test_coefficients(self) -> FloatArray:
-        """(n_local, n_polynomials) Legendre coefficients on the test element."""
+    def tested(self) -> Functions:
+        """v, at the points x: those of the test space."""
+        return Functions(self.test)
 
     @abstractmethod
-    def trial_terms(self) -> list[TrialTerm]:
-        """Return the parts that share the test coefficients."""
+    def terms(self) -> list[Term]:
+        """Return the parts of the form; their sum is the form."""
 
 
 def require_one_mesh(trial: BoundarySpace, test: BoundarySpace) -> None:

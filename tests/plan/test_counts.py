@@ -107,8 +107,8 @@ def test_the_counts_of_the_papers_first_example() -> None:
 
 LEFT_OUT = {
     "constant": (
-        "operators.forms.HypersingularForm.trial_terms",
-        "operators.forms.DoubleLayerForm.trial_terms",
+        "operators.forms.HypersingularForm.terms",
+        "operators.forms.DoubleLayerForm.terms",
         "operators.linear.dense.Cholesky.__init__",
         "operators.integrals.inner.far_inner",
         "operators.integrals.curved_panels.fit",
@@ -122,10 +122,10 @@ LEFT_OUT = {
     "no contact": (
         "contact.condensation.dense_body.DenseBody.__init__",
         "solvers.base._Run.finish",
-        "operators.forms.HypersingularForm.trial_terms",
+        "operators.forms.HypersingularForm.terms",
     ),
-    "curved": ("operators.forms.HypersingularForm.trial_terms", "operators.forms.SingleLayerForm.trial_terms"),
-    "exterior": ("contact.condensation.dense_body.DenseBody.__init__", "operators.forms.SingleLayerForm.trial_terms"),
+    "curved": ("operators.forms.HypersingularForm.terms", "operators.forms.SingleLayerForm.terms"),
+    "exterior": ("contact.condensation.dense_body.DenseBody.__init__", "operators.forms.SingleLayerForm.terms"),
 }
 
 

@@ -10,8 +10,9 @@ import pytest
 import bemkit as bk
 from bemkit.errors import InputError
 from bemkit.geometry.errors import GeometryError
-from bemkit.geometry.local_values import dof_weights, of_one_degree, summed_at_dofs, values_on_elements
+from bemkit.geometry.local_values import dof_weights, summed_at_dofs, values_on_elements
 from bemkit.geometry.reflection import antisymmetric_dofs
+from bemkit.geometry.series import series
 from bemkit.geometry.spaces import LagrangeSpace, dof_points
 from bemkit.operators.boundary import hypersingular
 from bemkit.runs.element_degrees import LEAST_DEGREE, below_layers, few_kinds, sufficient_degrees
@@ -64,10 +65,26 @@ def test_integrals_are_summed_up_by_the_transpose() -> None:
     assert dof_weights(space, everything).sum() == pytest.approx(4.0, rel=1e-14)
 
 
-def test_elements_are_grouped_by_their_degrees() -> None:
+def test_the_series_of_an_element_end_with_its_degree() -> None:
     space = mixed(square())
-    found = {part.degree: elements.tolist() for elements, (part,) in of_one_degree([space], np.arange(8))}
-    assert found == {1: [0], 2: [2, 7], 3: [4, 5], 4: [1], 5: [6], 6: [3]}
+    coefficients = (series(space).T @ np.random.default_rng(5).standard_normal(space.n_dofs // 2)).reshape(8, 7)
+    assert [int(np.flatnonzero(own).max()) for own in coefficients] == list(DEGREES)
+
+
+@pytest.mark.parametrize("symmetry", [None, bk.Symmetry(x=0.5)])
+def test_a_series_is_the_function_and_its_slope_on_all_images(symmetry: bk.Symmetry | None) -> None:
+    mesh = square(symmetry)
+    space = LagrangeSpace(mesh, degree=6, element_degrees=np.resize(DEGREES, mesh.n_elements))
+    points, n = dof_points(space) - np.array([0.5, 0.0]), mesh.whole.n_elements
+    xi = np.linspace(-1.0, 1.0, 5)
+    polynomials = np.polynomial.legendre.legvander(xi, 6)
+    along = mesh.whole.tangents
+    for component in (0, 1):  # x is antisymmetric, as the component x of a displacement is
+        values = (series(space, component=component).T @ points[:, component]).reshape(n, -1) @ polynomials.T
+        expected = mesh.whole.points(np.arange(n), xi)[:, :, component] - (0.5, 0.0)[component]
+        np.testing.assert_allclose(values, expected, atol=1e-14)
+        slopes = series(space, derivative=True, component=component).T @ points[:, component]
+        np.testing.assert_allclose(slopes.reshape(n, -1)[:, 0], along[:, component], atol=1e-13)
 
 
 @pytest.mark.parametrize("symmetry", [None, bk.Symmetry(x=0.5)])

@@ -16,8 +16,7 @@ are listed and corrected (`near`).
 
 from __future__ import annotations
 
-import itertools
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from functools import cached_property
 
 import numpy as np
@@ -93,9 +92,11 @@ class PairSweep:
         """Return the number of points of a Gauss level."""
         return GAUSS_LEVELS[level][0] + self.degrees.extra_points
 
-    def row_slices(self, edges: Sequence[int] = ()) -> Iterator[slice]:
-        """Yield the chunks as slices of the test elements, cut at some edges, too."""
-        return row_slices(self.test.size, self._n_rows, edges)
+    def row_slices(self) -> Iterator[slice]:
+        """Yield the chunks as slices of the test elements."""
+        return (
+            slice(first, min(first + self._n_rows, self.test.size)) for first in range(0, self.test.size, self._n_rows)
+        )
 
     def _classify(self) -> tuple[LevelArray, BoolArray]:
         """Find the Gauss level of every pair on its test element, and which pairs are too close for the dense sweep."""
@@ -188,11 +189,6 @@ def sweep_memory(degrees: Degrees, n_test: int, n_trial: int, n_threads: int, *,
     of_pair = (0 if is_listed else n_points * (n_inner + 2 * n_log)) + n_integrals
     sweeping = 8 * (n_listed * n_integrals + n_chunk * of_pair)
     return max(listing, sweeping)
-
-
-def row_slices(n: int, n_rows: int, edges: Sequence[int] = ()) -> Iterator[slice]:
-    """Cut n rows into chunks of so many, and at some edges, too."""
-    yield from (slice(*ends) for ends in itertools.pairwise(sorted({*range(0, n, n_rows), *edges, n})))
 
 
 def rows_per_chunk(degrees: Degrees, n_trial: int, n_points: int) -> int:

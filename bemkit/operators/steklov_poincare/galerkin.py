@@ -17,7 +17,7 @@ from bemkit.geometry.reflection import antisymmetric_dofs
 from bemkit.geometry.spaces import BoundarySpace, ConstantSpace, LinearSpace, dof_points, element_nodes
 from bemkit.geometry.vectors import turned_right
 from bemkit.operators.counts import OperationCounts
-from bemkit.operators.forms import mass_product
+from bemkit.operators.forms import mass_matrix
 from bemkit.operators.linear.dense import Cholesky, multiply
 from bemkit.operators.linear.solvers import (
     Automatic,
@@ -218,8 +218,7 @@ class GalerkinElasticity:
         tractions = self.tractions(displacement)
         at_nodes = values_on_elements(self.traction_space, tractions)
         if self._needs_forces:
-            carried = mass_product(self.traction_space, self.displacement_space, tractions.reshape(-1, 1))
-            missing = force.ravel() - carried[:, 0]
+            missing = force.ravel() - mass_matrix(self.traction_space, self.displacement_space) @ tractions.ravel()
             pressures = np.linalg.lstsq(self._fluxes(self.mesh.loops), missing, rcond=None)[0]
             normals = self._normals_of_true_mean()
             for elements, pressure in zip(self.mesh.loops, pressures, strict=True):

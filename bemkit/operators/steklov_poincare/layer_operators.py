@@ -15,8 +15,7 @@ from bemkit.operators.forms import (
     DoubleLayerForm,
     HypersingularForm,
     SingleLayerForm,
-    mass_entries,
-    mass_product,
+    mass_matrix,
 )
 from bemkit.operators.linear.dense import Cholesky, multiply, subtract_product
 from bemkit.operators.material import Material
@@ -72,14 +71,14 @@ def assemble_layers(
         hypersingular=Entries.full(u.n_dofs, u.n_dofs),
     )
     is_compressible = not (material.is_incompressible or mesh.is_exterior)
-    annihilated = np.zeros((t.n_dofs, 0)) if is_compressible else mass_product(t, t, pressures)
+    annihilated = np.zeros((t.n_dofs, 0)) if is_compressible else mass_matrix(t, t) @ pressures
     kernel = np.column_stack([annihilated, _unit_vectors(antisymmetric_dofs(t))])
     factor = Cholesky(_without_kernel(v, kernel), "the single layer operator", overwrite=True)
     del v  # matrices are dropped as soon as they are used: there is room for few of them at once
     motions = traction_free_modes(mesh, dof_points(u))
-    mass = mass_entries(u, t)
-    resultants = mass.times(motions, t.n_dofs)
-    np.add.at(k, (mass.rows, mass.columns), 0.5 * mass.values)
+    mass = mass_matrix(u, t).tocoo()
+    resultants = mass @ motions
+    k[mass.row, mass.col] += 0.5 * mass.data
     # polynomials do not hold a rotation of curved elements exactly: its interpolant is made a rigid motion
     at_rest, _ = np.linalg.qr(motions[:, : 0 if mesh.is_straight.all() else 3])
     trace = _without(k, at_rest)
