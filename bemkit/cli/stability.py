@@ -4,14 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import partial
-from os import cpu_count
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
 from bemkit.cli.options import StudyProgress, reserve
-from bemkit.results.outputs import Outputs, TextFile, make_folder
+from bemkit.results.outputs import Outputs, TextFile
 
 if TYPE_CHECKING:
     from bemkit.studies.engine import Task
@@ -27,54 +25,9 @@ if TYPE_CHECKING:
 @click.option("--plot", "plot", metavar="DIR", help="Draw one figure for each axis into a folder.")
 @click.option("--elements", type=int, metavar="N", help="Number of boundary elements, instead of the scene's.")
 @click.option("--discretisation", metavar="WORD", help="Such as linear or constant, instead of the scene's.")
-@click.option("--random", "count", type=click.IntRange(1), metavar="N", help="Solve N random scenes instead.")
-@click.option("--seed", type=click.IntRange(0), metavar="N", help="Of the random scenes (0).")
-@click.option("--first", type=click.IntRange(0), metavar="N", help="Number of the first random scene (0).")
-@click.option("--jobs", type=click.IntRange(1), metavar="N", help="Processes for random scenes (all processors).")
-@click.option("--save", metavar="DIR", help="Keep random scenes that fail as TOML in a folder.")
 @click.option("-q", "--quiet", is_flag=True, help="Print neither progress nor tables.")
-def stability(count: int | None, quiet: bool, **asked: Any) -> int:
-    """Drive SCENE (paper-1 by default) to its extremes and judge every answer by independent evidence.
-
-    With --random many scenes of every kind are judged instead. The exit code is 1 if an answer is wrong or an error
-    has no name.
-    """
-    of_trials = {name: asked.pop(name) for name in ("seed", "first", "jobs", "save")}
-    superfluous = of_trials if count is None else asked
-    for name, value in superfluous.items():
-        if value not in (None, ()):
-            remedy = "goes with random scenes: add --random, such as --random 200"
-            if count is not None:
-                remedy = "goes with a sweep of one scene: leave it out, or --random"
-            raise click.UsageError(f"{'SCENE' if name == 'scene' else '--' + name} {remedy}")
-    return _sweep(**asked, quiet=quiet) if count is None else _try_random(count, **of_trials, quiet=quiet)
-
-
-def _try_random(
-    count: int, *, seed: int | None, first: int | None, jobs: int | None, save: str | None, quiet: bool
-) -> int:
-    """Solve and judge random scenes; those that fail are on the disk as soon as they are known."""
-    with StudyProgress(quiet) as progress:
-        from bemkit.studies.stability.report import print_trials
-        from bemkit.studies.stability.trials import save_trial, trial_tasks
-
-        if save is not None:
-            make_folder(Path(save))
-        tasks = trial_tasks(seed or 0, range(first or 0, (first or 0) + count))
-        trials = []
-        for trial in progress.compute(tasks, "random scenes", processes=min(jobs or cpu_count() or 1, count)):
-            trials.append(trial)
-            if save is not None and trial.is_failure:
-                save_trial(trial, Path(save))
-    trials.sort(key=lambda trial: trial.index)
-    if not quiet:
-        print_trials(trials)
-    return int(any(trial.is_failure for trial in trials))
-
-
-def _sweep(
+def stability(
     scene: str | None,
-    *,
     axis: tuple[str, ...],
     output: str | None,
     csv: str | None,
@@ -84,7 +37,11 @@ def _sweep(
     discretisation: str | None,
     quiet: bool,
 ) -> int:
-    """Compute what is missing, keep every record at once, and print each axis when it is complete."""
+    """Drive SCENE (paper-1 by default) to its extremes and judge every answer by independent evidence.
+
+    The exit code is 1 if an answer is wrong. Random scenes of every kind are a tool of the repository:
+    ``python -m checks.random_scenes 200``.
+    """
     with StudyProgress(quiet) as progress:
         from bemkit.scene.assembly import Assembly
         from bemkit.scene.toml import load_scene, scene_to_toml, with_overrides

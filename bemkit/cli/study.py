@@ -1,10 +1,9 @@
-"""The commands of studies: ``bemkit study errors | paper-tables | solutions``."""
+"""The commands of studies: ``bemkit study errors | solutions``."""
 
 from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
-from functools import partial
 from typing import TYPE_CHECKING
 
 import click
@@ -129,25 +128,6 @@ def errors(
                 print_study(records, shown)
     outputs.write(records)
     return 0 if all(record.is_certified for record in records) else NOT_CONVERGED
-
-
-@study.command("paper-tables")
-@click.option("--json", "json_file", metavar="FILE", help="Write the tables as JSON; - is standard output.")
-@click.option("--csv", "csv_file", metavar="FILE", help="Write one row for each pair of rho; - is standard output.")
-@click.option("-q", "--quiet", is_flag=True, help="Print neither the progress bar nor the tables.")
-def paper_tables(json_file: str | None, csv_file: str | None, quiet: bool) -> None:
-    """Reproduce the source paper's Tables 1 and 2: outer steps of the augmented Lagrangian method over rho."""
-    with StudyProgress(quiet) as progress:
-        from bemkit.studies import paper_tables as module
-
-        as_json = TextFile(json_file, "JSON file", JSON_START, module.to_json)
-        as_csv = TextFile(csv_file, "CSV file of the paper's tables", module.CSV_START, module.to_csv)
-        outputs = Outputs((as_json, as_csv))
-        outputs.check()
-        tables = module.paper_tables(partial(progress.compute, name="paper tables"))
-    outputs.write(tables)
-    if not quiet and not outputs.uses_stdout:
-        module.print_paper_tables(tables)
 
 
 @study.command()

@@ -7,6 +7,7 @@ from bemkit.testing.laws import check_law as check_law
 from bemkit.testing.linear import check_linear_solver as check_linear_solver
 from bemkit.testing.operators import check_double_layer as check_double_layer
 from bemkit.testing.operators import check_operator as check_operator
+from bemkit.testing.solutions import check_solution as check_solution
 from bemkit.testing.solvers import check_solver as check_solver
 from bemkit.testing.spaces import check_curve as check_curve
 from bemkit.testing.spaces import check_space as check_space

@@ -20,7 +20,7 @@ from bemkit.contact.obstacle import (
 )
 from bemkit.contact.polygon import PolygonalObstacle
 from bemkit.formulas import Expression
-from bemkit.studies.stability.independent_check.nodes import distance_to
+from bemkit.testing.independent_check.nodes import distance_to
 
 coordinates = st.floats(-10.0, 10.0)
 points = st.tuples(coordinates, coordinates)

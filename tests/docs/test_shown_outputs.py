@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import runpy
 import shlex
 from itertools import pairwise
 from pathlib import Path
@@ -11,12 +12,15 @@ from typing import Any
 import pytest
 
 from bemkit.cli.main import main
-from tests.docs.pages import OUTPUTS_SHOWN, blocks, read
+from tests.docs.pages import DOCS, OUTPUTS_SHOWN, blocks, read
 from tests.slow import slow_only
 
 
 def run_command(line: str) -> None:
     program, *arguments = shlex.split(line)
+    if program == "python":
+        runpy.run_path(str(DOCS.parent / arguments[0]), run_name="__main__")
+        return
     assert program == "bemkit"
     with pytest.raises(SystemExit):
         main(arguments)

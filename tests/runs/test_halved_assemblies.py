@@ -16,9 +16,9 @@ from bemkit.results.result_file import read_result, write_result
 from bemkit.scene.symmetry import AsymmetricSceneError
 from bemkit.studies.stability.assembly_axes import ASSEMBLY_AXES
 from bemkit.studies.stability.axes import find_axes
-from bemkit.studies.stability.independent_check import check_assembly
 from bemkit.studies.stability.records import Verdict
 from bemkit.studies.stability.sweep import sweep
+from bemkit.testing.independent_check import violations_of_assembly
 
 STEEL, SOFT = bk.Material(1.0, 0.3), bk.Material(0.5, 0.2)
 ABOUT_X = bk.Symmetry(x=0.0)
@@ -95,7 +95,7 @@ def test_half_of_the_bodies_answer_as_the_whole_ones() -> None:
     inside = np.array([[-0.3, -0.2], [0.3, -0.2]])
     fields = [bk.interior_fields(each.bodies["lower"]).stress(inside) for each in (half, whole)]
     np.testing.assert_allclose(fields[0], fields[1], atol=1e-10)
-    check = check_assembly(half)
+    check = violations_of_assembly(half)
     assert check.is_good, check
 
 

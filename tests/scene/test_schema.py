@@ -16,7 +16,7 @@ from bemkit.cli.main import commands
 from bemkit.errors import BemkitError
 from bemkit.scene.schema import parameters, scene_schema, summary
 from bemkit.scene.toml import shipped_files
-from bemkit.studies.stability.random_scenes.scenes import random_case
+from checks.random_scenes.scenes import random_case
 from tests.docs.test_scene_files_page import EXAMPLES, as_text
 from tests.docs.test_several_bodies_page import EXAMPLES as ASSEMBLIES
 

@@ -1,6 +1,6 @@
 """Whether boundary equations are compressed over a tree, and what that takes, foreseen from sizes alone.
 
-Times and memory are those of a square with 1e3 to 1e6 elements (`tests/benchmarks/large.py` measures what is estimated
+Times and memory are those of a square with 1e3 to 1e6 elements (`benchmarks/large.py` measures what is estimated
 here); they hardly depend on the shape.
 """
 

@@ -1,6 +1,6 @@
 """Whether the equations of collocation can be solved without storing them, and what that takes, from sizes alone.
 
-Times and memory are those of a square with 1e4 to 1e5 elements (`tests/benchmarks/low_memory.py` measures what is
+Times and memory are those of a square with 1e4 to 1e5 elements (`benchmarks/low_memory.py` measures what is
 estimated here).
 """
 

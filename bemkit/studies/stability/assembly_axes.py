@@ -12,7 +12,7 @@ from bemkit.scene.body import Body
 from bemkit.scene.mesh_options import MeshOptions
 from bemkit.studies.stability.axes import Axis, changed, friction, moved, read_axes, similar
 from bemkit.studies.stability.case import PRECISION, Case
-from bemkit.studies.stability.random_assemblies.similar import AssemblySimilarity
+from bemkit.studies.stability.similar_assembly import AssemblySimilarity
 
 
 def _against(similarity: AssemblySimilarity) -> Callable[[Assembly], str]:

@@ -35,7 +35,7 @@ from bemkit.solvers.alm import AugmentedLagrangian
 from bemkit.solvers.base import ContactSolver
 from bemkit.solvers.ssn import SemismoothNewton
 from bemkit.studies.stability.case import PRECISION, Case, Similarity, precision_elsewhere, with_friction
-from bemkit.studies.stability.random_assemblies.similar import AssemblySimilarity
+from bemkit.studies.stability.similar_assembly import AssemblySimilarity
 
 Baseline = TypeVar("Baseline", Solution, AssemblySolution)
 

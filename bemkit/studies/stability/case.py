@@ -16,7 +16,7 @@ from bemkit.scene.conditions import Contact, Part
 from bemkit.scene.load_history import AnyScene
 from bemkit.scene.scene import Scene
 from bemkit.scene.transform import AffineMap, transformed_scene
-from bemkit.studies.stability.random_assemblies.similar import AssemblySimilarity
+from bemkit.studies.stability.similar_assembly import AssemblySimilarity
 
 PRECISION = 1e-9
 """Agreement, relative to the largest entry, that similar problems owe each other after scaling."""

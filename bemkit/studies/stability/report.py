@@ -13,18 +13,9 @@ from bemkit.results.drawing import BLUE, GREEN, GREY, ORANGE, SKY, VERMILION, Fi
 from bemkit.results.outputs import plain_table, stdout_console
 from bemkit.studies.stability.axes import Axis
 from bemkit.studies.stability.records import StabilityRecord, Verdict, cells
-from bemkit.studies.stability.trials import Outcome, Trial
 
 _STYLES = {"right": "green", "coarse": "yellow", "ambiguous": "yellow", "named": "cyan", "wrong": "bold red"}
 
-_OUTCOMES = {
-    Outcome.SUCCESS: ("successes", ""),
-    Outcome.WARNED: ("warned", "yellow"),
-    Outcome.NAMED: ("named failures", "cyan"),
-    Outcome.WRONG: ("wrong successes", "bold red"),
-    Outcome.TRACEBACK: ("tracebacks", "bold red"),
-}
-"""What each outcome is called in the plural, and its style."""
 _SERIES = (
     ("certificate", "certificate of the driver", BLUE, "o"),
     ("check", "independent check", GREEN, "s"),
@@ -66,23 +57,6 @@ def print_verdicts(records: Sequence[StabilityRecord]) -> None:
     counts = Counter(record.verdict for record in records)
     words = [f"{counts[verdict.value]} {verdict.value}" for verdict in Verdict if counts[verdict.value]]
     console.print(Text(f"{len(records)} rows: {', '.join(words)}", style="bold"))
-
-
-def print_trials(trials: Sequence[Trial]) -> None:
-    """Print how many scenes came to which end and why, and what to call for each that failed."""
-    console = stdout_console()
-    table = plain_table(("outcome", "scenes", "why"), gap=2)
-    table.columns[1].justify = "right"
-    for outcome, (plural, style) in _OUTCOMES.items():
-        own = [trial for trial in trials if trial.outcome is outcome]
-        reasons = Counter(trial.reason for trial in own if trial.reason)
-        why = ", ".join(f"{reason.replace('_', ' ')} {count}" for reason, count in reasons.most_common())
-        table.add_row(Text(plural, style), str(len(own)), why if outcome is not Outcome.WARNED else "")
-    console.print(Text(f"{len(trials)} random scenes", style="bold"))
-    console.print(table)
-    for trial in filter(lambda trial: trial.is_failure, trials):
-        console.print(Text(f"{trial.outcome.value}: {trial.reason}: {trial.message.strip().splitlines()[-1]}"))
-        console.print(Text(f"  bemkit stability --random 1 --seed {trial.seed} --first {trial.index} --save ."))
 
 
 def draw_axes(axes: Sequence[Axis[Any]], records: Sequence[StabilityRecord]) -> dict[str, Figure]:

@@ -21,10 +21,10 @@ from bemkit.scene.scene import Scene
 from bemkit.studies.engine import REFUSED, Attempt, Task, attempt, compute
 from bemkit.studies.stability.axes import Axis, Baseline
 from bemkit.studies.stability.case import Case, Similarity
-from bemkit.studies.stability.independent_check import check_step
-from bemkit.studies.stability.independent_check.verdict import Violations
-from bemkit.studies.stability.random_assemblies.similar import AssemblySimilarity
 from bemkit.studies.stability.records import StabilityRecord, Verdict
+from bemkit.studies.stability.similar_assembly import AssemblySimilarity
+from bemkit.testing.independent_check import violations_of
+from bemkit.testing.independent_check.verdict import Violations
 
 AnySolution: TypeAlias = Solution | AssemblySolution
 
@@ -125,7 +125,7 @@ def _twin(scene: Scene | Assembly) -> tuple[Similarity | AssemblySimilarity, Sce
 
 def _checked(solution: AnySolution) -> Violations:
     n_steps = 0 if solution.loading is None else len(solution.loading.steps)
-    return check_step(solution, solution.at_step(n_steps - 1) if n_steps > 1 else None)
+    return violations_of(solution, solution.at_step(n_steps - 1) if n_steps > 1 else None)
 
 
 def _attempt(scene: Scene | Assembly, case: Case) -> Attempt[Any]:

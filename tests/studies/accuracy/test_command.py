@@ -63,7 +63,6 @@ def test_the_word_errors_may_be_left_out_and_the_other_commands_stay() -> None:
     assert names[0] == names[1]
     assert len(names[0]) == 2
     assert "SCENE" in call("study", "--help").output
-    assert "outer steps" in call("study", "paper-tables", "--help").output
     assert call("study", "solutions", "paper-1", "--elements", "20", "--starts", "1").return_value == 0
 
 

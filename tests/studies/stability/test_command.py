@@ -9,14 +9,10 @@ import pytest
 from click.testing import CliRunner, Result
 
 from bemkit.cli.main import commands
-from bemkit.scene.toml import load_scene
-from bemkit.studies.engine import compute, compute_with_progress
 from bemkit.studies.stability import sweep as sweep_module
 from bemkit.studies.stability.axes import AXES, find_axes
-from bemkit.studies.stability.random_scenes import random_case
 from bemkit.studies.stability.records import FILE, StabilityRecord, cells, to_csv, to_markdown
 from bemkit.studies.stability.report import draw_axis
-from bemkit.studies.stability.trials import Outcome, Trial, trial_tasks
 
 FAST = ("stability", "paper-1", "--elements", "32", "--axis", "sliding")
 
@@ -78,9 +74,6 @@ def test_a_wrong_row_shows_in_the_exit_code(monkeypatch: pytest.MonkeyPatch) -> 
         (("stability", "paper-1", "--axis", "rho"), "the axes are youngs-modulus"),
         (("stability", "paper-1", "--csv", "-", "--markdown", "-"), "two outputs go to the same place"),
         (("stability", "paper-1", "-o", "/nowhere/rows.h5"), "create it first"),
-        (("stability", "--random", "3", "--axis", "gap"), "--axis goes with a sweep of one scene"),
-        (("stability", "paper-1", "--random", "3"), "SCENE goes with a sweep of one scene"),
-        (("stability", "paper-1", "--seed", "3"), "--seed goes with random scenes: add --random"),
     ],
 )
 def test_bad_input_is_one_line(arguments: tuple[str, ...], message: str) -> None:
@@ -104,37 +97,3 @@ def test_tables_leave_out_what_does_not_exist() -> None:
     axes = find_axes(["sliding"], AXES)
     assert "| 2 | named | refused |" in to_markdown(axes, [row])
     assert draw_axis(axes[0], [row]).axes[0].get_title(loc="left") == "sliding"
-
-
-def test_random_scenes_are_counted() -> None:
-    result = call("stability", "--random", 4, "--seed", 7, "--first", 40, "--jobs", 1)
-    assert result.exception is None
-    assert result.return_value == 0
-    assert "4 random scenes" in result.output
-    for outcome in ("successes", "warned", "named failures", "wrong successes", "tracebacks"):
-        assert outcome in result.output
-
-
-@pytest.mark.slow
-def test_random_scenes_are_the_same_in_processes() -> None:
-    tasks = trial_tasks(7, range(40, 44))
-    together = list(compute_with_progress(tasks, "random scenes", is_live=False, processes=2))
-    assert sorted(together, key=lambda trial: trial.index) == list(compute(tasks))
-
-
-def test_random_scenes_that_fail_are_saved_and_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    found = Trial(7, 41, Outcome.WRONG, "status", "status 1.0e+00")
-    monkeypatch.setattr("bemkit.studies.stability.trials.try_case", lambda seed, index: found)
-    result = call("stability", "--random", 1, "--seed", 7, "--first", 41, "--save", tmp_path / "failures")
-    assert result.return_value == 1
-    assert "wrong success: status: status 1.0e+00" in result.output
-    assert "bemkit stability --random 1 --seed 7 --first 41" in result.output
-    saved = tmp_path / "failures" / "random-7-41.toml"
-    assert saved.read_text().startswith("# wrong success: status")
-    assert load_scene(saved) == random_case(7, 41).scenes[0]
-
-
-def test_a_folder_that_cannot_be_made_is_one_line(tmp_path: Path) -> None:
-    (tmp_path / "file").write_text("my thesis")
-    result = call("stability", "--random", 1, "--save", tmp_path / "file")
-    assert "cannot be made (File exists): give the name of a folder" in str(result.exception)

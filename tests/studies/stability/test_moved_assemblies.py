@@ -10,7 +10,7 @@ import pytest
 
 import bemkit as bk
 from bemkit.results.assembly_solution import AssemblySolution
-from bemkit.studies.stability.random_assemblies.similar import AssemblySimilarity
+from bemkit.studies.stability.similar_assembly import AssemblySimilarity
 from tests.slow import slow_except
 
 FRICTION = 0.25

@@ -1,3 +1,0 @@
-"""Random assemblies of several bodies, each a pure function of two whole numbers."""
-
-from bemkit.studies.stability.random_assemblies.assemblies import random_assembly as random_assembly

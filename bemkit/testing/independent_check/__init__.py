@@ -1,0 +1,18 @@
+"""An independent check of a solution, from its own fields: no stiffness matrix, no active sets, no driver.
+
+Only the physical fields of a `Solution`, the points of its mesh and the statement of its scene are read. Normals are
+differentiated from the points, obstacles measured anew, and elasticity is tested with Kelvin's solution as printed in
+textbooks. Resultants of forces inside are integrated anew; for Betti's theorem alone the particular solution of body
+forces is taken off as the solver knows it. Whatever the drivers believe, these numbers say whether the fields obey
+supports, contact and friction, whether forces and energy balance, and whether tractions and displacements belong to one
+elastic body.
+"""
+
+from bemkit.testing.independent_check.assembly_check import AssemblyCheck as AssemblyCheck
+from bemkit.testing.independent_check.assembly_check import violations_of as violations_of
+from bemkit.testing.independent_check.assembly_check import violations_of_assembly as violations_of_assembly
+from bemkit.testing.independent_check.boundary import CONTACT_LIMIT as CONTACT_LIMIT
+from bemkit.testing.independent_check.check import IndependentCheck as IndependentCheck
+from bemkit.testing.independent_check.check import violations_of_body as violations_of_body
+from bemkit.testing.independent_check.load_history import energy_fault as energy_fault
+from bemkit.testing.independent_check.verdict import COARSE_LIMIT as COARSE_LIMIT

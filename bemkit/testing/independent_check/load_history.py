@@ -1,0 +1,44 @@
+"""The independent check of a load history: the work in its last step."""
+
+from __future__ import annotations
+
+from typing import cast
+
+import numpy as np
+
+from bemkit.results.assembly_solution import AssemblySolution
+from bemkit.results.solution import Solution
+
+LOST = 1e-6
+"""Share of the work in a load step that iterative linear solvers and far rigid motions may leave unexplained."""
+ROUND_OFF = 1e-12
+"""Share, on top, of the work by which the displacement would strain a body of its own size: the last digits of sums of
+forces, each of that size, which a body that is carried along has."""
+
+
+def energy_fault(step: Solution | AssemblySolution) -> str:
+    """Say what is wrong with the work in the last step of a history: friction that gives back, work that is missing."""
+    if step.loading is None:
+        return ""
+    last = step.loading.steps[-1]
+    energy = step.loading.steps[-2].elastic_energy if len(step.loading.steps) > 1 else 0.0
+    work = last.work
+    missing = work.external_work - (last.elastic_energy - energy) - work.dissipation - work.increment_work
+    size = max(abs(value) for value in (last.elastic_energy, energy, *vars(work).values()))
+    ends = [cast(Solution | AssemblySolution, each.end) for each in step.loading.steps[-2:]]
+    allowed = LOST * size + ROUND_OFF * max(map(_work_of_motion, ends))
+    if work.friction_gain > allowed:
+        return f"friction acts along slip, which gives {work.friction_gain / size:.1e} of the work"
+    if work.dissipation < 0.0:
+        return f"friction gave back {-work.dissipation:.1e}"
+    # stiffnesses of collocation are not symmetric: work and energy do not agree to round-off
+    is_balanced = all(body.scene.discretisation.is_symmetric for body in step.solved_bodies)
+    return f"{missing / size:.1e} of the work is missing" if is_balanced and abs(missing) > allowed else ""
+
+
+def _work_of_motion(step: Solution | AssemblySolution) -> float:
+    """Return ``E' |u|^2`` [J/m] of the largest displacement, of bodies that only move, too."""
+    return max(
+        body.scene.material.plane_modulus * float(np.abs(body.boundary.displacement).max()) ** 2
+        for body in step.solved_bodies
+    )

@@ -1,0 +1,1 @@
+"""Tools that look for faults: random scenes and their judgement."""

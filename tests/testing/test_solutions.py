@@ -1,0 +1,69 @@
+"""The check of solutions passes on right fields, and names each planted fault."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import bemkit as bk
+from bemkit.errors import InputError
+from bemkit.testing import CheckFailed, check_solution
+from tests.scenes import FLOOR, block
+
+
+@pytest.fixture(scope="module")
+def solution() -> bk.Solution:
+    return bk.run(block(FLOOR, bk.Part("load", bk.Pressure(1e-3), sides=("top",)), mesh=bk.MeshOptions(160)))
+
+
+def test_right_fields_pass(solution) -> None:
+    assert check_solution(solution).worst < 1e-6
+    two = bk.run(replace(bk.load_scene("two-cylinders"), mesh=bk.MeshOptions(elements=40)))
+    assert check_solution(two).is_good
+
+
+def with_table(solution: bk.Solution, **changes: np.ndarray) -> bk.Solution:
+    return replace(solution, contact=replace(solution.contact, **changes))
+
+
+def test_each_planted_fault_is_named(solution) -> None:
+    table, fields = solution.contact, solution.boundary
+    faults = {
+        "negative_energy": replace(solution, energy=-solution.energy),
+        "energy": replace(solution, energy=2.0 * solution.energy),
+        "tension": with_table(solution, sigma_n=-table.sigma_n),
+        "cone_excess": with_table(solution, sigma_t=table.sigma_t + np.abs(table.sigma_n)),
+        "status": with_table(solution, status=np.zeros_like(table.status)),
+        "obstacle": with_table(solution, gap=table.gap + 1e-3),
+        "tractions": replace(solution, boundary=replace(fields, traction=1.1 * fields.traction)),
+        "penetration": replace(solution, boundary=replace(fields, displacement=fields.displacement - [0.0, 1e-3])),
+    }
+    for name, wrong in faults.items():
+        with pytest.raises(CheckFailed, match=rf"the solution violates .*\b{name} "):
+            check_solution(wrong)
+
+
+def test_fields_of_another_material_need_a_warning(solution) -> None:
+    other = replace(
+        solution, scene=replace(solution.scene, material=bk.Material(3.0, 0.3)), energy=solution.energy, warnings=()
+    )
+    with pytest.raises(CheckFailed, match="the solution lacks a warning of reciprocity"):
+        check_solution(other)
+
+
+def test_work_that_is_missing_in_a_load_step_is_named() -> None:
+    loop = bk.load_scene("friction-loop")
+    (step, *_) = bk.run_history([replace(loop, mesh=bk.MeshOptions(elements=40), steps=loop.steps[:1])])
+    check_solution(step)
+    last = step.loading.steps[-1]
+    wrong = replace(last, work=replace(last.work, external_work=1.0))
+    loading = replace(step.loading, steps=(*step.loading.steps[:-1], wrong))
+    with pytest.raises(CheckFailed, match=r"the load history does not balance: .* of the work is missing"):
+        check_solution(replace(step, loading=loading))
+
+
+def test_a_solution_that_has_not_converged_is_refused(solution) -> None:
+    with pytest.raises(InputError, match="the solution ended as stalled: give a converged one"):
+        check_solution(replace(solution, status=bk.Status.STALLED))
