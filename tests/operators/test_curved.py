@@ -173,7 +173,7 @@ def check_pair(mesh: BoundaryMesh, computed: PairIntegrals, i: int, j: int, expe
     # round-off of a few hundred points of the reference, relative to the largest the pair can contribute
     for name, scale in (("log", size), ("quotient", size), ("double", mesh.lengths[i])):
         difference = getattr(computed, name)[:, :, i, j] - getattr(expected, name)
-        assert np.abs(difference).max() < 2e-14 * scale, name
+        assert np.abs(difference).max() < 4e-14 * scale, name  # 2.3e-14 with other kernels
 
 
 def composite(n_pieces: int) -> tuple[FloatArray, FloatArray]:
