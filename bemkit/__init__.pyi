@@ -122,10 +122,13 @@ from bemkit.solvers.alm import AugmentedLagrangian as AugmentedLagrangian
 from bemkit.solvers.base import ContactSolver as ContactSolver
 from bemkit.solvers.base import Status as Status
 from bemkit.solvers.base import solve as solve
+from bemkit.solvers.fallbacks import Fallbacks as Fallbacks
 from bemkit.solvers.fixed_point import FixedPoint as FixedPoint
+from bemkit.solvers.lemke import LemkePivoting as LemkePivoting
+from bemkit.solvers.solution_path import SolutionPath as SolutionPath
+from bemkit.solvers.springs import Springs as Springs
 from bemkit.solvers.ssn import SemismoothNewton as SemismoothNewton
 from bemkit.studies.sweep.sweep import sweep as sweep
 from bemkit.studies.sweep.table import Sweep as Sweep
 from bemkit.studies.verification.verification import verify as verify
-from bemkit.testing.lemke import LemkePivoting as LemkePivoting
 from bemkit.version import __version__ as __version__

@@ -20,7 +20,7 @@ from bemkit.contact.laws import Coulomb
 from bemkit.contact.problem import ContactProblem
 from bemkit.contact.solvability import find_unsolvable_load
 from bemkit.solvers.base import StepRecord, solve
-from bemkit.solvers.ssn import SemismoothNewton
+from bemkit.solvers.fallbacks import Fallbacks
 from tests.contact.joined.blocks import wall
 from tests.runs.masonry import wall as wall_assembly
 from tests.runs.packing import packing
@@ -49,7 +49,7 @@ def main(courses: int = 20, per_course: int = 50) -> None:
         words = f"{record.n_separated} open, {record.n_slip} slip, certificate {record.certificate.worst:.0e}"
         lap(f"step {record.step}: {words} {record.message}")
 
-    found = solve(problem, SemismoothNewton(), throw=False, callback=shown)
+    found = solve(problem, Fallbacks(), throw=False, callback=shown)
     lap(f"{found.status.name} after {found.linear_solves} responses")
 
 

@@ -22,6 +22,7 @@ from bemkit.results.solution import Solution
 from bemkit.scene.registry import DISCRETISATIONS, SOLVERS
 from bemkit.scene.unit_names import UnitNames, amount
 from bemkit.solvers.base import StepRecord
+from bemkit.solvers.fallbacks import drivers_at_work
 
 if TYPE_CHECKING:
     from bemkit.results.assembly_solution import AssemblySolution
@@ -168,8 +169,9 @@ def _summary_rows(solution: Solution | AssemblySolution) -> Iterator[tuple[str, 
         yield "estimated error", f"{solution.estimated_error:.1e}  relative, in the energy norm{of_tractions}"
     if has_contact:
         yield "transitions", "\n".join(_transition_lines(solution))
-        word = SOLVERS.word_of(solver)
-        yield "linear solves", f"{solution.linear_solves} in {solution.outer_steps} steps ({word})"
+        drivers = drivers_at_work(solver, (record.message for record in solution.history))
+        words = ", ".join(dict.fromkeys(map(SOLVERS.word_of, drivers)))
+        yield "linear solves", f"{solution.linear_solves} in {solution.outer_steps} steps ({words})"
     yield from _violation_rows(solution)
     yield "time", _time(solution)
 

@@ -24,7 +24,7 @@ from bemkit.scene.discretisation import Galerkin
 from bemkit.scene.mesh_options import MeshOptions
 from bemkit.scene.scene import Scene
 from bemkit.scene.toml import load_single_body
-from bemkit.solvers.ssn import SemismoothNewton
+from bemkit.solvers.fallbacks import Fallbacks
 
 
 def find_reference(scene: Scene) -> Reference | None:
@@ -55,7 +55,7 @@ def _problem(scene: Scene) -> Scene:
         reference="",
         mesh=MeshOptions(),
         discretisation=Galerkin(1),
-        solver=SemismoothNewton(),
+        solver=Fallbacks(),
     )
 
 

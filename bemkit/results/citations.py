@@ -18,7 +18,7 @@ from bemkit.scene.body import Body
 from bemkit.scene.discretisation import ConstantCollocation, Discretisation, Galerkin
 from bemkit.scene.registry import LAWS, SOLVERS
 from bemkit.scene.scene import Scene
-from bemkit.solvers.ssn import PATH_MESSAGE, SPRINGS_MESSAGE
+from bemkit.solvers.fallbacks import drivers_at_work
 from bemkit.version import __version__
 
 PACKAGE = "bemkit"
@@ -27,6 +27,8 @@ _NEWTON = ("HintermuellerItoKunisch2002", "HueeberStadlerWohlmuth2008", "Christe
 DRIVERS: Mapping[str, tuple[str, ...]] = MappingProxyType(
     {
         "semismooth-newton": _NEWTON,
+        "springs": ("Rockafellar1976",),
+        "solution-path": ("Lemke1965", "CottlePangStone1992"),
         "augmented-lagrangian": ("Paper", "Stadler2004"),
         "fixed-point": ("NecasJarusekHaslinger1980", *_NEWTON),
         "lemke": ("Lemke1965", "CottlePangStone1992", "StewartTrinkle1996"),
@@ -174,8 +176,7 @@ def cite(subject: Scene | Assembly | Solution | AssemblySolution) -> Citations:
     Parameters
     ----------
     subject : Scene, Assembly, Solution or AssemblySolution
-        A solution tells more than its scene: the linear solver that was chosen, and whether the driver had to follow
-        paths of solutions or to hold bodies by springs.
+        A solution tells more than its scene: the linear solver that was chosen, and which drivers took part.
 
     Returns
     -------
@@ -183,7 +184,8 @@ def cite(subject: Scene | Assembly | Solution | AssemblySolution) -> Citations:
         ``print`` shows the methods with their works; `Citations.bibtex` has them for a BibTeX file.
     """
     stated = subject if isinstance(subject, Scene | Assembly) else subject.stated
-    methods = [Method("bemkit", (PACKAGE,)), *_of_bodies(stated), *_of_contact(stated)]
+    messages = [] if isinstance(subject, Scene | Assembly) else [record.message for record in subject.history]
+    methods = [Method("bemkit", (PACKAGE,)), *_of_bodies(stated), *_of_contact(stated, messages)]
     if not isinstance(subject, Scene | Assembly):
         methods += _of_run(subject)
     return Citations(tuple(dict.fromkeys(methods)), stated.reference)
@@ -219,7 +221,7 @@ def _of_discretisation(discretisation: Discretisation, *, has_layers: bool) -> I
         yield Method("corners where contact tractions have no bound", ("Williams1952",))
 
 
-def _of_contact(stated: Scene | Assembly) -> Iterator[Method]:
+def _of_contact(stated: Scene | Assembly, messages: list[str]) -> Iterator[Method]:
     if isinstance(stated, Assembly) and (stated.contacts or stated.touching is not None):
         yield Method(
             "mortar coupling with dual multipliers",
@@ -235,8 +237,8 @@ def _of_contact(stated: Scene | Assembly) -> Iterator[Method]:
     for law in (stated.law, *own):
         if keys := LAW_WORKS.get(LAWS.word_of(law)):
             yield Method(f"law {LAWS.word_of(law)}", keys)
-    word = SOLVERS.word_of(stated.solver)
-    yield Method(f"driver {word}", DRIVERS.get(word, ()))
+    for word in map(SOLVERS.word_of, drivers_at_work(stated.solver, messages)):
+        yield Method(f"driver {word}", DRIVERS.get(word, ()))
 
 
 def _of_run(solution: Solution | AssemblySolution) -> Iterator[Method]:
@@ -245,8 +247,3 @@ def _of_run(solution: Solution | AssemblySolution) -> Iterator[Method]:
         yield Method("GMRES with sums over a hierarchy", ("SaadSchultz1986", "BramblePasciakXu1990"))
     if any(item.is_needed and "multigrid" in item.name for item in solution.plan.items):
         yield Method("algebraic multigrid", ("RugeStueben1987",))
-    messages = [record.message for record in solution.history]
-    if any(message.startswith(PATH_MESSAGE) for message in messages):
-        yield Method("path of solutions by complementary pivoting", ("Lemke1965",))
-    if any(message.startswith(SPRINGS_MESSAGE) for message in messages):
-        yield Method("springs that become weaker (proximal point method)", ("Rockafellar1976",))

@@ -24,7 +24,7 @@ from bemkit.scene.scene import Scene
 from bemkit.scene.steps import Stated, Step, check_laws, check_names
 from bemkit.scene.unit_names import UnitNames
 from bemkit.solvers.base import ContactSolver
-from bemkit.solvers.ssn import SemismoothNewton
+from bemkit.solvers.fallbacks import Fallbacks
 
 
 def body_and_part(side: str) -> tuple[str, str]:
@@ -200,7 +200,7 @@ class Assembly(Stated):
     linear_solver: LinearSolverChoice = field(default_factory=Automatic)
     symmetry: Symmetry | None = None
     mesh: MeshOptions = field(default_factory=MeshOptions)
-    solver: ContactSolver = field(default_factory=SemismoothNewton)
+    solver: ContactSolver = field(default_factory=Fallbacks)
     units: UnitNames | None = None
     description: str = ""
     reference: str = ""

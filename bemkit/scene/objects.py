@@ -13,7 +13,7 @@ _EXAMPLES: Mapping[str, str] = MappingProxyType(
         "shape": "Rectangle(width=1.0, height=1.0)",
         "material": "Material(youngs_modulus=1e4, poisson_ratio=0.2)",
         "law": "Coulomb(friction_coefficient=0.5)",
-        "solver": "SemismoothNewton()",
+        "solver": "Fallbacks()",
         "discretisation": "Galerkin(2)",
         "linear_solver": "Automatic()",
         "mesh": "MeshOptions(elements=320)",

@@ -35,6 +35,8 @@ class Registry:
         Words that name no class, and what to write instead.
     protocol : str, optional
         The protocol that the classes fulfil, as ``"module:Class"``; none if they are all alternatives there are.
+    listed : str, optional
+        The word of the class that a list of words or tables makes; a tuple of them is its only field.
     """
 
     role: str
@@ -43,6 +45,7 @@ class Registry:
     presets: Mapping[str, tuple[str, Mapping[str, Any]]] = field(default_factory=dict, repr=False)
     hints: Mapping[str, str] = field(default_factory=dict, repr=False)
     protocol: str = ""
+    listed: str = ""
 
     def holds(self, alternatives: Iterable[object]) -> bool:
         """Whether a type declared by these alternatives stands for the role: its protocol, or several classes."""
@@ -278,13 +281,17 @@ LINEAR_SOLVERS = Registry(
 SOLVERS = Registry(
     "solver",
     {
+        "fallbacks": "bemkit.solvers.fallbacks:Fallbacks",
         "semismooth-newton": "bemkit.solvers.ssn:SemismoothNewton",
+        "springs": "bemkit.solvers.springs:Springs",
+        "solution-path": "bemkit.solvers.solution_path:SolutionPath",
         "augmented-lagrangian": "bemkit.solvers.alm:AugmentedLagrangian",
         "fixed-point": "bemkit.solvers.fixed_point:FixedPoint",
-        "lemke": "bemkit.testing.lemke:LemkePivoting",
+        "lemke": "bemkit.solvers.lemke:LemkePivoting",
     },
     "bemkit.solvers",
     protocol="bemkit.solvers.base:ContactSolver",
+    listed="fallbacks",
 )
 
 REGISTRIES = (

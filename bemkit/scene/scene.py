@@ -34,7 +34,7 @@ from bemkit.scene.plane_motion import FarField
 from bemkit.scene.steps import Stated, Step, check_laws, check_names
 from bemkit.scene.unit_names import UnitNames, check_length_of_file
 from bemkit.solvers.base import ContactSolver
-from bemkit.solvers.ssn import SemismoothNewton
+from bemkit.solvers.fallbacks import Fallbacks
 
 if TYPE_CHECKING:
     from bemkit.geometry.meshing.partition import Partition
@@ -105,7 +105,7 @@ class Scene(Stated):
     discretisation: Discretisation = field(default_factory=lambda: Galerkin(1))
     linear_solver: LinearSolverChoice = field(default_factory=Automatic)
     mesh: MeshOptions = field(default_factory=MeshOptions)
-    solver: ContactSolver = field(default_factory=SemismoothNewton)
+    solver: ContactSolver = field(default_factory=Fallbacks)
     units: UnitNames | None = None
     description: str = ""
     reference: str = ""
@@ -135,7 +135,7 @@ class Scene(Stated):
                     raise InputError(f"part {part.name!r}: unknown side {side!r}: the sides are {choices(side, names)}")
 
     def _check_without_contact(self) -> None:
-        for name, default in (("law", Frictionless()), ("solver", SemismoothNewton())):
+        for name, default in (("law", Frictionless()), ("solver", Fallbacks())):
             if getattr(self, name) != default:
                 raise InputError(
                     f"{name} is {getattr(self, name)!r}, but no part is in contact: leave the {name} out, or give one "

@@ -138,9 +138,13 @@ class _Definitions:
         """Return the schema of a word alone, or a table with a kind: what is wrong in it is told of its kind alone."""
         tables = {word: self._kind(registry, word) for word in registry.words() if _can_be_loaded(registry, word)}
         alone = [word for word, table in tables.items() if not table["required"]]
+        role, listed = f"{registry.role[0].upper()}{registry.role[1:]}", {}
+        if registry.listed:
+            listed = {"items": {"$ref": f"#/definitions/{_slug(registry.role)}"}, "minItems": 1}
         return {
-            "description": f"{registry.role[0].upper()}{registry.role[1:]}: a word, or a table with its kind.",
-            "type": ["string", "object"],
+            "description": f"{role}: a word, or a table with its kind{', or a list of them' if listed else ''}.",
+            "type": ["string", "object", *(["array"] if listed else [])],
+            **listed,
             "required": ["kind"],
             "properties": {"kind": {"enum": list(tables)}} | _hints(tables),
             "allOf": [

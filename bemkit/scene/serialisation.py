@@ -150,6 +150,8 @@ def _unstructure_dataclass(value: Any, declared: Any, path: str, keep_defaults: 
         kind = registry.kind_of(value)
     except InputError as error:
         raise UnstructureError(f"{path}: {error}") from error
+    if table and kind == registry.listed:
+        return next(iter(table.values()))
     return registry.written(kind, table)
 
 
@@ -309,6 +311,9 @@ def _one_of(value: object, declared: Any, path: str) -> Any:
 def _tagged(value: object, declared: Any, path: str) -> Any:
     """Return an object whose class is named by a word alone, or by the kind of a table."""
     registry = cast(Registry, registry_of(declared))  # the reader is chosen by it
+    if isinstance(value, list) and registry.listed:
+        listed = _tuple(value, tuple[declared, ...], path)
+        return _at(path, registry.find(registry.listed), listed)
     table = {"kind": value} if isinstance(value, str) else value
     table = registry.with_options(_exactly(table, dict, f"a {registry.role} as a word or as a table with its kind"))
     if "kind" not in table:

@@ -21,6 +21,7 @@ from bemkit.scene.registry import FILE_KINDS, RISING, SOLVERS
 from bemkit.scene.scene import Scene
 from bemkit.scene.serialisation import StructureError, UnstructureError, structure, unstructure
 from bemkit.solvers.base import ContactSolver
+from bemkit.solvers.fallbacks import Fallbacks
 
 if TYPE_CHECKING:
     from bemkit.scene.assembly import Assembly
@@ -306,10 +307,16 @@ def with_overrides(
 
 
 def _with_rho(solver: Any, rho: float) -> Any:
-    names = [entry.name for entry in fields(solver) if entry.name in ("rho", "rho_n", "rho_t")]
+    if isinstance(solver, Fallbacks):
+        return Fallbacks(tuple(_with_rho(each, rho) if _penalties(each) else each for each in solver.drivers))
+    names = _penalties(solver)
     if not names:
         raise SceneError(f"rho is {rho}: the solver {SOLVERS.kind_of(solver)} has no penalty: leave rho out")
     return replace(solver, **dict.fromkeys(names, rho))
+
+
+def _penalties(solver: Any) -> list[str]:
+    return [entry.name for entry in fields(solver) if entry.name in ("rho", "rho_n", "rho_t")]
 
 
 def _ordered(table: dict[str, Any], keys: tuple[str, ...]) -> dict[str, Any]:

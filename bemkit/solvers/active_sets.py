@@ -108,8 +108,6 @@ class ProjectionEquations:
     given_bound : (n_contact,) array [Pa], optional
         Friction bound held fixed (lagged). Without it the bound follows the predicted normal traction, and the
         Newton matrix contains its derivative.
-    friction_share : float
-        Factor of a bound that is not held fixed: less than one for weaker friction than that of the law.
     """
 
     problem: ContactProblem
@@ -117,7 +115,6 @@ class ProjectionEquations:
     rho_t: float
     multiplier: FloatArray | None = None
     given_bound: FloatArray | None = None
-    friction_share: float = 1.0
 
     def evaluate(self, state: ContactState, touches: BoolArray | None = None) -> Residual:
         """Return sets and residual at `state`.
@@ -137,8 +134,8 @@ class ProjectionEquations:
             is_closed |= touches
         predicted_sigma_n = -positive_part(towards_obstacle)
         if self.given_bound is None:
-            bound = self.friction_share * problem.friction_bound(predicted_sigma_n, is_closed)
-            slope = self.friction_share * problem.friction_slope(predicted_sigma_n, is_closed)
+            bound = problem.friction_bound(predicted_sigma_n, is_closed)
+            slope = problem.friction_slope(predicted_sigma_n, is_closed)
         else:
             bound, slope = self.given_bound, np.zeros_like(self.given_bound)
         _, direction = clip_to_bound_derivative(along_obstacle, bound)

@@ -25,7 +25,7 @@ class Status(Enum):
         "The certificate no longer improves; try another driver, a larger rho, a nearby start or a looser tolerance."
     )
     CYCLING = (
-        "The iterates repeat themselves; allow the line search and the continuation, or try another driver: "
+        "The iterates repeat themselves; add drivers such as SolutionPath to Fallbacks, or try another one: "
         "the problem may have no solution, or several."
     )
     SINGULAR = "The body can move freely whatever its contact nodes do; hold it by its boundary conditions."
@@ -247,12 +247,6 @@ def check_max_steps(max_steps: int) -> None:
     """Raise ValueError unless `max_steps` is positive."""
     if max_steps < 1:
         raise InputError(f"max_steps = {max_steps}; allow at least one step")
-
-
-def check_count(name: str, count: int) -> None:
-    """Raise ValueError if `count` is negative."""
-    if count < 0:
-        raise InputError(f"{name} = {count}; give zero or a positive number")
 
 
 @dataclass(frozen=True)

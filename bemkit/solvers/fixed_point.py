@@ -5,9 +5,9 @@ from dataclasses import dataclass, field
 from bemkit.contact.laws import Tresca
 from bemkit.contact.problem import ContactProblem, ContactState
 from bemkit.errors import InputError
-from bemkit.solvers.base import Iterate, check_max_steps, solve
+from bemkit.solvers.base import ContactSolver, Iterate, check_max_steps, solve
+from bemkit.solvers.fallbacks import Fallbacks
 from bemkit.solvers.progress import OuterIterate
-from bemkit.solvers.ssn import SemismoothNewton
 
 
 @dataclass(frozen=True)
@@ -16,7 +16,7 @@ class FixedPoint:
 
     Parameters
     ----------
-    inner : SemismoothNewton
+    inner : ContactSolver
         Driver of the Tresca problems.
     inner_tolerance : float
         Certificate of the inner solutions; at least a thousand times the accuracy of the body.
@@ -30,7 +30,7 @@ class FixedPoint:
     STALLED.
     """
 
-    inner: SemismoothNewton = field(default_factory=SemismoothNewton)
+    inner: ContactSolver = field(default_factory=Fallbacks)
     inner_tolerance: float = 1e-11
     max_steps: int = 500
 

@@ -1,14 +1,15 @@
-"""Follow the path of exact solutions while an extra pressure and an extra friction decrease to zero.
+"""Lemke's complementary pivoting on a body: follow exact solutions while an artificial load decreases to zero.
 
-With enough extra pressure and friction at the contact nodes every node is closed and sticks. Between two changes of a
-node's status the response is linear in the amount of the extras. So the path from there to the problem itself consists
-of straight pieces: at each joint one node changes its status, and the amount goes on falling, or rises for a while
-where the path folds. At folds Newton's method and plain continuation fail; this method does not. It is Lemke's
-complementary pivoting [Lemke1965], carried out on a body instead of a matrix.
+With enough extra pressure and friction at the contact nodes every node is closed and sticks. These extras are the
+covering vector times the artificial variable. Between two changes of a node's status the response is linear in the
+artificial variable. So the path from there to the problem itself consists of straight segments: at each pivot one node
+changes its status, and the artificial variable goes on falling, or rises for a while where the path folds. A segment
+without end is a ray; then the path leads to no solution. At folds Newton's method and plain continuation fail; this
+method does not. It is [Lemke1965] with the responses of a body in place of a tableau.
 
-The path may also start with other statuses, such as those at which Newton's method gives up. Then only nodes that
-violate an inequality get extras (of pressure, friction, gap or slip), so that it holds. These are few, and the path is
-short.
+The path may also start with other statuses, such as those at which Newton's method gives up. Then the covering vector
+has entries (of pressure, friction, gap or slip) only at nodes that violate an inequality. These are few, and the path
+is short.
 """
 
 from dataclasses import dataclass
@@ -23,8 +24,8 @@ from bemkit.contact.problem import ContactProblem, ContactState, SingularRespons
 from bemkit.solvers.active_sets import ActiveSets
 
 
-class _Kind(IntEnum):
-    """The inequality that a node has to keep, by the piece it is on."""
+class _Inequality(IntEnum):
+    """The inequality that a node has to keep, by the segment it is on."""
 
     PRESSURE = 0  # closed: -sigma_n >= 0
     CLEARANCE = 1  # open: g - u_n >= 0
@@ -59,17 +60,17 @@ class PathEnd(NamedTuple):
 
     state: ContactState | None
     linear_solves: int
-    n_pieces: int
+    n_segments: int
     reason: str
 
 
-class _Piece(NamedTuple):
-    """A straight piece of the path: tractions and displacements are ``origin + amount * rate``."""
+class _Segment(NamedTuple):
+    """A straight segment of the path: tractions and displacements are ``origin + artificial * rate``."""
 
     origin: ContactState
     rate: ContactState
     is_kept: BoolArray  # (5, n_contact): which inequalities matter
-    slack: FloatArray  # (5, n_contact) at amount zero
+    slack: FloatArray  # (5, n_contact) at the origin
     slack_rate: FloatArray  # (5, n_contact)
 
 
@@ -88,7 +89,7 @@ def why_no_path(problem: ContactProblem, *, is_short: bool = False) -> str:
 
 
 def follow_path(
-    problem: ContactProblem, bound: AffineBound, start: ActiveSets | None = None, max_pieces: int | None = None
+    problem: ContactProblem, bound: AffineBound, start: ActiveSets | None = None, max_segments: int | None = None
 ) -> PathEnd:
     """Return the first solution on the path that starts with given statuses.
 
@@ -99,74 +100,78 @@ def follow_path(
     bound : AffineBound
     start : ActiveSets, optional
         By default all nodes are closed and stick; that path leads to a solution if the body is held. From statuses near
-        those of a solution the path is short, but may not lead to one.
-    max_pieces : int, optional
-        By default ``20 n_contact + 100``; about 1.5 pieces a node are usual.
+        those of a solution the path is short, but may end on a ray.
+    max_segments : int, optional
+        By default ``20 n_contact + 100``; about 1.5 segments a node are usual.
 
     Returns
     -------
     PathEnd
-        Two linear solves a piece. Tractions and displacements are exact up to round-off.
+        Two linear solves a segment. Tractions and displacements are exact up to round-off.
     """
     try:
         path, is_closed, direction, n_solves = _start_of_path(problem, bound, start)
     except SingularResponse as error:
         return PathEnd(None, 2, 0, f"the path begins with a singular response: {error}")
-    limit = 20 * problem.n_contact + 100 if max_pieces is None else max_pieces
-    state, n_pieces, reason = _follow_pieces(path, is_closed, direction, limit)
-    return PathEnd(state, n_solves + 2 * n_pieces, n_pieces, reason)
+    limit = 20 * problem.n_contact + 100 if max_segments is None else max_segments
+    state, n_segments, reason = _follow_segments(path, is_closed, direction, limit)
+    return PathEnd(state, n_solves + 2 * n_segments, n_segments, reason)
 
 
 def _start_of_path(
     problem: ContactProblem, bound: AffineBound, start: ActiveSets | None
 ) -> tuple["_Path", BoolArray, IntArray, int]:
-    """Return a path, its first statuses (closed, direction of slip), and the linear solves to find them."""
+    """Return a path, its first statuses (closed, direction of slip), and the linear solves spent on finding them."""
     if start is None:
         at_rest = np.zeros(problem.n_contact, dtype=np.intp)
-        return _Path(problem, bound, Extras.everywhere(problem)), np.isfinite(problem.gap), at_rest, 0
-    path = _Path(problem, bound, Extras.nothing(problem))
+        return _Path(problem, bound, CoveringVector.everywhere(problem)), np.isfinite(problem.gap), at_rest, 0
+    path = _Path(problem, bound, CoveringVector.zero(problem))
     is_closed, n_solves = start.is_closed, 0
     while True:  # open nodes that slip under tension: extra pressure there would change the friction
-        piece = path.piece(is_closed, start.direction)
+        segment = path.segment(is_closed, start.direction)
         n_solves += 2
-        is_pulled = is_closed & (start.direction != 0) & (piece.slack[_Kind.PRESSURE] < 0.0)
+        is_pulled = is_closed & (start.direction != 0) & (segment.slack[_Inequality.PRESSURE] < 0.0)
         if not is_pulled.any():
-            extras = Extras.covering(piece, bound, start.direction)
-            return _Path(problem, bound, extras), is_closed, start.direction, n_solves
+            cover = CoveringVector.of_violations(segment, bound, start.direction)
+            return _Path(problem, bound, cover), is_closed, start.direction, n_solves
         is_closed = is_closed & ~is_pulled
 
 
-def _follow_pieces(
+def _follow_segments(
     path: "_Path", is_closed: BoolArray, direction: IntArray, limit: int
 ) -> tuple[ContactState | None, int, str]:
-    """Return the end of a path (None if it does not lead to a solution), the number of its pieces, and the reason."""
-    amount, falling, entered = np.inf, -1.0, None
-    for n_pieces in range(1, limit + 1):
+    """Return the end of a path (None if it leads to no solution), the number of its segments, and the reason."""
+    artificial, sign, entering = np.inf, -1.0, None
+    for n_segments in range(1, limit + 1):
+        # Respond to the statuses, at two values of the artificial variable.
         try:
-            piece = path.piece(is_closed, direction)
+            segment = path.segment(is_closed, direction)
         except SingularResponse as error:
-            return None, n_pieces, f"the path meets a singular response: {error}"
-        if entered is None:
-            amount = _first_amount(piece)
+            return None, n_segments, f"the path meets a singular response: {error}"
+        # The artificial variable falls or rises so that the slack that has entered grows from zero.
+        if entering is None:
+            artificial = _first_artificial(segment)
         else:
-            falling = float(np.sign(piece.slack_rate[entered]))
-            piece.is_kept[entered] = False  # it has just become active and grows from zero
-        step, kind, node = _next_joint(piece, amount, falling)
-        if falling < 0.0 and step >= amount:
-            return piece.origin, n_pieces, ""
-        if falling == 0.0 or not np.isfinite(step):
-            return None, n_pieces, "the path does not return to the problem proper"
-        amount += falling * step
-        if kind is _Kind.CLEARANCE and path.is_free(is_closed)[node]:
+            sign = float(np.sign(segment.slack_rate[entering]))
+            segment.is_kept[entering] = False
+        # Ratio test: the problem itself, a ray, or the inequality that ends the segment.
+        step, inequality, node = _leaving(segment, artificial, sign)
+        if sign < 0.0 and step >= artificial:
+            return segment.origin, n_segments, ""
+        if sign == 0.0 or not np.isfinite(step):
+            return None, n_segments, "the path ends on a ray"
+        artificial += sign * step
+        # Pivot: the node changes its status.
+        if inequality is _Inequality.CLEARANCE and path.is_free(is_closed)[node]:
             direction = direction.copy()  # friction sets in against the slip that the open node has come to
-            direction[node] = 1 if path.slip(piece, amount)[node] > 0.0 else -1
-        is_closed, direction, entered = _pivoted(is_closed, direction, kind, node)
-    return None, limit, f"the path has more than {limit} pieces"
+            direction[node] = 1 if path.slip(segment, artificial)[node] > 0.0 else -1
+        is_closed, direction, entering = _pivoted(is_closed, direction, inequality, node)
+    return None, limit, f"the path has more than {limit} segments"
 
 
 @dataclass(frozen=True, eq=False)
-class Extras:
-    """Additions to a problem, for an amount of one, with which given statuses solve it.
+class CoveringVector:
+    """Additions to a problem, for an artificial variable of one, with which given statuses solve it.
 
     Parameters
     ----------
@@ -182,30 +187,30 @@ class Extras:
     slip: FloatArray
 
     @classmethod
-    def everywhere(cls, problem: ContactProblem) -> "Extras":
+    def everywhere(cls, problem: ContactProblem) -> "CoveringVector":
         """Return pressure and friction at all nodes: with enough of it every node touches and sticks."""
         stress = float(np.abs(problem.sticking_state.traction).max()) or 1.0
         extras, none = stress * _uneven(2 * problem.n_contact), np.zeros(problem.n_contact)
         return cls(extras[::2], extras[1::2], none, none)
 
     @classmethod
-    def nothing(cls, problem: ContactProblem) -> "Extras":
-        """Return no extras."""
+    def zero(cls, problem: ContactProblem) -> "CoveringVector":
+        """Return no additions."""
         none = np.zeros(problem.n_contact)
         return cls(none, none, none, none)
 
     @classmethod
-    def covering(cls, piece: "_Piece", bound: AffineBound, direction: IntArray) -> "Extras":
-        """Return the extras that make all inequalities of a piece hold and do not change its response.
+    def of_violations(cls, segment: "_Segment", bound: AffineBound, direction: IntArray) -> "CoveringVector":
+        """Return the additions that make all inequalities of a segment hold and do not change its response.
 
-        Needs a piece in which no slipping node is under tension: extra pressure there would change the friction.
+        Needs a segment in which no slipping node is under tension: extra pressure there would change the friction.
         """
-        missing = np.where(piece.is_kept, np.maximum(-piece.slack, 0.0), 0.0)
+        missing = np.where(segment.is_kept, np.maximum(-segment.slack, 0.0), 0.0)
         missing *= _uneven(missing.size).reshape(missing.shape)
-        pressure = missing[_Kind.PRESSURE]
-        friction = np.maximum(missing[_Kind.FORWARD], missing[_Kind.BACKWARD])
+        pressure = missing[_Inequality.PRESSURE]
+        friction = np.maximum(missing[_Inequality.FORWARD], missing[_Inequality.BACKWARD])
         friction = np.maximum(friction + bound.slope * pressure, 0.0)  # less what the extra pressure adds
-        return cls(pressure, friction, missing[_Kind.CLEARANCE], -direction * missing[_Kind.SLIP])
+        return cls(pressure, friction, missing[_Inequality.CLEARANCE], -direction * missing[_Inequality.SLIP])
 
 
 def _uneven(count: int) -> FloatArray:
@@ -214,25 +219,25 @@ def _uneven(count: int) -> FloatArray:
 
 
 class _Path:
-    """The problem with extras."""
+    """The problem with its covering vector."""
 
-    def __init__(self, problem: ContactProblem, bound: AffineBound, extras: Extras) -> None:
+    def __init__(self, problem: ContactProblem, bound: AffineBound, cover: CoveringVector) -> None:
         self.problem = problem
         self.bound = bound
-        self.extras = extras
+        self.cover = cover
 
     def is_free(self, is_closed: BoolArray) -> BoolArray:
-        """Return (n_contact,) bool: nodes that nothing resists along the tangent, whatever the amount."""
+        """Return (n_contact,) bool: nodes that nothing resists along the tangent, for any artificial variable."""
         has_bound = (self.bound.intercept != 0.0) | (is_closed & (self.bound.slope != 0.0))
-        return np.asarray(~has_bound & (self.extras.friction == 0.0))
+        return np.asarray(~has_bound & (self.cover.friction == 0.0))
 
-    def slip(self, piece: _Piece, amount: float) -> FloatArray:
-        """Return the slip (n_contact,) at an amount of extras [m]."""
-        moved = piece.origin.u_t + amount * piece.rate.u_t
-        return np.asarray(moved - self.problem.slip_origin - amount * self.extras.slip)
+    def slip(self, segment: _Segment, artificial: float) -> FloatArray:
+        """Return the slip (n_contact,) at a value of the artificial variable [m]."""
+        u_t = segment.origin.u_t + artificial * segment.rate.u_t
+        return np.asarray(u_t - self.problem.slip_origin - artificial * self.cover.slip)
 
-    def piece(self, is_closed: BoolArray, direction: IntArray) -> _Piece:
-        """Respond to fixed statuses, at amount zero and at amount one."""
+    def segment(self, is_closed: BoolArray, direction: IntArray) -> _Segment:
+        """Respond to fixed statuses, for an artificial variable of zero and of one."""
         problem, bound = self.problem, self.bound
         is_free = self.is_free(is_closed)
         slips = (direction != 0) | is_free
@@ -241,63 +246,62 @@ class _Path:
         sliding = slip(problem.gap, direction.astype(float), bound.slope, bound.intercept)
         conditions = of_statuses(is_closed, slips, held, sliding)
 
-        # The body carries contact traction plus extra pressure; the conditions are on contact tractions alone.
-        extras = self.extras
-        extra_value = conditions.on_traction[:, :, 0] * extras.pressure[:, None]
-        extra_value[:, 1] -= direction * extras.friction
-        extra_value += conditions.on_displacement[:, :, 0] * extras.gap[:, None]
-        extra_value += conditions.on_displacement[:, :, 1] * extras.slip[:, None]
-        with_extras = LinearConditions(
-            conditions.on_displacement, conditions.on_traction, conditions.value + extra_value
-        )
-        origin, shifted = problem.respond(conditions), problem.respond(with_extras)
+        # The body carries contact traction plus extra pressure; the conditions are on contact tractions only.
+        cover = self.cover
+        extra_value = conditions.on_traction[:, :, 0] * cover.pressure[:, None]
+        extra_value[:, 1] -= direction * cover.friction
+        extra_value += conditions.on_displacement[:, :, 0] * cover.gap[:, None]
+        extra_value += conditions.on_displacement[:, :, 1] * cover.slip[:, None]
+        covered = LinearConditions(conditions.on_displacement, conditions.on_traction, conditions.value + extra_value)
+        origin, shifted = problem.respond(conditions), problem.respond(covered)
         traction_rate = shifted.traction - origin.traction
-        traction_rate[:, 0] -= extras.pressure
+        traction_rate[:, 0] -= cover.pressure
         rate = ContactState(shifted.displacement - origin.displacement, traction_rate)
 
+        # The slacks of all five inequalities, and their rates; `is_kept` says which of them hold where.
         origin_slip = origin.u_t - problem.slip_origin
         limit = bound.slope * origin.sigma_n + bound.intercept
-        limit_rate = bound.slope * rate.sigma_n + extras.friction
+        limit_rate = bound.slope * rate.sigma_n + cover.friction
         slack = [-origin.sigma_n, problem.gap - origin.u_n, limit + origin.sigma_t, limit - origin.sigma_t]
-        slack_rate = [-rate.sigma_n, extras.gap - rate.u_n, limit_rate + rate.sigma_t, limit_rate - rate.sigma_t]
-        return _Piece(
+        slack_rate = [-rate.sigma_n, cover.gap - rate.u_n, limit_rate + rate.sigma_t, limit_rate - rate.sigma_t]
+        return _Segment(
             origin,
             rate,
             np.stack([is_closed, ~is_closed & np.isfinite(problem.gap), sticks, sticks, slips & ~is_free]),
             np.stack([*slack, direction * origin_slip]),
-            np.stack([*slack_rate, direction * (rate.u_t - extras.slip)]),
+            np.stack([*slack_rate, direction * (rate.u_t - cover.slip)]),
         )
 
 
-def _first_amount(piece: _Piece) -> float:
-    """Return an amount of extras above which all inequalities hold."""
-    grows = piece.is_kept & (piece.slack_rate > 0.0)
-    return max(0.0, float(np.max(-piece.slack[grows] / piece.slack_rate[grows], initial=0.0))) * 1.01
+def _first_artificial(segment: _Segment) -> float:
+    """Return a value of the artificial variable above which all inequalities hold."""
+    grows = segment.is_kept & (segment.slack_rate > 0.0)
+    return max(0.0, float(np.max(-segment.slack[grows] / segment.slack_rate[grows], initial=0.0))) * 1.01
 
 
-def _next_joint(piece: _Piece, amount: float, falling: float) -> tuple[float, _Kind, int]:
-    """Return by how much the amount changes on the piece, and the inequality and node that end it."""
-    rate = falling * piece.slack_rate
-    ends = piece.is_kept & (rate < 0.0)
-    reach = np.full(rate.shape, np.inf)
-    slack = piece.slack[ends] + amount * piece.slack_rate[ends]
-    reach[ends] = np.maximum(slack, 0.0) / -rate[ends]
-    kind, node = np.unravel_index(np.argmin(reach), reach.shape)
-    return float(reach[kind, node]), _Kind(int(kind)), int(node)
+def _leaving(segment: _Segment, artificial: float, sign: float) -> tuple[float, _Inequality, int]:
+    """Return by how much the artificial variable changes on the segment, and the inequality and node that end it."""
+    rate = sign * segment.slack_rate
+    ends = segment.is_kept & (rate < 0.0)
+    ratio = np.full(rate.shape, np.inf)
+    slack = segment.slack[ends] + artificial * segment.slack_rate[ends]
+    ratio[ends] = np.maximum(slack, 0.0) / -rate[ends]
+    inequality, node = np.unravel_index(np.argmin(ratio), ratio.shape)
+    return float(ratio[inequality, node]), _Inequality(int(inequality)), int(node)
 
 
 def _pivoted(
-    is_closed: BoolArray, direction: IntArray, kind: _Kind, node: int
-) -> tuple[BoolArray, IntArray, tuple[_Kind, int]]:
-    """Return the statuses after the joint, and the inequality that becomes active instead of the one that ended."""
+    is_closed: BoolArray, direction: IntArray, leaving: _Inequality, node: int
+) -> tuple[BoolArray, IntArray, tuple[_Inequality, int]]:
+    """Return the statuses after a pivot, and the inequality that enters in place of the one that leaves."""
     is_closed, direction = is_closed.copy(), direction.copy()
-    if kind in (_Kind.PRESSURE, _Kind.CLEARANCE):
+    if leaving in (_Inequality.PRESSURE, _Inequality.CLEARANCE):
         is_closed[node] = not is_closed[node]
-        entered = _Kind.CLEARANCE if kind is _Kind.PRESSURE else _Kind.PRESSURE
-    elif kind is _Kind.SLIP:
-        entered = _Kind.FORWARD if direction[node] > 0 else _Kind.BACKWARD
+        entering = _Inequality.CLEARANCE if leaving is _Inequality.PRESSURE else _Inequality.PRESSURE
+    elif leaving is _Inequality.SLIP:
+        entering = _Inequality.FORWARD if direction[node] > 0 else _Inequality.BACKWARD
         direction[node] = 0
     else:
-        direction[node] = 1 if kind is _Kind.FORWARD else -1
-        entered = _Kind.SLIP
-    return is_closed, direction, (entered, node)
+        direction[node] = 1 if leaving is _Inequality.FORWARD else -1
+        entering = _Inequality.SLIP
+    return is_closed, direction, (entering, node)

@@ -14,6 +14,7 @@ from bemkit.scene.conditions import Part, Pressure, Traction
 from bemkit.scene.mesh_options import MeshOptions
 from bemkit.solvers.alm import AugmentedLagrangian
 from bemkit.solvers.base import ContactSolver
+from bemkit.solvers.fallbacks import Fallbacks
 from bemkit.solvers.fixed_point import FixedPoint
 from bemkit.solvers.ssn import SemismoothNewton
 from bemkit.studies.stability.similar_assembly import AssemblySimilarity
@@ -73,8 +74,8 @@ def _similarity(draw: Draw) -> AssemblySimilarity:
 
 def _solver(draw: Draw) -> ContactSolver:
     drivers: dict[ContactSolver, float] = {
-        SemismoothNewton(): 8.0,
-        SemismoothNewton(rho=draw.decades(-3.0, 3.0)): 1.0,
+        Fallbacks(): 8.0,
+        Fallbacks((SemismoothNewton(rho=draw.decades(-3.0, 3.0)), *Fallbacks().drivers[1:])): 1.0,
         AugmentedLagrangian(max_steps=60): 1.0,
         FixedPoint(max_steps=60): 1.0,
     }

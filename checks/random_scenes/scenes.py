@@ -21,9 +21,10 @@ from bemkit.scene.mesh_options import MeshOptions
 from bemkit.scene.scene import Scene
 from bemkit.solvers.alm import AugmentedLagrangian
 from bemkit.solvers.base import ContactSolver
+from bemkit.solvers.fallbacks import Fallbacks
 from bemkit.solvers.fixed_point import FixedPoint
+from bemkit.solvers.lemke import LemkePivoting
 from bemkit.solvers.ssn import SemismoothNewton
-from bemkit.testing.lemke import LemkePivoting
 from checks.random_scenes.bodies import Body, random_body
 from checks.random_scenes.draw import Draw, RandomCase
 from checks.random_scenes.half_planes import random_half_plane
@@ -89,7 +90,7 @@ def _scene(draw: Draw, title: str, modulus: float, layout: dict[str, Any]) -> Sc
     solver, linear_solver = _solver(draw), _linear_solver(draw)
     if not any(part for part in layout["parts"] if "contact" in part.name or part.name == "shaft"):
         layout = {name: value for name, value in layout.items() if name != "law"}
-        solver = SemismoothNewton()
+        solver = Fallbacks()
     return Scene(
         title=title,
         material=material,
@@ -133,8 +134,8 @@ def _mesh(draw: Draw, shape: Any, discretisation: Discretisation) -> MeshOptions
 
 def _solver(draw: Draw) -> ContactSolver:
     drivers: dict[ContactSolver, float] = {
-        SemismoothNewton(): 8.0,
-        SemismoothNewton(rho=draw.decades(-3.0, 3.0)): 1.0,
+        Fallbacks(): 8.0,
+        Fallbacks((SemismoothNewton(rho=draw.decades(-3.0, 3.0)), *Fallbacks().drivers[1:])): 1.0,
         AugmentedLagrangian(max_steps=60): 1.5,
         FixedPoint(max_steps=60): 1.5,
         LemkePivoting(): 1.5,

@@ -18,7 +18,7 @@ from bemkit.runs.run import UnsolvableSceneError
 from bemkit.scene.discretisation import Discretisation
 from bemkit.solvers.base import ContactSolver, Status, solve
 from bemkit.solvers.homotopy import AffineBound, follow_path
-from bemkit.testing.lemke import LemkePivoting
+from bemkit.solvers.lemke import LemkePivoting
 from tests.handmade import condense
 
 FLOOR = bk.HalfPlane()
@@ -185,7 +185,7 @@ def test_the_path_of_solutions_passes_over_free_tangents() -> None:
         loaded = replace(scene, parts=(*scene.parts[:2], replace(scene.parts[2], condition=load)))
         problem = model.under(model.prepared.under(loaded)).problem
         end = follow_path(problem, AffineBound.tangent(problem, np.zeros(problem.n_contact)))
-        lengths.add(end.n_pieces)
+        lengths.add(end.n_segments)
         assert end.state is not None
     # the friction bound of these nodes is reached all along the path; round-off must not make that a joint of it
     assert lengths == {3}

@@ -11,9 +11,9 @@ from bemkit.solvers.alm import AugmentedLagrangian
 from bemkit.solvers.base import solve
 from bemkit.solvers.fixed_point import FixedPoint
 from bemkit.solvers.homotopy import why_no_path
+from bemkit.solvers.lemke import LemkePivoting
 from bemkit.solvers.ssn import SemismoothNewton
 from bemkit.testing import check_law
-from bemkit.testing.lemke import LemkePivoting
 from tests.handmade import assert_solves, block_body
 
 POINTS = np.stack([np.linspace(0.0, 1.0, 5), np.full(5, 2.0)], axis=1)

@@ -182,7 +182,7 @@ def test_a_failed_step_leaves_the_finished_ones_in_the_file(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr(load_path, "MOST_HALVINGS", 0)
-    hopeless = bk.SemismoothNewton(full_steps=1, damped_steps=0, follows_path=False)
+    hopeless = bk.SemismoothNewton(max_steps=1)
     shear = bk.Step(2.0, {"parts.top.condition.x": 0.01})
     scene = replace(LOOP, steps=(LOOP.steps[0], shear), solver=hopeless)
     (tmp_path / "scene.toml").write_text(bk.scene_to_toml(scene))

@@ -91,7 +91,7 @@ def test_steps_that_are_reached_are_kept_in_the_result_of_a_scene() -> None:
 
 def test_a_jump_that_stalls_is_gone_in_halves() -> None:
     """Two full steps settle small increments and no large ones."""
-    impatient = bk.SemismoothNewton(full_steps=5, damped_steps=0, follows_path=False)
+    impatient = bk.SemismoothNewton(max_steps=5)
     assembly = replace(wall(3, 4, push=True), load_factors=(0.0, 4.6))
     assembly = replace(assembly, solver=impatient)
     first, second = bk.run_assembly_history([assembly])
@@ -109,7 +109,7 @@ def test_a_jump_that_stalls_is_gone_in_halves() -> None:
 
 def test_a_step_out_of_reach_says_how_far_it_came(monkeypatch) -> None:  # type: ignore[no-untyped-def]
     monkeypatch.setattr(load_path, "MOST_HALVINGS", 2)
-    hopeless = bk.SemismoothNewton(full_steps=2, damped_steps=0, follows_path=False)
+    hopeless = bk.Fallbacks((bk.SemismoothNewton(max_steps=2),))
     assembly = replace(wall(3, 4, push=True), load_factors=(0.0, 4.6), solver=hopeless)
     first, second = bk.run_assembly_history([assembly])
     assert first.is_converged

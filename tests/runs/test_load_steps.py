@@ -176,7 +176,7 @@ def test_with_weight_the_external_work_follows_from_the_balance() -> None:
 
 def test_a_step_that_fails_is_gone_in_halves() -> None:
     """Two full steps settle small increments of one body and no large ones."""
-    impatient = bk.SemismoothNewton(full_steps=2, damped_steps=0, follows_path=False)
+    impatient = bk.SemismoothNewton(max_steps=2)
     jump = (bk.Step(1.0, {"parts.top.condition.y": "-0.01*t"}), bk.Step(2.0, {SHEAR: 0.01}))
     patient, halved = (solved(replace(LOOP, steps=jump, solver=each)) for each in (LOOP.solver, impatient))
     assert patient.steps[1].n_increments == 1
@@ -188,7 +188,7 @@ def test_a_step_that_fails_is_gone_in_halves() -> None:
 
 def test_finished_steps_are_kept_and_named(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(load_path, "MOST_HALVINGS", 0)
-    hopeless = bk.SemismoothNewton(full_steps=1, damped_steps=0, follows_path=False)
+    hopeless = bk.SemismoothNewton(max_steps=1)
     steps = (
         bk.Step(1.0, {"parts.top.condition.y": "-0.01*t"}),
         bk.Step(1.5),

@@ -76,7 +76,7 @@ def test_starts_need_the_same_parts() -> None:
 
 
 def test_a_mesh_that_fails_is_no_start() -> None:
-    scene = dataclasses.replace(example(1, "linear", 160), solver=bk.SemismoothNewton(max_steps=1, follows_path=False))
+    scene = dataclasses.replace(example(1, "linear", 160), solver=bk.SemismoothNewton(max_steps=1))
     levels = run_cascade(scene)
     assert not levels[-1].is_converged
     # all of them start cold

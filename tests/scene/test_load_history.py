@@ -182,7 +182,7 @@ def test_the_summary_covers_all_steps() -> None:
 
 
 def test_a_step_that_fails_ends_the_history() -> None:
-    impatient = bk.SemismoothNewton(max_steps=1, follows_path=False)
+    impatient = bk.SemismoothNewton(max_steps=1)
     easy, hard = (block(push=push, solver=impatient) for push in (0.1, 0.39))
     steps = run_history([easy, hard, easy])
     assert [step.status for step in steps] == [bk.Status.CONVERGED, bk.Status.LOAD_NOT_REACHED]

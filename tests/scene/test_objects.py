@@ -21,7 +21,7 @@ PAIR = bk.ContactPair(("upper.bottom", "lower.top"))
         (lambda: replace(SCENE, law="coulomb"), r"^law is 'coulomb': give an object, such as Coulomb\("),
         (lambda: replace(SCENE, law=0.3), r"^law is 0.3: give an object, such as Coulomb\("),
         (lambda: replace(SCENE, law=bk.Coulomb), "^law is the class Coulomb: give an object"),
-        (lambda: replace(SCENE, solver="lemke"), r"^solver is 'lemke': give an object, such as SemismoothNewton\("),
+        (lambda: replace(SCENE, solver="lemke"), r"^solver is 'lemke': give an object, such as Fallbacks\("),
         (lambda: replace(SCENE, discretisation="linear"), "^discretisation is 'linear': give an object"),
         (lambda: replace(SCENE, linear_solver="automatic"), "^linear_solver is 'automatic': give an object"),
         (lambda: replace(SCENE, mesh=100), r"^mesh is 100: give an object, such as MeshOptions\(elements=320\)"),

@@ -26,9 +26,12 @@ from bemkit.scene.scene import Scene
 from bemkit.scene.serialisation import StructureError
 from bemkit.scene.toml import SceneError, load_scene, scene_from_toml, scene_to_toml, shipped_scenes, with_overrides
 from bemkit.solvers.alm import AugmentedLagrangian, BoundUpdate, InnerNewton
+from bemkit.solvers.fallbacks import Fallbacks
 from bemkit.solvers.fixed_point import FixedPoint
+from bemkit.solvers.lemke import LemkePivoting
+from bemkit.solvers.solution_path import SolutionPath
+from bemkit.solvers.springs import Springs
 from bemkit.solvers.ssn import SemismoothNewton
-from bemkit.testing.lemke import LemkePivoting
 
 BLOCK = """
 title = "Square on a rigid foundation"
@@ -112,6 +115,10 @@ solvers = st.one_of(
     st.builds(AugmentedLagrangian, rho_n=st.none() | positive, rho_t=st.none() | positive),
     st.builds(FixedPoint, max_steps=st.integers(1, 500)),
     st.just(LemkePivoting()),
+    st.builds(SolutionPath, st.booleans()),
+    st.just(Springs(first=0.1)),
+    st.just(Fallbacks()),
+    st.just(Fallbacks((SemismoothNewton(max_steps=4), SolutionPath(from_start=True), FixedPoint()))),
     st.just(AugmentedLagrangian(bound=BoundUpdate.CURRENT, inner=InnerNewton(max_steps=7))),
 )
 gradings = st.one_of(st.just(Uniform()), st.builds(Algebraic, st.floats(1.0, 4.0)), st.just(Geometric(0.25, 3)))
@@ -181,7 +188,18 @@ def test_one_word_or_a_table_name_a_solver() -> None:
     assert scene_from_toml(BLOCK).solver == SemismoothNewton()
     changed = BLOCK.replace('solver = "semismooth-newton"', table)
     assert scene_from_toml(changed).solver == AugmentedLagrangian(rho_n=1e4, rho_t=100.0)
-    assert scene_from_toml(BLOCK.replace('solver = "semismooth-newton"', "")).solver == SemismoothNewton()
+    assert scene_from_toml(BLOCK.replace('solver = "semismooth-newton"', "")).solver == Fallbacks()
+
+
+def test_a_list_names_solvers_one_after_the_other() -> None:
+    listed = 'solver = ["semismooth-newton", { kind = "solution-path", from_start = true }]'
+    scene = scene_from_toml(BLOCK.replace('solver = "semismooth-newton"', listed))
+    assert scene.solver == Fallbacks((SemismoothNewton(), SolutionPath(from_start=True)))
+    assert scene_from_toml(scene_to_toml(scene)).solver == scene.solver
+    with pytest.raises(SceneError, match=r"solver\[1\].kind: unknown solver 'newton'"):
+        scene_from_toml(BLOCK.replace('solver = "semismooth-newton"', 'solver = ["lemke", "newton"]'))
+    with pytest.raises(SceneError, match="solver: drivers is empty; give at least one driver"):
+        scene_from_toml(BLOCK.replace('solver = "semismooth-newton"', "solver = []"))
 
 
 def test_friction_may_vary_from_node_to_node() -> None:
@@ -222,7 +240,7 @@ CONTACT = '{ kind = "contact", obstacle = { kind = "half-plane", point = [0.0, 0
         (
             '"semismooth-newton"',
             '"newton"',
-            "solver.kind: unknown solver 'newton': the known ones are semismooth-newton",
+            "solver.kind: unknown solver 'newton': the known ones are fallbacks, semismooth-newton",
         ),
         ('"coulomb"', '"culomb"', "law.kind: unknown friction law 'culomb'.*did you mean 'coulomb'"),
         ("friction_coefficient = 0.5", "", "law.friction_coefficient: missing"),
@@ -386,7 +404,7 @@ def test_overrides_of_the_command_line() -> None:
     assert changed.mesh.elements == 64
     assert changed.discretisation == Galerkin(1)
     assert changed.solver == AugmentedLagrangian(rho_n=10.0, rho_t=10.0)
-    assert with_overrides(scene, rho=2.0).solver == SemismoothNewton(rho=2.0)
+    assert with_overrides(scene, rho=2.0).solver == Fallbacks((SemismoothNewton(rho=2.0), *Fallbacks().drivers[1:]))
     assert with_overrides(scene) == scene
     with pytest.raises(SceneError, match="elements is 1"):
         with_overrides(scene, elements=1)

@@ -8,16 +8,17 @@ import pytest
 from bemkit.contact.laws import Coulomb, Tresca
 from bemkit.contact.problem import ContactProblem
 from bemkit.operators.equilibrium import Imbalance
-from bemkit.solvers import ssn
 from bemkit.solvers.active_sets import ActiveSets, ProjectionEquations
 from bemkit.solvers.alm import AugmentedLagrangian
 from bemkit.solvers.base import Status, solve
+from bemkit.solvers.fallbacks import Fallbacks
 from bemkit.solvers.fixed_point import FixedPoint
 from bemkit.solvers.homotopy import why_no_path
+from bemkit.solvers.lemke import LemkePivoting
 from bemkit.solvers.newton import negligible
 from bemkit.solvers.progress import OuterIterate
+from bemkit.solvers.solution_path import SolutionPath
 from bemkit.solvers.ssn import SemismoothNewton
-from bemkit.testing.lemke import LemkePivoting
 from tests.handmade import Inexact, block_body, block_problem, hard_problem
 
 DRIVERS = [SemismoothNewton(), AugmentedLagrangian(), FixedPoint()]
@@ -72,30 +73,18 @@ def test_residuals_and_states_are_compared_by_the_accuracy(accuracy):
     assert OuterIterate.begun(problem, state).followed_by(problem, moved, 1).ended is None
 
 
-def test_the_path_of_solutions_is_left_out_where_responses_are_costly():
+def test_the_whole_path_is_skipped_where_responses_are_costly():
     problem = hard_problem(16)
-    assert any("path of" in record.message for record in solve(problem, SemismoothNewton()).history)
+    whole = Fallbacks((SemismoothNewton(), SolutionPath(from_start=True)))
+    assert any("path of" in record.message for record in solve(problem, whole).history)
     costly = replace(problem, body=Inexact(problem.body, is_costly=True))
-    found = solve(costly, SemismoothNewton(), throw=False)
-    assert found.status is Status.STALLED
-    assert "because responses of this body are costly" in found.message
-    assert why_no_path(costly) == "the path of solutions is not followed, because responses of this body are costly"
-    silent = solve(costly, SemismoothNewton(follows_path=False), throw=False)
-    assert "costly" not in silent.message  # nobody asked for it
-
-
-def test_costly_bodies_are_given_up_early(monkeypatch):
-    """After fewer full steps, and fewer with line search, than other bodies get."""
-    problem = block_problem(Coulomb(0.5))
-    costly = replace(problem, body=Inexact(problem.body, is_costly=True))
-    assert solve(costly, SemismoothNewton()).steps == 3
-    monkeypatch.setattr(ssn, "_COSTLY_FULL", 1)
-    monkeypatch.setattr(ssn, "_COSTLY_DAMPED", 1)
-    assert solve(problem, SemismoothNewton()).steps == 3
-    found = solve(costly, SemismoothNewton(), throw=False)
-    assert found.steps == 2
-    assert found.history[1].message == "1 full steps have not settled the active sets; line search begins"
-    assert "the line search takes too many steps" in found.message
+    found = solve(costly, whole, throw=False)
+    assert found.status is Status.CYCLING
+    words = "the path of solutions is not followed, because responses of this body are costly"
+    assert f"SemismoothNewton: the active sets come back; SolutionPath: {words}" in found.message
+    assert why_no_path(costly) == words
+    assert not why_no_path(costly, is_short=True)
+    assert solve(costly, Fallbacks()).is_converged  # by the path from the sets that come back
 
 
 def test_lemkes_method_declines_before_it_asks():

@@ -12,8 +12,8 @@ from bemkit.solvers.alm import AugmentedLagrangian, BoundUpdate
 from bemkit.solvers.base import solve
 from bemkit.solvers.fixed_point import FixedPoint
 from bemkit.solvers.homotopy import AffineBound, follow_path
+from bemkit.solvers.lemke import LemkePivoting
 from bemkit.solvers.ssn import SemismoothNewton
-from bemkit.testing.lemke import LemkePivoting
 from tests.handmade import assert_solves, block_problem, random_problem
 from tests.slow import slow_except
 

@@ -12,9 +12,9 @@ from bemkit.contact.problem import ContactProblem, ContactState
 from bemkit.solvers.alm import AugmentedLagrangian
 from bemkit.solvers.base import solve
 from bemkit.solvers.fixed_point import FixedPoint
+from bemkit.solvers.lemke import LemkePivoting
 from bemkit.solvers.newton import FloatingResponse, floating_response
 from bemkit.solvers.ssn import SemismoothNewton
-from bemkit.testing.lemke import LemkePivoting
 from tests.handmade import block_body
 
 N = 13

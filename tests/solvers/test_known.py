@@ -11,9 +11,9 @@ from bemkit.solvers.active_sets import NodeStatus
 from bemkit.solvers.alm import AugmentedLagrangian, BoundUpdate
 from bemkit.solvers.base import solve
 from bemkit.solvers.fixed_point import FixedPoint
+from bemkit.solvers.lemke import LemkePivoting
 from bemkit.solvers.multistart import probe, start_with
 from bemkit.solvers.ssn import SemismoothNewton
-from bemkit.testing.lemke import LemkePivoting
 from tests.handmade import assert_solves, block_problem, random_body
 from tests.slow import slow_only
 

@@ -12,17 +12,18 @@ from bemkit.contact.problem import ContactProblem, ContactState, DenseBody, cert
 from bemkit.solvers.active_sets import ActiveSets, NodeStatus, contact_sets
 from bemkit.solvers.alm import AugmentedLagrangian, BoundUpdate
 from bemkit.solvers.base import solve
+from bemkit.solvers.fallbacks import Fallbacks
 from bemkit.solvers.fixed_point import FixedPoint
 from bemkit.solvers.homotopy import AffineBound, follow_path, why_no_path
+from bemkit.solvers.lemke import LemkePivoting, lemke
 from bemkit.solvers.multistart import start_with
 from bemkit.solvers.ssn import SemismoothNewton
-from bemkit.testing.lemke import LemkePivoting, lemke
 from tests.contact.test_laws import Rubber
 from tests.handmade import assert_solves, block_body, block_problem, hard_problem, random_problem
 from tests.slow import slow_except
 
 OUTER = [AugmentedLagrangian(), AugmentedLagrangian(bound=BoundUpdate.CURRENT), FixedPoint()]
-DRIVERS = [SemismoothNewton(), *OUTER]
+DRIVERS = [SemismoothNewton(), Fallbacks(), *OUTER]
 
 
 def test_history_and_callback_tell_the_same_true_story():
@@ -137,8 +138,8 @@ def test_the_path_leads_to_a_solution_whatever_the_friction(seed):
     problem = hard_problem(seed, n_most=20, condition=1e3, friction_coefficient=5.0)
     end = follow_path(problem, AffineBound.tangent(problem, np.zeros(problem.n_contact)))
     assert_solves(problem, end.state, 5.0)
-    assert end.linear_solves == 2 * end.n_pieces
-    assert end.n_pieces <= 10 * problem.n_contact  # usually 1.5 n_contact
+    assert end.linear_solves == 2 * end.n_segments
+    assert end.n_segments <= 10 * problem.n_contact  # usually 1.5 n_contact
 
 
 def test_the_path_goes_to_tresca_solutions_with_open_sticking_nodes():
@@ -153,8 +154,8 @@ def test_the_path_goes_to_tresca_solutions_with_open_sticking_nodes():
 def test_the_path_reports_its_ends():
     problem = hard_problem(16)
     bound = AffineBound.tangent(problem, np.zeros(problem.n_contact))
-    assert follow_path(problem, bound, max_pieces=1).reason == "the path has more than 1 pieces"
-    assert follow_path(problem, bound, max_pieces=1).state is None
+    assert follow_path(problem, bound, max_segments=1).reason == "the path has more than 1 segments"
+    assert follow_path(problem, bound, max_segments=1).state is None
     lifting = block_problem(Coulomb(0.5), press=-1.0)
     end = follow_path(lifting, AffineBound.tangent(lifting, np.zeros(12)))
     assert end.state is None
@@ -178,7 +179,7 @@ def test_a_path_from_nearby_statuses_is_short_and_leads_to_a_solution(seed):
     solution = follow_path(problem, bound).state
     sets = contact_sets(problem, solution)
     unchanged = follow_path(problem, bound, sets)
-    assert unchanged.n_pieces == 1
+    assert unchanged.n_segments == 1
     assert np.allclose(unchanged.state.displacement, solution.displacement)
     node = seed % problem.n_contact
     is_closed, direction = sets.is_closed.copy(), sets.direction.copy()
@@ -187,7 +188,7 @@ def test_a_path_from_nearby_statuses_is_short_and_leads_to_a_solution(seed):
     end = follow_path(problem, bound, ActiveSets(is_closed, direction))
     if end.state is not None:  # there is no promise of an end
         assert_solves(problem, end.state, 0.5)
-        assert end.n_pieces <= 20
+        assert end.n_segments <= 20
     if opened.state is not None:
         assert_solves(problem, opened.state, 0.5)
 
@@ -202,27 +203,6 @@ def test_statuses_that_do_not_hold_the_body_begin_no_path():
     end = follow_path(problem, bound, ActiveSets(np.zeros(12, bool), np.zeros(12, np.intp)))
     assert end.state is None
     assert "leave a rigid motion free" in end.reason
-
-
-def test_newton_says_when_it_follows_the_path():
-    messages = [record.message for record in solve(hard_problem(16), SemismoothNewton()).history]
-    assert any("the path is followed next" in message for message in messages)
-    assert any(message.startswith("path of ") for message in messages)
-    messages = [
-        record.message for record in solve(hard_problem(16), SemismoothNewton(follows_path=False), throw=False).history
-    ]
-    assert any("line search begins" in message for message in messages)
-
-
-def test_newton_starts_again_from_weaker_friction_where_short_paths_end():
-    """Random problems far beyond uniqueness, where some of the first short paths and line searches fail."""
-    messages = []
-    for seed in range(60):
-        problem = hard_problem(seed, n_most=20, condition=1e3, friction_coefficient=5.0)
-        solution = solve(problem, SemismoothNewton())
-        assert_solves(problem, solution.state, 5.0)
-        messages += [record.message for record in solution.history]
-    assert any("of the friction" in message and message.startswith("path of") for message in messages)
 
 
 # ------------------------------------------------------------------------------------------------------- metamorphic

@@ -13,7 +13,7 @@ import bemkit as bk
 from bemkit.model.contact_model import build_model
 from bemkit.model.prepared import prepare
 from bemkit.solvers.alm import BoundUpdate
-from bemkit.testing.lemke import LemkePivoting
+from bemkit.solvers.lemke import LemkePivoting
 from tests.slow import slow_except, slow_only
 
 DRIVERS: dict[str, bk.ContactSolver] = {

@@ -1,0 +1,140 @@
+"""Drivers one after the other: a driver that is made of drivers, and the default of scenes."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+
+from bemkit.contact.problem import ContactProblem, ContactState
+from bemkit.errors import InputError
+from bemkit.solvers.active_sets import ProjectionEquations
+from bemkit.solvers.base import ContactSolver, Iterate, Status
+from bemkit.solvers.newton import merit, negligible
+from bemkit.solvers.solution_path import SolutionPath
+from bemkit.solvers.springs import Springs
+from bemkit.solvers.ssn import SemismoothNewton
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class FallbackIterate(Iterate):
+    """Iterate of `Fallbacks`.
+
+    Parameters
+    ----------
+    index : int
+        Of the driver at work.
+    inner : Iterate
+        Of that driver.
+    n_steps : int
+        Its steps so far.
+    reasons : tuple of str
+        Why those drivers have ended.
+    """
+
+    index: int
+    inner: Iterate
+    n_steps: int = 0
+    reasons: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Fallbacks:
+    """Drivers one after the other, each from where the one before has ended or has run out of its steps.
+
+    Parameters
+    ----------
+    drivers : tuple of ContactSolver
+        By default Newton's method, which suffices nearly always; springs, for many loose bodies; the path of solutions
+        from the statuses reached; and the whole path.
+
+    Notes
+    -----
+    A driver that cannot help ends in `init`, and the next one begins. Nothing follows where contact and friction are
+    satisfied, because only drivers of other responses could improve the rest of the certificate.
+
+    Examples
+    --------
+    >>> Fallbacks((SemismoothNewton(max_steps=10), SolutionPath()))
+    Fallbacks(drivers=(SemismoothNewton(rho=None, max_steps=10), SolutionPath(from_start=False, max_steps=5)))
+    """
+
+    drivers: tuple[ContactSolver, ...] = (
+        SemismoothNewton(),
+        Springs(least_motions=4),
+        SolutionPath(),
+        SolutionPath(from_start=True),
+    )
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "drivers", tuple(self.drivers))
+        if not self.drivers:
+            raise InputError("drivers is empty; give at least one driver, such as SemismoothNewton()")
+
+    @property
+    def max_steps(self) -> int:
+        """Steps of all drivers."""
+        return sum(driver.max_steps for driver in self.drivers)
+
+    def without_whole_path(self) -> "Fallbacks":
+        """Return the drivers without those that follow the whole path, which is the same from wherever they begin."""
+        others = [driver for driver in self.drivers if not (isinstance(driver, SolutionPath) and driver.from_start)]
+        return Fallbacks(tuple(others)) if others else self
+
+    def init(self, problem: ContactProblem, start: ContactState) -> FallbackIterate:
+        """Begin with the first driver that can help."""
+        return self._begun(problem, FallbackIterate(state=start, index=-1, inner=Iterate(state=start)))
+
+    def step(self, problem: ContactProblem, iterate: Iterate) -> FallbackIterate:
+        """Take a step of the driver at work; hand on to the next one if it ends."""
+        if not isinstance(iterate, FallbackIterate):
+            raise TypeError(f"iterate is a {type(iterate).__name__}; give what init or step of this driver returned")
+        driver, n_steps = self.drivers[iterate.index], iterate.n_steps + 1
+        inner = driver.step(problem, iterate.inner)
+        if inner.ended is None and n_steps >= driver.max_steps:
+            inner = replace(inner, ended=Status.STALLED, message=f"{n_steps} steps have not led to a solution")
+        following = replace(
+            iterate,
+            state=inner.state,
+            linear_solves=iterate.linear_solves + inner.linear_solves - iterate.inner.linear_solves,
+            ended=inner.ended,
+            message=inner.message,
+            inner=inner,
+            n_steps=n_steps,
+        )
+        if inner.ended is None or not inner.state.is_finite or _is_satisfied(problem, inner.state):
+            return following
+        return self._begun(problem, replace(following, reasons=(*iterate.reasons, self._reason(iterate.index, inner))))
+
+    def _begun(self, problem: ContactProblem, iterate: FallbackIterate) -> FallbackIterate:
+        """Return the iterate at the first of the next drivers that can help; the given one, ended, if none can."""
+        ended, reasons = iterate.ended, iterate.reasons
+        for index in range(iterate.index + 1, len(self.drivers)):
+            inner = self.drivers[index].init(problem, iterate.state)
+            if inner.ended is None:
+                spent = iterate.linear_solves + inner.linear_solves
+                message = "; ".join([*filter(None, [iterate.message]), _begins(self.drivers[index])]) if index else ""
+                return FallbackIterate(
+                    state=inner.state, linear_solves=spent, message=message, index=index, inner=inner, reasons=reasons
+                )
+            ended = ended or inner.ended
+            reasons = (*reasons, self._reason(index, inner))
+        return replace(iterate, ended=ended, message="; ".join(reasons))
+
+    def _reason(self, index: int, inner: Iterate) -> str:
+        return f"{type(self.drivers[index]).__name__}: {inner.message}"
+
+
+def drivers_at_work(solver: ContactSolver, messages: Iterable[str]) -> tuple[ContactSolver, ...]:
+    """Return the drivers that have taken part in a solve, by the messages of its history; without any the first one."""
+    if not isinstance(solver, Fallbacks):
+        return (solver,)
+    words = "; ".join(messages)
+    return (solver.drivers[0], *(driver for driver in solver.drivers[1:] if _begins(driver) in words))
+
+
+def _begins(driver: ContactSolver) -> str:
+    return f"{type(driver).__name__} is next"
+
+
+def _is_satisfied(problem: ContactProblem, state: ContactState) -> bool:
+    """Whether contact and friction hold to round-off, so that what is wrong is no matter of drivers."""
+    rho = problem.body.stiffness_scale
+    return merit(problem, ProjectionEquations(problem, rho, rho).evaluate(state)) <= negligible(problem.body)
