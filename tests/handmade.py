@@ -4,20 +4,19 @@ import zlib
 
 import numpy as np
 
+from bemkit.contact.condensation.direct_body import condensed_body
 from bemkit.contact.condensation.nodes import ContactNodes, contact_conditions, contact_frame, nodes_on
-from bemkit.contact.condensation.reduction import condensed_body
 from bemkit.contact.laws import Coulomb
 from bemkit.contact.problem import ContactProblem, ContactState, DenseBody, LinearBody
 from bemkit.geometry.local_values import dof_weights
 from bemkit.geometry.spaces import dof_points
 
 
-def contact_along_normals(space, elements, *, is_frictionless=False):
+def contact_along_normals(space, elements):
     """Return the nodes of elements (m,), in order along the boundary, with contact along the body's normals."""
     nodes, normals = nodes_on(space, elements)
-    law = np.full(nodes.size, is_frictionless)
     weights = dof_weights(space, elements)[nodes]
-    return ContactNodes(nodes, dof_points(space)[nodes], contact_frame(normals), weights, law)
+    return ContactNodes(nodes, dof_points(space)[nodes], contact_frame(normals), weights)
 
 
 def condense(elastic, supports, candidates, force):

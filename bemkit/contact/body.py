@@ -172,10 +172,11 @@ class LinearBody(Protocol):
         ...
 
     @property
-    def tangent_is_eliminated(self) -> BoolArray:
-        """(n_contact,) bool array: nodes without friction, whose tangential motion the body has eliminated.
+    def tangent_follows(self) -> BoolArray:
+        """(n_contact,) bool array: nodes whose tangential displacement follows from normal ones; none by default.
 
-        The only tangential condition there is ``sigma_t = 0``; `ContactProblem.respond` sees to it. None by default.
+        A support or two obstacles hold them, so that their tangential condition is one on tractions.
+        `ContactProblem.respond` replaces others.
         """
         return np.zeros(self.n_contact, bool)
 
@@ -185,14 +186,14 @@ class LinearBody(Protocol):
         Parameters
         ----------
         conditions : LinearConditions
-            At nodes whose tangent is eliminated the second one is ``sigma_t = 0``.
+            At nodes whose tangent follows the second one is on tractions.
 
         Raises
         ------
         SingularResponse
             If the conditions do not determine the response.
         InputError
-            If there is another tangential condition where the tangent is eliminated.
+            If there is another tangential condition where the tangent follows.
         """
         ...
 
@@ -258,9 +259,11 @@ class LinearBody(Protocol):
             load and tractions on the rigid motions, whose largest component is one; both relative to the largest nodal
             force of the state and of that response.
         """
-        is_eliminated = self.tangent_is_eliminated
-        held = np.stack([np.ones_like(is_eliminated), ~is_eliminated], axis=1)
-        conditions = separated(self.n_contact).replaced(held, stick(state.u_n, state.u_t))
+        follows = self.tangent_follows
+        held = np.stack([np.ones_like(follows), ~follows], axis=1)
+        given = separated(self.n_contact)
+        given.value[follows, 1] = state.sigma_t[follows]
+        conditions = given.replaced(held, stick(state.u_n, state.u_t))
         response = self.respond(conditions)
         forces = self.weights[:, None] * np.stack([state.traction, response.traction])
         largest = float(np.abs(forces).max())

@@ -8,9 +8,9 @@ from functools import cached_property
 
 import numpy as np
 
-from bemkit.arrays import BoolArray, ComplexArray, FloatArray
+from bemkit.arrays import ComplexArray, FloatArray
 from bemkit.contact.body import ContactState, LinearBody, SingularResponse
-from bemkit.contact.condensation.nodes import ContactNodes, find_tangents
+from bemkit.contact.condensation.nodes import ContactNodes
 from bemkit.contact.conditions import LinearConditions
 from bemkit.contact.reduced_conditions import ReducedConditions, as_complex, as_pairs
 from bemkit.operators.counts import OperationCounts
@@ -71,15 +71,9 @@ class PeriodicBody(LinearBody):
         return self.elastic.material.plane_modulus / float(np.median(self.weights))
 
     @property
-    def is_held(self) -> BoolArray:
-        """(n_contact,) bool array: no node is held by a support."""
-        return np.zeros(self.n_contact, bool)
-
-    @property
     def work(self) -> OperationCounts:
         """The order of the contact system, of which no matrix is formed."""
-        n_eliminated = int(np.count_nonzero(find_tangents(self.conditions, self.nodes)))
-        return OperationCounts(contact_unknowns=2 * self.n_contact - n_eliminated)
+        return OperationCounts(contact_unknowns=2 * self.n_contact)
 
     def under(self, displacement: FloatArray, force: FloatArray, inside: ForcesInside | None = None) -> PeriodicBody:
         """Return the same body under other nodal forces."""

@@ -1,6 +1,7 @@
 """The contact problem: a body, a gap, a friction law; and the certificate of a solution, numbers anyone can check."""
 
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, NamedTuple, TypeVar
@@ -35,6 +36,8 @@ ones count, however small they are."""
 _LARGEST_STICKING_RATIO = 100.0
 """The tractions of the sticking state measure a state only up to this multiple of its own tractions. These are then
 known to 1e-7 at a tolerance of 1e-9, and to 1e-6 (the mean of an element) where few nodes carry all."""
+_RESTS = 1e-9
+"""Slip below this share of the largest displacement is round-off of the frames of contact and support."""
 DEFORMED = 1e-3
 """Share of its displacement that counts as deformation of a body without contact tractions. It lies above the round-off
 of the displacement at a tolerance of 1e-9, and below the deformation by a load under which the body gives way to an
@@ -98,11 +101,20 @@ class ContactProblem:
     def sticking_state(self) -> ContactState:
         """Response with all nodes sticking and none overlapping: the cold start, and the measure of the load.
 
-        Nodes are held at ``u_n = min(g, 0)`` and ``u_t = reference_slip``, or ``sigma_t = 0`` where the body has
-        eliminated the tangent.
+        Nodes are held at ``u_n = min(g, 0)`` and ``u_t = reference_slip``, or ``sigma_t = 0`` where the tangent follows
+        or, if that does not set the body free, where there is no friction.
         """
+        return self.for_all_laws("sticking_state", self._sticking)
+
+    def _sticking(self) -> ContactState:
         sticking = stick(np.minimum(self.gap, 0.0), self.slip_origin)
-        return self.for_all_laws("sticking_state", lambda: self.respond(sticking))
+        none, pressed = np.zeros(self.n_contact), np.full(self.n_contact, -self.modulus)
+        is_smooth = (self.friction_bound(none) == 0.0) & (self.friction_bound(pressed) == 0.0)
+        if is_smooth.any():
+            rows = np.stack([np.zeros_like(is_smooth), is_smooth], axis=1)
+            with suppress(SingularResponse):
+                return self.respond(sticking.replaced(rows, separated(self.n_contact)))
+        return self.respond(sticking)
 
     @cached_property
     def modulus(self) -> float:
@@ -121,23 +133,28 @@ class ContactProblem:
         return {}
 
     def respond(self, conditions: LinearConditions) -> ContactState:
-        """Return the response of the body, with the condition ``sigma_t = 0`` where it has eliminated the tangent.
+        """Return the response of the body, with ``sigma_t = 0`` for conditions on displacements that follow.
 
-        Drivers call this instead of `LinearBody.respond`, and need not know where there is no friction.
+        Drivers call this instead of `LinearBody.respond`, and need not know which tangents supports hold.
 
         Raises
         ------
         SingularResponse
             If the conditions do not determine the response.
         """
-        return self.body.respond(self.without_eliminated(conditions))
+        return self.body.respond(self.possible(conditions))
 
-    def without_eliminated(self, conditions: LinearConditions) -> LinearConditions:
-        """Return the conditions with ``sigma_t = 0`` wherever the body has eliminated the tangent."""
-        rows = self.body.tangent_is_eliminated
+    def possible(self, conditions: LinearConditions) -> LinearConditions:
+        """Return the conditions with ``sigma_t = 0`` for those on tangential displacements that follow."""
+        rows = self.body.tangent_follows & conditions.on_displacement[:, 1].any(axis=1)
         if not rows.any():
             return conditions
         return conditions.replaced(np.stack([np.zeros_like(rows), rows], axis=1), separated(self.n_contact))
+
+    def given_direction(self, state: ContactState) -> FloatArray:
+        """Return (n_contact,) the direction, +1, -1 or 0, in which nodes slip whose tangent follows; 0 elsewhere."""
+        slip = np.where(self.body.tangent_follows, state.u_t - self.slip_origin, 0.0)
+        return np.where(np.abs(slip) > _RESTS * np.abs(state.displacement).max(), np.sign(slip), 0.0)
 
     def with_law(self, law: FrictionLaw) -> "ContactProblem":
         """Return the problem under another law, with the results that do not depend on it."""
@@ -175,12 +192,6 @@ class ContactProblem:
             raise LawError(
                 f"friction law {law_name(self.law)}.bound is {bound[node]:g} at contact node {node} "
                 f"(sigma_n = {sigma_n[node]:g}); a bound is zero or positive"
-            )
-        if np.any(bound[self.body.tangent_is_eliminated] > 0.0):
-            node = int(np.flatnonzero(self.body.tangent_is_eliminated & (bound > 0.0))[0])
-            raise LawError(
-                f"friction law {law_name(self.law)} allows {bound[node]:g} at contact node {node}, where the body was "
-                "condensed without friction: condense it again for this law"
             )
         return self._where_acting(bound, is_closed)
 
@@ -229,7 +240,7 @@ def _check_members(body: LinearBody, law: FrictionLaw) -> None:
 
 
 _BODY_MEMBERS = (
-    *("weights", "n_contact", "stiffness_scale", "accuracy", "is_costly", "tangent_is_eliminated"),
+    *("weights", "n_contact", "stiffness_scale", "accuracy", "is_costly", "tangent_follows"),
     *("respond", "rigid_motions", "rigid_load", "moving_bodies", "partners_of", "shares", "imbalance"),
 )
 _LAW_MEMBERS = ("bound", "bound_derivative", "is_frictionless", "acts_across_gap", "scaled")

@@ -117,7 +117,7 @@ def find_contact(
     parts += further
     if not parts:
         none, nowhere = np.zeros(0), np.zeros((0, 2))
-        nodes = ContactNodes(none.astype(np.intp), nowhere, contact_frame(nowhere), none, none.astype(bool))
+        nodes = ContactNodes(none.astype(np.intp), nowhere, contact_frame(nowhere), none)
         return ContactData(nodes, (), none, none, none, nowhere)
     parts, sides = _nearest_of_each_part(
         parts, [_Side.of(one.obstacle, mesh.part(one.part), mesh, space) for one in parts]
@@ -216,6 +216,5 @@ def _joined(parts: Sequence[FacingPart], sides: Sequence[_Side], space: Boundary
     columns = (np.concatenate(column) for column in zip(*(vars(side).values() for side in sides), strict=True))
     nodes, directions, weights, arc_length, gap, facing, points = columns
     of_node = [part for part, side in zip(parts, sides, strict=True) for _ in range(side.nodes.size)]
-    is_frictionless = np.array([part.is_frictionless for part in of_node], bool)
-    contact_nodes = ContactNodes(nodes, dof_points(space)[nodes], contact_frame(directions), weights, is_frictionless)
+    contact_nodes = ContactNodes(nodes, dof_points(space)[nodes], contact_frame(directions), weights)
     return ContactData(contact_nodes, tuple(part.name for part in of_node), arc_length, gap, facing, points)

@@ -15,8 +15,8 @@ import numpy as np
 
 from bemkit.arrays import FloatArray, IntArray, blended
 from bemkit.contact.body import ContactState
+from bemkit.contact.condensation.direct_body import DirectBody, condensed_body
 from bemkit.contact.condensation.nodes import ContactNodes
-from bemkit.contact.condensation.reduction import CondensedBody, condensed_body
 from bemkit.contact.laws import FrictionLaw
 from bemkit.contact.problem import ContactProblem
 from bemkit.geometry.local_values import element_degrees, from_own_nodes, projector
@@ -45,7 +45,7 @@ if TYPE_CHECKING:
 _MORE_POINTS = 4
 """Gauss points of an element at which given loads are evaluated, beyond the degree of the tractions."""
 
-ContactBody: TypeAlias = "CondensedBody | HierarchicalBody | PeriodicBody | UntouchedBody"
+ContactBody: TypeAlias = "DirectBody | HierarchicalBody | PeriodicBody | UntouchedBody"
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,10 +57,8 @@ class Model:
     prepared : Prepared
     elastic : SteklovPoincare
         Dimensionless.
-    body : CondensedBody, HierarchicalBody, PeriodicBody or UntouchedBody
+    body : DirectBody, HierarchicalBody, PeriodicBody or UntouchedBody
     problem : ContactProblem
-        Where supports hold contact nodes along the tangent its law is frictionless; see
-        `bemkit.model.solved_contact.with_held_friction`.
     """
 
     prepared: Prepared
@@ -101,8 +99,7 @@ class Model:
     def under(self, prepared: Prepared) -> Model:
         """Return the same body under the loads, obstacles and law of another scene; nothing is factored again.
 
-        The body is condensed again only if the law has friction where it had none, if directions of contact change, or
-        if the drive of a half-plane does.
+        The body is condensed again only if directions of contact change, or the drive of a half-plane does.
 
         Parameters
         ----------
@@ -110,16 +107,14 @@ class Model:
             From `Prepared.under` of this model's.
         """
         contact = prepared.candidates.of(self.nodes)
-        is_new_friction = self.nodes.is_frictionless & ~contact.nodes.is_frictionless
         elastic = self.elastic
         if isinstance(elastic, HeavyElasticity) and prepared.inside is not None:
             elastic = replace(elastic, inside=prepared.inside)
         is_driven_alike = prepared.drive == self.prepared.drive
         if not is_driven_alike:
             elastic = _driven_by(elastic, prepared.drive)
-        if is_driven_alike and contact.has_same_directions(self.contact) and not is_new_friction.any():
+        if is_driven_alike and contact.has_same_directions(self.contact):
             body = self.body.under(prepared.conditions.displacement, prepared.force, prepared.inside)
-            # the condensed body keeps the tangent of a node that has lost its friction
             prepared = replace(prepared, conditions=body.conditions, contact=replace(contact, nodes=self.nodes))
         else:
             body = contact_body(elastic, prepared)
@@ -175,7 +170,7 @@ class Model:
         """
         prepared = replace(self.prepared, scene=scene)
         _ = self.problem.sticking_state  # common to all laws
-        return Model(prepared, self.elastic, self.body, self.problem.with_law(_law(prepared, self.body)))
+        return Model(prepared, self.elastic, self.body, self.problem.with_law(_law(prepared)))
 
     @property
     def work(self) -> OperationCounts:
@@ -184,8 +179,8 @@ class Model:
 
     @property
     def law(self) -> FrictionLaw:
-        """The friction law of the contact nodes, dimensionless, also where supports hold them."""
-        return self.scene.law_at(self.contact.parts, self.contact.points).scaled(self.units.stress)
+        """The friction law of the contact nodes, dimensionless."""
+        return _law(self.prepared)
 
     def boundary_fields(self, state: ContactState) -> tuple[FloatArray, FloatArray, float]:
         """Return the physical fields of a contact state on the whole boundary.
@@ -317,13 +312,12 @@ def _driven_by(elastic: SteklovPoincare, drive: FarDrive) -> SteklovPoincare:
 
 
 def _problem(prepared: Prepared, body: ContactBody) -> ContactProblem:
-    return ContactProblem(body, prepared.contact.gap / prepared.units.displacement, _law(prepared, body))
+    return ContactProblem(body, prepared.contact.gap / prepared.units.displacement, _law(prepared))
 
 
-def _law(prepared: Prepared, body: ContactBody) -> FrictionLaw:
+def _law(prepared: Prepared) -> FrictionLaw:
     contact = prepared.contact
-    law = prepared.scene.law_at(contact.parts, contact.points, body.is_held)
-    return law.scaled(prepared.units.stress)
+    return prepared.scene.law_at(contact.parts, contact.points).scaled(prepared.units.stress)
 
 
 def insert_loads(

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from bemkit.arrays import FloatArray
-from bemkit.contact.condensation.nodes import bound_tangents
 from bemkit.contact.solvability import UnsolvableLoad
 from bemkit.errors import InputError
 from bemkit.geometry.spaces import dof_points
@@ -119,9 +118,7 @@ def _rigid_mode(prepared: Prepared, load: UnsolvableLoad) -> FloatArray:
     nodes = prepared.contact.nodes
     modes = rigid_motions(nodes.points, np.zeros(2), 1.0)
     matrix = np.einsum("nkc,ncm->nkm", nodes.frame, modes)
-    is_known = np.ones((len(matrix), 2), bool)
-    is_known[:, 1] = ~bound_tangents(prepared.conditions, nodes)  # along a support that component says nothing
-    mode: FloatArray = np.linalg.lstsq(matrix[is_known], load.motion[is_known], rcond=_ROUND_OFF)[0]
+    mode: FloatArray = np.linalg.lstsq(matrix.reshape(-1, 3), load.motion.ravel(), rcond=_ROUND_OFF)[0]
     return _along_obstacle(matrix[~np.isnan(load.lift), 0], mode) if load.is_sliding else mode
 
 

@@ -1,9 +1,4 @@
-"""What follows from a solved contact state: friction at nodes that supports hold, doubts in sentences, negative energy.
-
-What acts along the tangent of a node that a support holds there is the sum of friction and the reaction of the support.
-So friction is no unknown of the contact problem at such a node, and has no influence on the body. What it is follows
-from the displacement that the support prescribes: where the node slips, the law says it. A node that rests carries
-none: a support that holds one direction is free of shear, and shear stresses are equal on both sides of a right angle.
+"""Checks of a solved contact state: warnings in sentences, negative energy.
 
 The elastic energy of no body can be negative, but that of a discrete one can. Collocation does not make the stiffness
 symmetric and positive semidefinite, as Galerkin's method does: on elements that are much longer than a body is thick it
@@ -19,7 +14,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bemkit.arrays import FloatArray, IntArray
-from bemkit.contact.body import ContactState, SlipHistory
 from bemkit.geometry.spaces import BoundarySpace, dof_points
 from bemkit.model.contact_model import Model, energy_beyond, map_fields
 from bemkit.operators.equilibrium import NOISE_FACTOR, round_off_of
@@ -34,8 +28,6 @@ if TYPE_CHECKING:
     from bemkit.model.assembled.model import AssembledModel  # single bodies are solved without it
 
 
-SLIP_TOLERANCE = 1e-9
-"""Slip below this share of the largest displacement is round-off of the frames of contact and support."""
 LARGEST_ANGLE = 30.0
 """Degrees between the body's normal and the direction of contact. A side lies down on its obstacle by turning through
 this angle, and small displacements hold for turns that are small against one: a half is not."""
@@ -48,42 +40,6 @@ _OF_DIFFERENCES = 4.0
 """Rounding errors in a strain, of the size of the displacements: of these, of the motion, of their difference."""
 _ELIMINATION_TOLERANCE = 64.0 * float(np.finfo(float).eps)
 """Share of the sensitivity of the whole body that elimination may leave in its condensed stiffness."""
-
-
-def with_held_friction(
-    model: Model, state: ContactState, node_status: IntArray, motion: SlipHistory | None = None
-) -> tuple[ContactState, IntArray]:
-    """Complete a solution of the contact problem by the friction at nodes that supports hold.
-
-    Parameters
-    ----------
-    model : Model
-    state : ContactState
-        Dimensionless; at these nodes without tangential traction.
-    node_status : (n_contact,) array of `NodeStatus` values
-    motion : SlipHistory, optional
-        For laws that depend on slip or time.
-
-    Returns
-    -------
-    state : ContactState
-    node_status : (n_contact,) array of `NodeStatus` values
-        Other nodes are as they were.
-    """
-    held = model.body.is_held
-    if not held.any():
-        return state, node_status
-    law, is_closed = model.law, node_status != NodeStatus.SEPARATED
-    law = law if motion is None else law.at_slip(motion)
-    sigma_n = np.minimum(state.sigma_n, 0.0)
-    bound = np.where(is_closed | np.asarray(law.acts_across_gap), law.bound(sigma_n), 0.0)
-    has_friction = held & ((bound > 0.0) | (law.bound_derivative(sigma_n) != 0.0))
-    slip = state.u_t - model.problem.slip_origin
-    slip = np.where(np.abs(slip) > SLIP_TOLERANCE * np.abs(state.displacement).max(), slip, 0.0)
-    sigma_t = np.where(has_friction, -bound * np.sign(slip), state.sigma_t)
-    status = np.select([slip > 0.0, slip < 0.0], [NodeStatus.SLIP_FORWARD, NodeStatus.SLIP_BACKWARD], NodeStatus.STICK)
-    status = np.where(has_friction & is_closed, status, node_status)
-    return ContactState(state.displacement, np.stack([state.sigma_n, sigma_t], axis=1)), status
 
 
 def contact_warnings(model: Model, displacement: FloatArray, node_status: IntArray) -> tuple[ResultWarning, ...]:

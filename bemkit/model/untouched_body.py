@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from bemkit.arrays import BoolArray, FloatArray
+from bemkit.arrays import FloatArray
 from bemkit.contact.body import ContactState, LinearBody
 from bemkit.contact.conditions import LinearConditions
 from bemkit.contact.problem import Certificate
@@ -49,11 +49,6 @@ class UntouchedBody(LinearBody):
     stiffness_scale = 1.0
 
     @property
-    def is_held(self) -> BoolArray:
-        """(0,) bool array."""
-        return np.zeros(0, bool)
-
-    @property
     def work(self) -> OperationCounts:
         """What it took to come here, from the operators on."""
         return self.condensed.work
@@ -67,7 +62,7 @@ class UntouchedBody(LinearBody):
         return self.condensed.recover(np.zeros(0))
 
     def under(self, displacement: FloatArray, force: FloatArray, inside: ForcesInside | None = None) -> UntouchedBody:
-        """Return the same body under other displacements and forces; see `CondensedBody.under`."""
+        """Return the same body under other displacements and forces; see `DirectBody.under`."""
         conditions = replace(self.conditions, displacement=displacement)
         condensed = condensed_under(self.condensed, conditions, force, inside)
         condensed = replace(condensed, work=self.condensed.work + condensed.work)

@@ -90,7 +90,7 @@ def _sizes(prepared: PreparedAssembly) -> Sizes:
         n_free=sum(int(np.count_nonzero(each.is_free)) for each in conditions),
         n_open=sum(int(np.count_nonzero(each.is_retained)) for each in conditions),
         n_contact=prepared.n_contact,
-        n_contact_unknowns=2 * prepared.n_contact - int(np.count_nonzero(prepared.tangent_is_eliminated)),
+        n_contact_unknowns=2 * prepared.n_contact - int(np.count_nonzero(prepared.tangent_follows)),
         n_motions=sum(len(admissible_modes(body.mesh)) for body in bodies) + 3 * len(prepared.assembly.rigid),
         n_free_motions=_n_driven(prepared.assembly)
         + sum(len(free_modes(body.own_space, each)) for body, each in zip(bodies, conditions, strict=True)),

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from bemkit.contact.condensation.nodes import find_tangents
+from bemkit.contact.condensation.nodes import following_tangents
 from bemkit.contact.laws import FrictionLaw
 from bemkit.errors import InputError
 from bemkit.geometry.mesh import BoundaryMesh
@@ -103,7 +103,7 @@ def find_sizes(prepared: Prepared) -> Sizes:
         n_free=int(np.count_nonzero(conditions.is_free)),
         n_open=int(np.count_nonzero(conditions.is_retained)),
         n_contact=n_contact,
-        n_contact_unknowns=2 * n_contact - int(np.count_nonzero(find_tangents(conditions, nodes))),
+        n_contact_unknowns=2 * n_contact - int(np.count_nonzero(following_tangents(conditions, nodes))),
         n_motions=len(admissible_modes(mesh)),
         n_free_motions=len(prepared.free_modes),
     )

@@ -19,7 +19,7 @@ from bemkit.geometry.spaces import dof_points
 from bemkit.model.assembled.model import AssembledModel, build_assembled_model
 from bemkit.model.assembled.prepared import PreparedAssembly, prepare_assembly_steps
 from bemkit.model.assembled.turning import with_turning_checked
-from bemkit.model.solved_contact import SLIP_TOLERANCE, with_energies_checked
+from bemkit.model.solved_contact import with_energies_checked
 from bemkit.operators.stopwatch import Stage, StageClock
 from bemkit.plan import Plan
 from bemkit.plan.assembly_plan import plan_assembly
@@ -31,7 +31,6 @@ from bemkit.results.solved_problem import SolvedSteps
 from bemkit.results.warnings import find_warnings
 from bemkit.runs.steps import Kind, joined, solved_history
 from bemkit.scene.assembly import Assembly
-from bemkit.solvers.active_sets import NodeStatus
 from bemkit.solvers.base import ContactSolution, Status, StepRecord
 
 
@@ -132,8 +131,7 @@ def assembly_solution(
     prepared = model.prepared
     law = prepared.law if motion is None else prepared.law.at_slip(motion)
     solved = model.boundary_fields(result.state)
-    furthest = max(float(np.abs(displacement).max()) for displacement, _, _ in solved)
-    table = _contact_table(model, result.state, _at_rest(model, result, furthest))
+    table = _contact_table(model, result.state, result.node_status)
     slip = table.u_t - model.problem.slip_origin * prepared.units.displacement
     transitions = find_transitions(table, slip)
     bodies = {}
@@ -178,18 +176,6 @@ def assembly_solution(
         rigid=rigid,
     )
     return solution.with_warnings(find_warnings)
-
-
-def _at_rest(model: AssembledModel, result: ContactSolution, furthest: float) -> IntArray:
-    """Return the status of the nodes, those that supports and symmetry lines hold sticking unless they move.
-
-    They have no friction of their own, and count as free to slip in the contact problem. What is seen to move exceeds a
-    share of the largest displacement [m] of the bodies.
-    """
-    held = np.concatenate([rows.is_held & (not rows.law.is_frictionless) for rows in model.prepared.rows])
-    slip = np.abs(result.state.u_t - model.problem.slip_origin) * model.prepared.units.displacement
-    rests = held & (result.node_status != NodeStatus.SEPARATED) & (slip <= SLIP_TOLERANCE * furthest)
-    return np.where(rests, NodeStatus.STICK, result.node_status)
 
 
 def _contact_table(model: AssembledModel, state: ContactState, node_status: IntArray) -> ContactTable:

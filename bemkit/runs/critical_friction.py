@@ -106,7 +106,7 @@ def critical_friction(scene: Scene | Assembly) -> CriticalFriction:
     problem, statuses = _solved(scene)
     slope = problem.friction_slope(np.full(problem.n_contact, -1.0))
     is_closed = statuses != NodeStatus.SEPARATED
-    has_friction = (slope < 0.0) & ~problem.body.tangent_is_eliminated
+    has_friction = (slope < 0.0) & ~problem.body.tangent_follows
     if not has_friction.any():
         raise LawError("friction does not grow with the pressure: choose Coulomb's law, or one like it")
     if not (is_closed & has_friction).any():

@@ -8,7 +8,7 @@ from functools import partial
 
 import numpy as np
 
-from bemkit.arrays import FloatArray, IntArray
+from bemkit.arrays import IntArray
 from bemkit.contact.body import ContactState, SlipHistory
 from bemkit.contact.solvability import UnsolvableLoad
 from bemkit.errors import InputError
@@ -17,7 +17,7 @@ from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.spaces import dof_points
 from bemkit.model.contact_model import Model, build_model
 from bemkit.model.prepared import Prepared, prepare_steps
-from bemkit.model.solved_contact import contact_warnings, with_energy_checked, with_held_friction
+from bemkit.model.solved_contact import contact_warnings, with_energy_checked
 from bemkit.operators.stopwatch import Stage, StageClock
 from bemkit.plan import Plan, check_elements, plan_steps
 from bemkit.result_warning import ResultWarning
@@ -106,9 +106,9 @@ def solution_of(
     model: Model, result: ContactSolution, plan: Plan, clock: StageClock, motion: SlipHistory | None = None
 ) -> Solution:
     """Turn what the driver found into physical fields; the slip is for laws that depend on it."""
-    state, node_status = with_held_friction(model, result.state, result.node_status, motion)
+    state, node_status = result.state, result.node_status
     displacement, traction_dofs, energy = model.boundary_fields(state)
-    table = _contact_table(model, state, node_status, displacement)
+    table = _contact_table(model, state, node_status)
     transitions = find_transitions(table, table.u_t - model.problem.slip_origin * model.units.displacement)
     of_contact = contact_warnings(model, displacement, node_status) if result.is_converged else ()
     points, centres = dof_points(model.prepared.space, model.mesh), model.mesh.centres.copy()
@@ -147,14 +147,8 @@ def _warnings(of_contact: tuple[ResultWarning, ...], solution: Solution) -> tupl
     return (*find_warnings(solution), *of_contact)
 
 
-def _contact_table(
-    model: Model, state: ContactState, node_status: IntArray, boundary_displacement: FloatArray
-) -> ContactTable:
+def _contact_table(model: Model, state: ContactState, node_status: IntArray) -> ContactTable:
     units, contact = model.units, model.contact
-    tangents = model.nodes.frame[:, 1]
-    # where the tangent is no unknown the body itself says how it moves
-    u_t = np.sum(boundary_displacement[model.nodes.nodes] * tangents, axis=1)
-    u_t = np.where(model.body.tangent_is_eliminated, u_t, state.u_t * units.displacement)
     displacement = state.displacement * units.displacement
     return ContactTable(
         part=contact.parts,
@@ -162,7 +156,7 @@ def _contact_table(
         y=contact.points[:, 1].copy(),
         s=contact.arc_length.copy(),
         u_n=displacement[:, 0].copy(),
-        u_t=u_t,
+        u_t=displacement[:, 1].copy(),
         sigma_n=state.sigma_n * units.stress,
         sigma_t=state.sigma_t * units.stress,
         gap=contact.gap.copy(),

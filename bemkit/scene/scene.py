@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bemkit.arrays import BoolArray, FloatArray, IntArray
+from bemkit.arrays import FloatArray, IntArray
 from bemkit.contact.further_laws import PiecewiseLaw
 from bemkit.contact.laws import FrictionLaw, Frictionless
 from bemkit.contact.problem import LawError
@@ -173,7 +173,7 @@ class Scene(Stated):
         """The pieces of the outline that the parts cover, by name."""
         return {part.name: part.selection for part in self.parts}
 
-    def law_at(self, parts: Sequence[str], points: FloatArray, is_held: BoolArray | None = None) -> FrictionLaw:
+    def law_at(self, parts: Sequence[str], points: FloatArray) -> FrictionLaw:
         """Return the friction law of given contact nodes, every coefficient in numbers.
 
         Parameters
@@ -181,19 +181,16 @@ class Scene(Stated):
         parts : sequence of n_contact str
             The contact part that each node belongs to.
         points : (n_contact, 2) array [m]
-        is_held : (n_contact,) bool array, optional
-            Nodes without friction, whatever their part. None by default.
 
         Raises
         ------
         LawError
             If a coefficient is not finite or negative somewhere; the message names the part.
         """
-        held = np.zeros(len(parts), bool) if is_held is None else is_held
-        laws: list[FrictionLaw] = [Frictionless()] if held.any() else []
-        nodes = [np.flatnonzero(held)] if held.any() else []
+        laws: list[FrictionLaw] = []
+        nodes: list[IntArray] = []
         for name, law in self.laws.items():
-            part_nodes = np.flatnonzero(np.array([part == name for part in parts], bool) & ~held)
+            part_nodes = np.flatnonzero(np.array([part == name for part in parts], bool))
             try:
                 laws.append(law.at(points[part_nodes]))
             except ValueError as error:

@@ -15,6 +15,8 @@ from bemkit.contact.projection import (
     positive_part_derivative,
 )
 
+_FAR = float(np.finfo(float).max)
+
 
 class NodeStatus(IntEnum):
     """Status of a contact node."""
@@ -129,6 +131,10 @@ class ProjectionEquations:
         multiplier = state.traction if self.multiplier is None else self.multiplier
         towards_obstacle = self.rho_n * (state.u_n - problem.gap) - multiplier[:, 0]
         along_obstacle = self.rho_t * (state.u_t - problem.slip_origin) - multiplier[:, 1]
+        # where the tangent follows, slip is no unknown: it has its direction whatever the friction
+        follows = problem.body.tangent_follows
+        if follows.any():
+            along_obstacle = np.where(follows, problem.given_direction(state) * _FAR, along_obstacle)
         is_closed = positive_part_derivative(towards_obstacle) > 0.0
         if touches is not None:
             is_closed |= touches
@@ -163,7 +169,7 @@ class ProjectionEquations:
         intercept = residual.bound - residual.slope * residual.predicted_sigma_n
         sliding = slip(problem.gap, sets.direction.astype(float), residual.slope, intercept)
         slides = (sets.direction != 0) | residual.is_free
-        return of_statuses(sets.is_closed, slides, sticking, sliding)
+        return problem.possible(of_statuses(sets.is_closed, slides, sticking, sliding))
 
     def through_stick(self, residual: Residual, previous: ActiveSets) -> ActiveSets:
         """Return the sets of `residual` with every direct change of slip direction replaced by stick.

@@ -241,7 +241,7 @@ class _Path:
         problem, bound = self.problem, self.bound
         is_free = self.is_free(is_closed)
         slips = (direction != 0) | is_free
-        sticks = ~slips & ~problem.body.tangent_is_eliminated  # an eliminated tangent is followed by the body
+        sticks = ~slips & ~problem.body.tangent_follows  # others follow, with no inequality of their own
         held = stick(problem.gap, problem.slip_origin)
         sliding = slip(problem.gap, direction.astype(float), bound.slope, bound.intercept)
         conditions = of_statuses(is_closed, slips, held, sliding)
@@ -267,7 +267,15 @@ class _Path:
         return _Segment(
             origin,
             rate,
-            np.stack([is_closed, ~is_closed & np.isfinite(problem.gap), sticks, sticks, slips & ~is_free]),
+            np.stack(
+                [
+                    is_closed,
+                    ~is_closed & np.isfinite(problem.gap),
+                    sticks,
+                    sticks,
+                    slips & ~is_free & ~problem.body.tangent_follows,
+                ]
+            ),
             np.stack([*slack, direction * origin_slip]),
             np.stack([*slack_rate, direction * (rate.u_t - cover.slip)]),
         )

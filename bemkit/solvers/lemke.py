@@ -93,7 +93,7 @@ class LemkePivoting:
         # one step of iterative refinement: the inverse loses as many digits as the springs are weak
         residual = load + spring_load + force.ravel() - (stiffness + springs) @ displacement
         displacement = (displacement + compliance @ residual).reshape(-1, 2)
-        displacement = problem.respond(stick(*displacement.T)).displacement  # eliminated tangents follow
+        displacement = problem.respond(stick(*displacement.T)).displacement  # with the tangents that follow
         state = ContactState(displacement, force / problem.body.weights[:, None])
         return Iterate(state=state, linear_solves=spent, message=f"{n_pivots} pivots")
 
@@ -199,7 +199,7 @@ def _probed(problem: ContactProblem) -> tuple[FloatArray, FloatArray, int]:
     for column, unit in enumerate(amount * np.eye(2 * n_contact)):
         moved = problem.respond(stick(unit[0::2], unit[1::2])).traction.ravel()
         stiffness[:, column] = weights * (moved - at_rest) / amount
-    idle = 2 * np.flatnonzero(body.tangent_is_eliminated) + 1
+    idle = 2 * np.flatnonzero(body.tangent_follows) + 1
     stiffness[idle, idle] = weights[idle] * body.stiffness_scale
     return stiffness, -weights * at_rest, 2 * n_contact + 1
 
@@ -213,8 +213,8 @@ def _springs(problem: ContactProblem, state: ContactState) -> tuple[FloatArray, 
     motions = as_dense(problem.body.rigid_motions(), problem.n_contact)
     if not len(motions):
         return np.zeros((n_unknowns, n_unknowns)), np.zeros(n_unknowns)
-    is_held = np.stack([np.ones(problem.n_contact), ~problem.body.tangent_is_eliminated], axis=1)
-    motions = (motions * is_held).reshape(len(motions), -1)
+    is_unknown = np.stack([np.ones(problem.n_contact), ~problem.body.tangent_follows], axis=1)
+    motions = (motions * is_unknown).reshape(len(motions), -1)
     orthonormal = np.linalg.qr(motions.T)[0]
     scale = _RELATIVE_STIFFNESS * spring_stiffness(problem, state) * float(np.median(problem.body.weights))
     springs = scale * orthonormal @ orthonormal.T

@@ -256,7 +256,7 @@ def floating_response(body: LinearBody, conditions: LinearConditions) -> Floatin
     """
     free = _few(conditions.free_motions(body.rigid_motions()), body.n_contact)
     gives_traction = ~np.any(conditions.on_displacement != 0.0, axis=2)
-    gives_traction[:, 1] &= ~body.tangent_is_eliminated  # whose displacement cannot be held
+    gives_traction[:, 1] &= ~body.tangent_follows  # whose displacement cannot be held
     if not len(free) or np.count_nonzero(gives_traction) < len(free):
         return None
     pins = _choose_pins(free, gives_traction)

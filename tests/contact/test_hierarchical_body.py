@@ -9,9 +9,9 @@ import pytest
 
 import bemkit as bk
 from bemkit.contact.body import ContactState, SingularResponse
+from bemkit.contact.condensation.direct_body import condensed_body
 from bemkit.contact.condensation.hierarchical_body import HierarchicalBody, hierarchical_body
-from bemkit.contact.condensation.nodes import contact_conditions
-from bemkit.contact.condensation.reduction import NoContactNodesError, condensed_body
+from bemkit.contact.condensation.nodes import NoContactNodesError, contact_conditions
 from bemkit.contact.conditions import separated, stick
 from bemkit.contact.problem import ContactProblem
 from bemkit.errors import InputError
@@ -264,9 +264,9 @@ def test_contact_nodes_that_a_support_holds_move_in_its_frame(travel: float) -> 
     conditions, contact = contact_conditions(prepared.space, [support], prepared.candidates.nodes)
     body = hierarchical_body(elastic, conditions, contact, prepared.force)
     dense = condensed_body(elastic, conditions, contact, prepared.force)
-    np.testing.assert_array_equal(body.is_held, dense.is_held)
-    assert body.is_held.sum() == 5
-    law = prepared.scene.law_at(prepared.contact.parts, prepared.contact.points, body.is_held)
+    np.testing.assert_array_equal(body.tangent_follows, dense.tangent_follows)
+    assert body.tangent_follows.sum() == 5
+    law = prepared.scene.law_at(prepared.contact.parts, prepared.contact.points)
     problems = [ContactProblem(each, prepared.contact.gap, law) for each in (body, dense)]
     ask = stick(0.01 * np.cos(np.arange(body.n_contact)), np.zeros(body.n_contact))
     opened = np.zeros((body.n_contact, 2), bool)
@@ -281,7 +281,7 @@ def test_contact_nodes_that_a_support_holds_move_in_its_frame(travel: float) -> 
     for ours, theirs in zip(body.recover(one), dense.recover(two), strict=True):
         np.testing.assert_allclose(ours, theirs, atol=1e-9 * np.abs(theirs).max())
     unknown = stick(np.zeros(body.n_contact), np.zeros(body.n_contact))
-    with pytest.raises(InputError, match="contact node 0 is without friction"):
+    with pytest.raises(InputError, match="contact node 0 follows from a support"):
         body.respond(unknown)
 
 

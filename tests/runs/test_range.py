@@ -15,7 +15,6 @@ from bemkit.geometry.vectors import check_magnitude
 from bemkit.model.assembled.model import AssembledModel
 from bemkit.model.contact_model import Model
 from bemkit.model.units import OutOfRangeError
-from bemkit.runs import history
 from bemkit.scene.toml import with_overrides
 
 ELEMENTS = [bk.Galerkin(1), bk.ConstantCollocation()]
@@ -109,13 +108,12 @@ def test_results_that_are_not_finite_are_never_converged(is_contact: bool, monke
 
 def test_states_that_are_not_finite_end_as_a_status_without_warnings_of_numpy(monkeypatch: pytest.MonkeyPatch) -> None:
     """As random scene 117 of seed 3002, a plate that nothing holds sideways, on its way to infinity."""
-    actual = history.with_held_friction
+    actual = Model.boundary_fields
 
-    def infinite(*arguments: Any) -> Any:
-        state, node_status = actual(*arguments)
-        return ContactState(np.full_like(state.displacement, np.inf), state.traction), node_status
+    def infinite(model: Model, state: ContactState) -> Any:
+        return actual(model, ContactState(np.full_like(state.displacement, np.inf), state.traction))
 
-    monkeypatch.setattr(history, "with_held_friction", infinite)
+    monkeypatch.setattr(Model, "boundary_fields", infinite)
     solution = bk.run(block())
     assert solution.status is bk.Status.NOT_FINITE
     assert np.isnan(solution.energy)

@@ -8,6 +8,7 @@ import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray, IntArray, read_only, spread_fractions
 from bemkit.contact.body import ContactState, LinearBody, SingularResponse
+from bemkit.contact.condensation.held_friction import HeldFriction
 from bemkit.contact.conditions import LinearConditions, orthonormal
 from bemkit.errors import InputError
 from bemkit.operators.equilibrium import Imbalance, Unbalanced
@@ -21,15 +22,16 @@ _LEFT_OVER = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
-class EliminatedTangents:
-    """Tangential displacements that follow the unknowns of a body, because no traction ever acts along them.
+class FollowingTangents:
+    """Tangential displacements that follow from the unknowns of a body, because supports or two obstacles give them.
 
     Parameters
     ----------
-    nodes : (n_eliminated,) array
-        Numbers of the contact nodes, ascending.
-    response, at_rest : (n_eliminated, n_unknowns) array [-], (n_eliminated,) array [m]
-        Their tangential displacements are ``at_rest + response @ unknowns``.
+    nodes : (n_following,) array
+        Indices of the contact nodes, ascending.
+    response, at_rest : (n_following, n_unknowns) array [-], (n_following,) array [m]
+        Their tangential displacements are ``at_rest + response @ unknowns``. Friction may act where the normal
+        displacement of the node itself is the only unknown; see `bemkit.contact.condensation.held_friction`.
     """
 
     nodes: IntArray
@@ -44,16 +46,16 @@ class DenseBody(LinearBody):
     Parameters
     ----------
     stiffness : (n_unknowns, n_unknowns) array [Pa]
-        Condensed stiffness, index ``2 node + component`` with component 0 = normal, 1 = tangential; eliminated
-        tangents are left out. It need not be symmetric.
+        Condensed stiffness, index ``2 node + component`` with component 0 = normal, 1 = tangential, without the
+        tangents that follow. It need not be symmetric.
     load : (n_unknowns,) array [N/m]
         Condensed load: the nodal forces that would act on the contact nodes of the clamped body, reversed.
     weights : (n_contact,) array [m]
         Length that belongs to each node.
     motions : (n_motions, n_contact, 2) array, optional
         Rigid motions that only contact holds; none by default.
-    eliminated_tangents : EliminatedTangents, optional
-        Nodes without friction whose tangential displacement is no unknown; none by default.
+    following_tangents : FollowingTangents, optional
+        Nodes whose tangential displacement is no unknown; none by default.
     modulus : float, optional [Pa]
         E' of the material: force per displacement of one node. By default the median of the diagonal normal
         stiffnesses, of those that are more than round-off.
@@ -69,7 +71,7 @@ class DenseBody(LinearBody):
     load: FloatArray
     weights: FloatArray
     motions: FloatArray | None = None
-    eliminated_tangents: EliminatedTangents | None = None
+    following_tangents: FollowingTangents | None = None
     modulus: float | None = None
 
     def __post_init__(self) -> None:
@@ -102,16 +104,27 @@ class DenseBody(LinearBody):
 
     @property
     def n_unknowns(self) -> int:
-        """Two for each contact node, less the eliminated tangents."""
-        return 2 * self.n_contact - (0 if self.eliminated_tangents is None else len(self.eliminated_tangents.nodes))
+        """Two for each contact node, less the tangents that follow."""
+        return 2 * self.n_contact - (0 if self.following_tangents is None else len(self.following_tangents.nodes))
 
     @cached_property
-    def tangent_is_eliminated(self) -> BoolArray:
+    def tangent_follows(self) -> BoolArray:
         """(n_contact,) bool array: where the tangential displacement is no unknown."""
-        is_eliminated = super().tangent_is_eliminated
-        if self.eliminated_tangents is not None:
-            is_eliminated[self.eliminated_tangents.nodes] = True
-        return is_eliminated
+        follows = np.zeros(self.n_contact, bool)
+        if self.following_tangents is not None:
+            follows[self.following_tangents.nodes] = True
+        return follows
+
+    @cached_property
+    def held_friction(self) -> HeldFriction:
+        """How friction acts where the tangent follows."""
+        slope = np.full(self.n_contact, np.nan)
+        if self.following_tangents is not None:
+            for node, row in zip(self.following_tangents.nodes, self.following_tangents.response, strict=True):
+                normal = int(np.searchsorted(self.unknown_dofs, 2 * node))
+                if not np.delete(row, normal).any():
+                    slope[node] = row[normal]
+        return HeldFriction(self.tangent_follows, slope)
 
     @cached_property
     def stiffness_scale(self) -> float:
@@ -128,7 +141,7 @@ class DenseBody(LinearBody):
     def unknown_dofs(self) -> IntArray:
         """(n_unknowns,) array: the numbers ``2 node + component`` of the unknown displacements, ascending."""
         is_unknown = np.ones((self.n_contact, 2), bool)
-        is_unknown[self.tangent_is_eliminated, 1] = False
+        is_unknown[self.tangent_follows, 1] = False
         return np.flatnonzero(is_unknown)
 
     def respond(self, conditions: LinearConditions) -> ContactState:
@@ -139,7 +152,7 @@ class DenseBody(LinearBody):
         Prescribed displacements, zero tractions and slip tractions are met exactly, not just to round-off, so that
         ties such as ``|sigma_t| = s |sigma_n|`` are decided alike in all units.
         """
-        refuse_other_tangents(conditions, self.tangent_is_eliminated)
+        given, conditions = conditions, self.held_friction.substituted(conditions)
         own = [0, 1]
         acts_on_displacement = np.any(conditions.on_displacement != 0.0, axis=2)
         acts_on_traction = np.any(conditions.on_traction != 0.0, axis=2)
@@ -153,12 +166,13 @@ class DenseBody(LinearBody):
         if not is_given.all():
             unknowns[~is_given] = self._solved(conditions, unknowns, is_given)
             displacement.flat[self.unknown_dofs] = unknowns
-        displacement[self.tangent_is_eliminated, 1] = self._followed(unknowns)
+        displacement[self.tangent_follows, 1] = self._followed(unknowns)
 
         traction = np.zeros_like(displacement)
         traction.flat[self.unknown_dofs] = self.stiffness @ unknowns - self.load
         traction /= self.weights[:, None]
-        return ContactState(displacement, conditions.with_given_tractions(traction))
+        state = ContactState(displacement, conditions.with_given_tractions(traction))
+        return self.held_friction.restored(given, state)
 
     def rigid_motions(self) -> FloatArray:
         """Return the motions given to the constructor."""
@@ -177,12 +191,12 @@ class DenseBody(LinearBody):
 
         Notes
         -----
-        The first number is the residual of ``weights * t = stiffness @ u - load`` (and of eliminated tangents that do
-        not follow), so it also detects states that are no response of this body. Round-off is what the stiffness makes
+        The first number is the residual of ``weights * t = stiffness @ u - load`` (and of tangents that do not follow),
+        so it also detects states that are no response of this body. Round-off is what the stiffness makes
         of the rigid part of the displacements, and that of the sums.
         """
         contact = (self.weights[:, None] * state.traction).ravel()
-        forces, unknowns = contact[self.unknown_dofs], state.displacement.ravel()[self.unknown_dofs]
+        forces, unknowns = self._forces_on_unknowns(contact), state.displacement.ravel()[self.unknown_dofs]
         missing = np.abs(self.stiffness @ unknowns - self.load - forces).max()
         motions, basis = self.motions_of_unknowns, self._orthonormal_motions
         left_by_motions = float(np.abs(self.stiffness @ (basis @ (basis.T @ unknowns))).max(initial=0.0))
@@ -229,17 +243,21 @@ class DenseBody(LinearBody):
             np.abs(self.motions_of_unknowns @ self.stiffness).max(axis=0) / np.abs(self.motions_of_unknowns).max()
         )
 
+    def _forces_on_unknowns(self, contact: FloatArray) -> FloatArray:
+        """Return the forces (n_unknowns,) on the unknowns of nodal forces (2 n_contact,) [N/m]."""
+        tangents, forces = self.following_tangents, contact[self.unknown_dofs]
+        return forces if tangents is None else forces + contact[2 * tangents.nodes + 1] @ tangents.response
+
     def _followed(self, unknowns: FloatArray) -> FloatArray:
-        """Return the displacements of the eliminated tangents."""
-        tangents = self.eliminated_tangents
+        """Return the displacements of the tangents that follow."""
+        tangents = self.following_tangents
         return np.zeros(0) if tangents is None else tangents.at_rest + tangents.response @ unknowns
 
     def _stray_forces(self, state: ContactState, unknowns: FloatArray) -> float:
-        """Return the largest force on an eliminated tangent, or what a displacement that does not follow would take."""
-        rows = self.tangent_is_eliminated
-        force = np.abs(state.sigma_t[rows])
-        force += self.stiffness_scale * np.abs(state.u_t[rows] - self._followed(unknowns))
-        return float(np.max(self.weights[rows] * force, initial=0.0))
+        """Return the largest force that a tangential displacement which does not follow would take."""
+        rows = self.tangent_follows
+        missed = np.abs(state.u_t[rows] - self._followed(unknowns))
+        return float(np.max(self.weights[rows] * self.stiffness_scale * missed, initial=0.0))
 
     def _solved(self, conditions: LinearConditions, unknowns: FloatArray, is_given: BoolArray) -> FloatArray:
         """Solve ``(A_u + A_t T) u = c + A_t t_free`` for the displacements that are not given, every row scaled to one.
@@ -293,16 +311,3 @@ class DenseBody(LinearBody):
     def _probe(self) -> FloatArray:
         """(n_unknowns,) array around one: not orthogonal to rigid motions, and without any pattern."""
         return 0.5 + spread_fractions(self.n_unknowns)
-
-
-def refuse_other_tangents(conditions: LinearConditions, is_eliminated: BoolArray) -> None:
-    """Raise InputError if conditions ask more of an eliminated tangent (n_contact,) than ``sigma_t = 0``."""
-    on_displacement, on_traction = conditions.on_displacement, conditions.on_traction
-    asks_more = np.any(on_displacement[:, 1] != 0.0, axis=1) | (on_displacement[:, 0, 1] != 0.0)
-    asks_more |= (on_traction[:, 1, 0] != 0.0) | (on_traction[:, 1, 1] == 0.0) | (conditions.value[:, 1] != 0.0)
-    if np.any(asks_more & is_eliminated):
-        node = int(np.argmax(asks_more & is_eliminated))
-        raise InputError(
-            f"contact node {node} is without friction, and its tangential displacement is eliminated: give "
-            "sigma_t = 0 as the second condition there, or ask ContactProblem.respond, which does"
-        )

@@ -9,9 +9,8 @@ import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray, IntArray, spread_fractions
 from bemkit.contact.body import ContactState, LinearBody, SingularResponse
-from bemkit.contact.condensation.dense_body import refuse_other_tangents
-from bemkit.contact.condensation.nodes import ContactNodes, free_motions, held_nodes
-from bemkit.contact.condensation.reduction import NoContactNodesError
+from bemkit.contact.condensation.held_friction import HeldFriction
+from bemkit.contact.condensation.nodes import ContactNodes, NoContactNodesError, free_motions, held_nodes
 from bemkit.contact.conditions import LinearConditions, stick
 from bemkit.geometry.spaces import dof_points
 from bemkit.operators.counts import OperationCounts
@@ -41,8 +40,8 @@ class ElementConditions:
     ----------
     of_traction, of_displacement : (n_contact, 2, 2) arrays
         ``sigma = of_traction @ t``, where t is the force of an element or node by its weight, and
-        ``u = of_displacement @ u_local``. Where a support holds a node in one direction, what acts there is its
-        reaction: the pressure is what the other one tells, and there is no friction.
+        ``u = of_displacement @ u_local``. Where a support holds a node in one direction, sigma_n is the effective
+        pressure on the other one, see `bemkit.contact.condensation.held_friction`, and sigma_t is zero.
     is_held : (n_contact,) bool array
         These nodes.
     support : (n_contact, 2) array
@@ -115,8 +114,7 @@ class HierarchicalBody(LinearBody):
     Notes
     -----
     A response factors the leaves of the tree whose conditions differ from those of the last one, and what lies above
-    them. Tangents are eliminated where supports hold the node alone: other frictionless nodes have the condition
-    ``sigma_t = 0`` like any other.
+    them.
     """
 
     loaded: LoadedSystem
@@ -151,15 +149,18 @@ class HierarchicalBody(LinearBody):
         """E' by the median length of a node [Pa/m]."""
         return self.loaded.map.material.plane_modulus / float(np.median(self.weights))
 
-    @cached_property
-    def is_held(self) -> BoolArray:
-        """(n_contact,) bool array: nodes that a support holds in one direction, which have no friction of their own."""
-        return held_nodes(self.conditions, self.nodes)
-
     @property
-    def tangent_is_eliminated(self) -> BoolArray:
-        """(n_contact,) bool array: the same."""
-        return self.is_held
+    def tangent_follows(self) -> BoolArray:
+        """(n_contact,) bool array: nodes that a support holds in one direction."""
+        return self._elements.is_held
+
+    @cached_property
+    def _held_friction(self) -> HeldFriction:
+        """How friction acts at these nodes."""
+        elements = self._elements
+        moving = np.where(elements.support[:, None] == 0.0, elements.of_displacement, 0.0).sum(axis=2)
+        slope = np.divide(moving[:, 1], moving[:, 0], out=np.zeros(len(moving)), where=elements.is_held)
+        return HeldFriction(elements.is_held, slope)
 
     @property
     def work(self) -> OperationCounts:
@@ -174,12 +175,12 @@ class HierarchicalBody(LinearBody):
         -----
         Prescribed displacements, zero tractions and slip tractions are met exactly, as by `DenseBody`.
         """
-        refuse_other_tangents(conditions, self.tangent_is_eliminated)
         if len(conditions.free_motions(self.rigid_motions())):
             raise SingularResponse("the contact conditions leave a rigid motion free")
         self._fields.clear()
-        state = self._solved(conditions)
-        self._responses.append(_Response(state, conditions, self._moving.system.n_answers))
+        substituted = self._held_friction.substituted(conditions)
+        state = self._held_friction.restored(conditions, self._solved(substituted))
+        self._responses.append(_Response(state, substituted, self._moving.system.n_answers))
         del self._responses[:-_KEPT]
         return state
 
@@ -230,7 +231,8 @@ class HierarchicalBody(LinearBody):
         of_contact = (fields.force - self.force) / loaded.map.mesh.lengths[:, None]
         at_nodes = self.conditions.in_frames(of_contact)[self.nodes.nodes]
         at_nodes = np.einsum("nij,nj->ni", self._elements.of_traction, at_nodes)
-        missing = float(np.abs(self.weights[:, None] * (state.traction - at_nodes)).max())
+        acting = self._held_friction.effective(state.traction)
+        missing = float(np.abs(self.weights[:, None] * (acting - at_nodes)).max())
         largest = max(float(np.abs(fields.force).max()), float((self.weights[:, None] * np.abs(state.traction)).max()))
         terms = loaded.map.material.plane_modulus * float(np.abs(fields.displacement).max())
         if inside is None and not self.force.any() and largest <= self.accuracy * terms:
@@ -316,7 +318,7 @@ class HierarchicalBody(LinearBody):
             self._travelled[:] = [loaded.moved(travel)]
         response = self._elements.of_contact(state[:, :2] + traction, state[:, 2:] + moved)
         met = conditions.with_given_tractions(response.traction)
-        met[self.is_held, 1] = 0.0
+        met[self.tangent_follows, 1] = 0.0
         return ContactState(conditions.with_given_displacements(response.displacement), met)
 
 

@@ -1,9 +1,4 @@
-"""The displacement nodes on a contact boundary, what is known at each of them, and which of them keep two unknowns.
-
-Where a law is frictionless no traction acts along the tangent, so that this displacement is eliminated with the rest of
-the body and follows the unknowns. A few of these tangents are retained if normals, friction and supports alone would
-leave the body free to move, or nearly so: what is eliminated has to be held.
-"""
+"""The displacement nodes on a contact boundary, and what supports and obstacles give at each of them."""
 
 from __future__ import annotations
 
@@ -14,6 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray, IntArray
+from bemkit.errors import InputError
 from bemkit.geometry.spaces import BoundarySpace, element_nodes
 from bemkit.geometry.vectors import turned_left
 from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions, Support, free_modes, supported
@@ -21,11 +17,10 @@ from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions, 
 APPROACH_TOLERANCE = 1e-3
 """Cosine of the angle between the one direction in which a supported node can move and the direction of contact below
 which contact there is left to the support: it would have to slide a thousand times as far as it closes the gap."""
-LEAST_RETAINED_SHARE = 0.03
-"""A rigid motion whose share in the retained directions is less than this is held too weakly by them: eliminating the
-rest then loses the square of it in digits."""
-RANK_TOLERANCE = 1e-9
-"""A combination of motions that moves the contact nodes by less than this share of the others moves none of them."""
+
+
+class NoContactNodesError(InputError):
+    """A contact boundary whose nodes are all held by supports."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,15 +40,12 @@ class ContactNodes:
         ``(-d_y, d_x)``. Where contact acts along the body's normal these are the outward normal and the tangent.
     weights : (n_contact,) array [m]
         Length of boundary that belongs to each node.
-    is_frictionless : (n_contact,) bool array
-        Nodes whose friction law knows no friction.
     """
 
     nodes: IntArray
     points: FloatArray
     frame: FloatArray
     weights: FloatArray
-    is_frictionless: BoolArray
 
     @property
     def directions(self) -> FloatArray:
@@ -120,7 +112,7 @@ def contact_conditions(
     Returns
     -------
     conditions : NodalConditions
-        Their retained directions are the unknowns of the contact system, but for tangents that supports hold.
+        Contact nodes are retained in all directions that no support holds.
     contact : ContactNodes
         The candidates that can touch. The others are left to their supports, which let them move neither towards the
         obstacle nor away from it.
@@ -134,11 +126,12 @@ def contact_conditions(
     motion = np.where(conditions.is_fixed[candidates.nodes][:, :, None], 0.0, conditions.frame[candidates.nodes])
     approach = np.abs(np.einsum("nkc,nc->nk", motion, candidates.directions)).max(axis=1)
     contact = candidates.take(approach > APPROACH_TOLERANCE)
-    has_tangent = ~contact.is_frictionless
-    if not has_tangent.all():
-        motions = free_motions(conditions, contact, space)
-        has_tangent = retained_tangents(motions, contact.is_frictionless, bound_tangents(conditions, contact))
-    return _opened(conditions, contact, has_tangent), contact
+    # the frame of a node is that of contact, unless a support or the first of two obstacles has given it another one
+    frame, is_retained = conditions.frame.copy(), conditions.is_retained.copy()
+    is_own = ~held_nodes(conditions, contact) & ~contact.is_second
+    frame[contact.nodes[is_own]] = contact.frame[is_own]
+    is_retained[contact.nodes] = ~conditions.is_fixed[contact.nodes]
+    return replace(conditions, frame=frame, is_retained=is_retained), contact
 
 
 def held_nodes(conditions: NodalConditions, contact: ContactNodes) -> BoolArray:
@@ -146,94 +139,19 @@ def held_nodes(conditions: NodalConditions, contact: ContactNodes) -> BoolArray:
     return np.asarray(np.any(conditions.is_fixed[contact.nodes], axis=1))
 
 
-def bound_tangents(conditions: NodalConditions, contact: ContactNodes) -> BoolArray:
+def following_tangents(conditions: NodalConditions, contact: ContactNodes) -> BoolArray:
     """Return (n_contact,) bool: nodes without a tangential displacement of their own.
 
-    A support holds it, or it is given by the displacements towards two obstacles.
+    It follows from the one normal displacement of the node where a support holds the other direction, and between two
+    obstacles from the displacements towards both.
     """
     return held_nodes(conditions, contact) | contact.is_shared
-
-
-def _opened(conditions: NodalConditions, contact: ContactNodes, has_tangent: BoolArray) -> NodalConditions:
-    """Open the directions of contact of the contact nodes, and the tangential ones of some, that no support fixes."""
-    frame, is_retained = conditions.frame.copy(), conditions.is_retained.copy()
-    unsupported = ~held_nodes(conditions, contact)
-    is_first = unsupported & ~contact.is_second
-    frame[contact.nodes[is_first]] = contact.frame[is_first]
-    is_retained[contact.nodes] = ~conditions.is_fixed[contact.nodes]
-    is_retained[contact.nodes[unsupported & ~has_tangent & ~contact.is_shared], 1] = False
-    return replace(conditions, frame=frame, is_retained=is_retained)
 
 
 def free_motions(conditions: NodalConditions, contact: ContactNodes, space: BoundarySpace) -> FloatArray:
     """Return the rigid motions (n_motions, n_contact, 2) that no support resists, in (n, t) components.
 
-    Bound tangential components are zero. An exterior, at rest far away, has none of these motions.
+    An exterior, at rest far away, has none of these motions.
     """
-    return at_contact(free_modes(space, conditions), conditions, contact)
-
-
-def at_contact(modes: FloatArray, conditions: NodalConditions, contact: ContactNodes) -> FloatArray:
-    """Return motions (n_motions, n_contact, 2) in (n, t) components from those of all nodes; see `free_motions`."""
-    motions: FloatArray = np.einsum("nkc,jnc->jnk", contact.frame, modes[:, contact.nodes])
-    motions[:, bound_tangents(conditions, contact), 1] = 0.0
+    motions: FloatArray = np.einsum("nkc,jnc->jnk", contact.frame, free_modes(space, conditions)[:, contact.nodes])
     return motions
-
-
-def find_tangents(conditions: NodalConditions, contact: ContactNodes) -> BoolArray:
-    """Return (n_contact,) bool: where the tangential displacement is eliminated, and follows the unknowns.
-
-    That is at nodes without friction, but for the few that are retained, wherever a support holds the node (what acts
-    there along the tangent cannot be told from the reaction of the support), and between two obstacles.
-    """
-    return np.asarray(~np.all(conditions.is_retained[contact.nodes], axis=1)) | contact.is_shared
-
-
-def unknown_directions(conditions: NodalConditions, contact: ContactNodes) -> BoolArray:
-    """Return (n_contact, 2) bool: which direction of the frame of its node makes each unknown.
-
-    Of a node that stands in two rows the first direction belongs to the first row, the second one to the other.
-    """
-    is_unknown = conditions.is_retained[contact.nodes]
-    is_unknown[contact.is_shared, 1] = False
-    is_unknown[contact.is_second] = (False, True)
-    return is_unknown
-
-
-def retained_tangents(motions: FloatArray, is_frictionless: BoolArray, is_bound: BoolArray) -> BoolArray:
-    """Return (n_contact,) bool: the contact nodes whose tangential displacement is an unknown.
-
-    These are all nodes with friction, and at most as many others as there are `motions` (n_motions, n_contact, 2) that
-    no support holds, in (n, t) components of any size. Nodes that a support holds have no tangent of their own.
-    """
-    is_retained = ~is_frictionless
-    if not motions.size or is_retained.all():
-        return is_retained
-    motions = _of_unit_size(motions)
-    normal, tangential = motions[:, :, 0].T, motions[:, :, 1].T  # (n_contact, n_motions)
-    held = np.concatenate([normal, tangential[is_retained & ~is_bound]])
-    _, singular, directions = np.linalg.svd(np.linalg.qr(held, mode="r"), full_matrices=True)
-    sizes = np.zeros(len(motions))
-    sizes[: singular.size] = singular
-    weak = directions[sizes < LEAST_RETAINED_SHARE * np.sqrt(len(held))]
-    along = np.where((is_frictionless & ~is_bound)[:, None], tangential @ weak.T, 0.0)
-    for _ in weak:  # the tangents that feel most of what is still free
-        sizes = np.linalg.norm(along, axis=1)
-        if sizes.max(initial=0.0) < LEAST_RETAINED_SHARE:
-            break
-        node = int(np.argmax(sizes))
-        is_retained[node] = True
-        unit = along[node] / sizes[node]
-        along = along - np.outer(along @ unit, unit)
-    return is_retained
-
-
-def _of_unit_size(motions: FloatArray) -> FloatArray:
-    """Return motions that span the same, orthogonal and of mean size one at the contact nodes.
-
-    Of a body that touches along a small part of its boundary all rotations are nearly translations there.
-    """
-    columns = motions.reshape(len(motions), -1).T
-    basis, sizes, _ = np.linalg.svd(columns, full_matrices=False)
-    basis = basis[:, sizes > RANK_TOLERANCE * sizes[0]]
-    return np.asarray(np.sqrt(motions.shape[1]) * basis.T.reshape(-1, *motions.shape[1:]))

@@ -11,15 +11,15 @@ from scipy import sparse
 
 from bemkit.arrays import BoolArray, FloatArray, IntArray
 from bemkit.contact.body import ContactState
-from bemkit.contact.condensation.nodes import retained_tangents
+from bemkit.contact.condensation.held_friction import HeldFriction
 from bemkit.contact.conditions import null_space
 from bemkit.contact.joined.member import Member, Shape, blocks_of_members, deformation, shapes_of
 from bemkit.errors import InputError
 
 _ROUNDS = 2
 """Times that rigid motions are fitted: normal equations hold half of the digits, which is too few for stiff bodies."""
-_FEW_MOTIONS = 60
-"""Largest number of rigid motions that are treated as a dense array when eliminated tangents are taken back."""
+_DEPENDENT = 1e-12
+"""Squared sine of the angle between the two rows of a node below which one displacement gives both components."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,7 +28,7 @@ class CoupledMembers:
 
     Parameters
     ----------
-    members, relative, offset, weights, tangent_is_eliminated
+    members, relative, offset, weights, tangent_follows
         See `bemkit.contact.joined.joined_bodies.JoinedBodies`.
     """
 
@@ -36,17 +36,17 @@ class CoupledMembers:
     relative: sparse.csr_array
     offset: FloatArray
     weights: FloatArray
-    tangent_is_eliminated: BoolArray = None  # type: ignore[assignment]  # a value, to hide the property of the protocol
+    tangent_follows: BoolArray = None  # type: ignore[assignment]  # a value, to hide the property of the protocol
 
     def __post_init__(self) -> None:
         n_contact, n = len(self.weights), sum(member.n_components for member in self.members)
         relative = sparse.csr_array(self.relative)
-        if self.tangent_is_eliminated is None:
-            object.__setattr__(self, "tangent_is_eliminated", np.zeros(n_contact, bool))
+        if self.tangent_follows is None:
+            object.__setattr__(self, "tangent_follows", np.zeros(n_contact, bool))
         for name, array, shape in (
             ("relative", relative, (2 * n_contact, n)),
             ("offset", self.offset, (2 * n_contact,)),
-            ("tangent_is_eliminated", self.tangent_is_eliminated, (n_contact,)),
+            ("tangent_follows", self.tangent_follows, (n_contact,)),
         ):
             if array.shape != shape:
                 raise InputError(f"{name} has the shape {array.shape}; {n_contact} contact nodes need {shape}")
@@ -59,7 +59,7 @@ class CoupledMembers:
             raise InputError(f"weights has the entry {self.weights.min():g}; the length of a node is positive")
         object.__setattr__(self, "relative", relative)
         self._check_held()
-        object.__setattr__(self, "tangent_is_eliminated", self._eliminated_tangents())
+        object.__setattr__(self, "tangent_follows", self.tangent_follows | ~np.isnan(self.tangents[0]))
 
     @property
     def n_contact(self) -> int:
@@ -202,24 +202,18 @@ class CoupledMembers:
             f"nothing holds {names}: no support, and no contact with anything that is held; make contacts or supports"
         )
 
-    def _eliminated_tangents(self) -> BoolArray:
-        """Return the eliminated tangents without those that are needed to hold the members."""
-        is_eliminated = np.array(self.tangent_is_eliminated, bool)
-        if not is_eliminated.any():
-            return is_eliminated
-        columns = sparse.csr_array(self.relative_motions.T)
-        if columns.shape[1] <= _FEW_MOTIONS:  # a round pin that turns moves its contact nodes by round-off only
-            motions = columns.toarray().T.reshape(-1, self.n_contact, 2)
-            is_bound = ~np.any(motions[:, :, 1], axis=0)
-            return is_eliminated & ~retained_tangents(motions, is_eliminated, is_bound)
-        is_kept = np.ones((self.n_contact, 2), bool)
-        is_kept[is_eliminated, 1] = False
-        free = null_space(sparse.csr_array(columns[is_kept.ravel()]))
-        if free.shape[0]:
-            from scipy.linalg import qr
+    @cached_property
+    def tangents(self) -> tuple[FloatArray, FloatArray]:
+        """(n_contact,) arrays: slope and constant of ``w_t = slope w_n + constant``, NaN where both are independent."""
+        normal, tangential = self.relative[0::2], self.relative[1::2]
+        squares, product, other = (
+            np.asarray(array.sum(axis=1)) for array in (normal * normal, normal * tangential, tangential * tangential)
+        )
+        is_dependent = squares * other - product**2 <= _DEPENDENT * squares * np.maximum(other, squares)
+        slope = np.where(is_dependent, product, np.nan) / np.where(squares > 0.0, squares, 1.0)
+        return slope, self.offset[1::2] - slope * self.offset[0::2]
 
-            tangents = np.flatnonzero(is_eliminated)
-            tangential = (free @ columns[2 * tangents + 1].T).toarray()
-            _, order = qr(tangential, mode="r", pivoting=True)
-            is_eliminated[tangents[order[: free.shape[0]]]] = False
-        return is_eliminated
+    @cached_property
+    def held_friction(self) -> HeldFriction:
+        """How friction acts where the tangent follows."""
+        return HeldFriction(self.tangent_follows, self.tangents[0])

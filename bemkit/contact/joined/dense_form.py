@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from bemkit.arrays import FloatArray
-from bemkit.contact.condensation.dense_body import DenseBody, EliminatedTangents
+from bemkit.contact.condensation.dense_body import DenseBody, FollowingTangents
 from bemkit.contact.joined.coupled_members import CoupledMembers
 from bemkit.operators.linear.dense import DenseLU
 
@@ -30,16 +30,16 @@ class RelativeStiffness:
     -----
     With the flexibility G of the members, their motions R and the coupling B the unknowns p (nodal forces) and a
     (motions) solve ``B G B^T p + B R a = w - o - B G f`` and ``R^T B^T p = -R^T f``; the inverse of this matrix holds
-    the stiffness of w. Rows of eliminated tangents are left out: there p = 0, and w follows.
+    the stiffness of w. The rows of tangents that follow are no equations.
     """
 
     def __init__(self, joined: CoupledMembers) -> None:
         is_kept = np.ones((joined.n_contact, 2), bool)
-        is_kept[joined.tangent_is_eliminated, 1] = False
+        is_kept[joined.tangent_follows, 1] = False
         self._is_kept = is_kept.ravel()
         self._coupling = joined.relative[self._is_kept]
         self._followers = joined.relative[~self._is_kept]
-        self._is_eliminated = joined.tangent_is_eliminated
+        self._follows, self._slope = joined.tangent_follows, joined.tangents[0][joined.tangent_follows]
         self._unit_deformation = joined.deformation(self._coupling.T.toarray())
         n_kept, motions = self._coupling.shape[0], (self._coupling @ joined.motions).toarray()
         n_motions = motions.shape[1]
@@ -68,26 +68,35 @@ class RelativeStiffness:
             load=-at_rest[:n_kept],
             weights=joined.weights,
             motions=(joined.relative @ joined.motions).T.toarray().reshape(-1, joined.n_contact, 2),
-            eliminated_tangents=self._eliminated(joined, loaded, at_rest),
+            following_tangents=self._followed(joined, loaded, at_rest),
             modulus=joined.stiffness_scale * float(np.median(joined.weights)),
         )
 
-    def _eliminated(self, joined: CoupledMembers, loaded: FloatArray, at_rest: FloatArray) -> EliminatedTangents | None:
-        if not self._is_eliminated.any():
+    def _followed(self, joined: CoupledMembers, loaded: FloatArray, at_rest: FloatArray) -> FollowingTangents | None:
+        if not self._follows.any():
             return None
         n_kept = self._coupling.shape[0]
         displacement = joined.offset[~self._is_kept] + self._followers @ loaded
         displacement = displacement + self._by_force @ at_rest[:n_kept] + self._following_motions @ at_rest[n_kept:]
-        return EliminatedTangents(np.flatnonzero(self._is_eliminated), self._following, displacement)
+        slope, constant = (array[self._follows] for array in joined.tangents)
+        return FollowingTangents(
+            np.flatnonzero(self._follows), self._following, np.where(np.isnan(slope), displacement, constant)
+        )
 
     @cached_property
     def _by_force(self) -> FloatArray:
-        """(n_eliminated, n_kept) array: displacements of eliminated tangents by unit forces."""
+        """(n_following, n_kept) array: displacements of tangents that follow by unit forces."""
         return np.asarray(self._followers @ self._unit_deformation)
 
     @cached_property
     def _following(self) -> FloatArray:
-        """(n_eliminated, n_kept) array: displacements of eliminated tangents by unit kept relative displacements."""
+        """(n_following, n_kept) array: displacements of tangents that follow by unit kept relative displacements."""
         n_kept = self._coupling.shape[0]
         by_motions = self._following_motions @ self._inverse[n_kept:, :n_kept]
-        return np.asarray(self._by_force @ self._stiffness + by_motions)
+        response = np.asarray(self._by_force @ self._stiffness + by_motions)
+        # where the normal displacement of the node itself gives the tangent nothing else takes part, not by round-off
+        own = np.flatnonzero(~np.isnan(self._slope))
+        response[own] = 0.0
+        normal = np.cumsum(self._is_kept)[2 * np.flatnonzero(self._follows)] - 1
+        response[own, normal[own]] = self._slope[own]
+        return response

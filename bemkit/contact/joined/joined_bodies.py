@@ -10,7 +10,7 @@ import numpy as np
 
 from bemkit.arrays import FloatArray
 from bemkit.contact.body import ContactState, LinearBody, SingularResponse
-from bemkit.contact.condensation.dense_body import DenseBody, refuse_other_tangents
+from bemkit.contact.condensation.dense_body import DenseBody
 from bemkit.contact.conditions import LinearConditions, RigidMotions
 from bemkit.contact.joined.coupled_members import CoupledMembers
 from bemkit.contact.joined.dense_form import RelativeStiffness
@@ -49,9 +49,9 @@ class JoinedBodies(CoupledMembers, LinearBody):
     offset : (2 n_contact,) array [m]
         Relative displacements that supports prescribe.
     weights : (n_contact,) array [m]
-    tangent_is_eliminated : (n_contact,) bool array, optional
-        Nodes without friction, or whose tangent supports hold: ``sigma_t = 0`` there. Where nothing else would hold
-        the members a few of them are taken back. None by default.
+    tangent_follows : (n_contact,) bool array, optional
+        Nodes between two obstacles, whose tangential displacements follow from both normal ones. Those where one
+        displacement gives both components, because supports hold the others, are found from `relative`.
     is_dense : bool, optional
         Whether to form the dense stiffness of relative displacements; by default if there are few.
 
@@ -97,7 +97,7 @@ class JoinedBodies(CoupledMembers, LinearBody):
         """Return relative displacements and tractions; see `LinearBody.respond`."""
         if not self.is_costly:
             return self._refined(conditions, self._dense.respond(conditions))
-        refuse_other_tangents(conditions, self.tangent_is_eliminated)
+        self.held_friction.check(conditions)
         if conditions.free_motions(self.rigid_motions()).shape[0]:
             raise SingularResponse("the contact conditions leave a rigid motion free")
         return sparse_response(self, self._compliance, conditions)
@@ -142,10 +142,10 @@ class JoinedBodies(CoupledMembers, LinearBody):
         -------
         Imbalance
             `force` is the largest relative displacement that no deformation and no motion of the members explains, as
-            the force it would take (E' of the partner that yields more), or a force along an eliminated tangent;
-            `moment` the work of load and contact forces on a rigid motion of a member, of largest entry one. The first
-            is relative to the largest force on the lightest loaded member there, the second to the sum of all forces on
-            the member. Members that carry nothing are measured by a thousandth of the largest forces on any.
+            the force it would take (E' of the partner that yields more); `moment` the work of load and contact forces
+            on a rigid motion of a member, of largest entry one. The first is relative to the largest force on the
+            lightest loaded member there, the second to the sum of all forces on the member. Members that carry nothing
+            are measured by a thousandth of the largest forces on any.
         """
         contact = self.contact_forces(state)
         displacement, missed = self.recover(state)
@@ -169,9 +169,7 @@ class JoinedBodies(CoupledMembers, LinearBody):
         total = np.maximum(total, LIGHTEST * total.max())
 
         at_contact = self.least_of_partners(largest)
-        stray = np.where(self.tangent_is_eliminated, self.weights * np.abs(state.sigma_t), 0.0)
         missing = np.abs(missed) * per_length / at_contact
-        missing[1::2] = np.maximum(missing[1::2], stray / at_contact[1::2])
         motions, owner = self.motions, self.motion_owner
         size = abs(motions).max(axis=0).toarray().ravel() if len(owner) else np.zeros(0)
         work = np.abs(motions.T @ (contact + self.load)) / size / total[owner]

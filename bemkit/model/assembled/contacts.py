@@ -16,6 +16,8 @@ from bemkit.contact.mortar.facing import find_facing, is_non_mortar
 from bemkit.contact.mortar.sides import ContactSide
 from bemkit.errors import InputError
 from bemkit.geometry.mesh import BoundaryMesh
+from bemkit.geometry.reflection import antisymmetric_dofs
+from bemkit.geometry.spaces import BoundarySpace
 from bemkit.geometry.symmetry import Symmetry
 from bemkit.model.assembled.placed import PlacedBody
 from bemkit.model.contact_data import FacingPart, find_contact
@@ -67,8 +69,10 @@ class ContactRows:
         Of a rigid body how its motions displace what the nodes may touch.
     elements, other_elements : int arrays
         Of both sides; none of a rigid obstacle.
-    is_held : (n,) bool array
-        Where a support holds the node in one direction: there is no friction of its own.
+    tangent_follows : (n,) bool array
+        Where a support, or a second obstacle in a corner, gives the tangential displacement.
+    is_on_line : (n,) bool array
+        Where the node lies on a symmetry line across its tangent: neither slips nor carries friction.
     """
 
     name: str
@@ -86,7 +90,8 @@ class ContactRows:
     on_other: sparse.csr_array | FloatArray | None
     elements: IntArray
     other_elements: IntArray
-    is_held: BoolArray
+    tangent_follows: BoolArray
+    is_on_line: BoolArray
 
     @property
     def n_contact(self) -> int:
@@ -188,6 +193,7 @@ def body_rows(
         for number, name, one in ordered[k]:
             for node in nodes_on(one.space, one.elements)[0].tolist():
                 taken[number].setdefault(node, name)
+        on_line = nodes_on_lines(side.space)[coupling.nodes]
         found[k] = ContactRows(
             pairs[k].name,
             assembly.law_of(pairs[k]),
@@ -204,9 +210,17 @@ def body_rows(
             sparse.csr_array(coupling.on_mortar),
             side.elements,
             other_side.elements,
-            np.asarray(conditions[first].is_fixed[coupling.nodes].any(axis=1)),
+            on_line,
+            on_line,
         )
     yield from (found[k] for k in range(len(pairs)))
+
+
+def nodes_on_lines(space: BoundarySpace) -> BoolArray:
+    """Return (n_nodes,) bool: nodes of a space that lie on a symmetry line of its mesh."""
+    if space.mesh.symmetry is None:
+        return np.zeros(space.n_dofs // 2, bool)
+    return np.asarray(antisymmetric_dofs(space).reshape(-1, 2).any(axis=1))
 
 
 _NamedSide = tuple[int, str, ContactSide]
@@ -290,6 +304,7 @@ def obstacle_rows(
                 gap, on_other = gap + pair.gap, assembly.rigid[k].motions_at(touched)
             else:
                 title, part, law, other, on_other = f"{body.name}.{name}", name, body.scene.laws[name], -1, None
+            is_held = fixed[nodes.nodes].any(axis=1)
             yield ContactRows(
                 title,
                 law,
@@ -306,7 +321,8 @@ def obstacle_rows(
                 on_other,
                 body.mesh.part(part),
                 np.zeros(0, np.intp),
-                fixed[nodes.nodes].any(axis=1) | nodes.is_shared,
+                nodes.is_shared | (is_held & (on_other is None or not assembly.rigid[k].is_driven.any())),
+                np.zeros(nodes.nodes.size, bool),
             )
 
 

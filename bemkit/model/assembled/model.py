@@ -64,11 +64,9 @@ class AssembledModel:
         )
         maps = [map_.weightless if isinstance(map_, HeavyElasticity) else map_ for map_ in self.elastic]
         elastic = _loaded(maps, prepared.insides)
-        offset, is_eliminated = _offset(prepared), prepared.tangent_is_eliminated
+        offset = _offset(prepared)
         loads = [*(map_.load for map_ in condensed), *(member.load for member in rigid_members(prepared))]
         body = self.body.under(loads, offset)
-        if not np.array_equal(is_eliminated, self.prepared.tangent_is_eliminated):
-            body = replace(body, tangent_is_eliminated=is_eliminated)
         added = sum((condensed[group[0]].work for group in groups(prepared.bodies)), OperationCounts())
         return AssembledModel(prepared, elastic, condensed, body, _problem(prepared, body), self.work + added)
 
@@ -244,10 +242,10 @@ def build_assembled_model(prepared: PreparedAssembly, executor: Executor | None 
         relative=_relative(prepared),
         offset=_offset(prepared),
         weights=prepared.column("weights") / prepared.units.length,
-        tangent_is_eliminated=prepared.tangent_is_eliminated,
+        tangent_follows=prepared.tangent_follows,
     )
-    n_eliminated = int(np.count_nonzero(prepared.tangent_is_eliminated))
-    work += OperationCounts(contact_unknowns=2 * prepared.n_contact - n_eliminated)
+    n_following = int(np.count_nonzero(prepared.tangent_follows))
+    work += OperationCounts(contact_unknowns=2 * prepared.n_contact - n_following)
     loaded_maps = _loaded(elastic, prepared.insides)
     return AssembledModel(prepared, loaded_maps, tuple(condensed), joined, _problem(prepared, joined), work)
 
@@ -304,9 +302,13 @@ def _prescribed(body: PlacedBody, conditions: NodalConditions) -> FloatArray:
 
 
 def _frames(prepared: PreparedAssembly) -> sparse.csr_array:
-    """Return the matrix from displacements in x and y at the contact nodes to (n, t) components."""
-    n = prepared.n_contact
-    return sparse.csr_array(sparse.bsr_array((prepared.frame, np.arange(n), np.arange(n + 1)), shape=(2 * n, 2 * n)))
+    """Return the matrix from displacements in x and y at the contact nodes to (n, t) components.
+
+    On a symmetry line the images of both bodies cancel what is left of the tangential component.
+    """
+    n, frame = prepared.n_contact, prepared.frame.copy()
+    frame[prepared.is_on_line, 1] = 0.0
+    return sparse.csr_array(sparse.bsr_array((frame, np.arange(n), np.arange(n + 1)), shape=(2 * n, 2 * n)))
 
 
 def _coupling(prepared: PreparedAssembly) -> sparse.csr_array:

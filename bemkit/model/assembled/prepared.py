@@ -115,23 +115,27 @@ class PreparedAssembly:
         for rows in self.rows:
             numbers = first + np.arange(rows.n_contact)
             first += rows.n_contact
-            for law, chosen in ((rows.law, ~rows.is_held), (Frictionless(), rows.is_held)):
-                if not chosen.any():
-                    continue
-                is_uniform = isinstance(law, LawOfCoefficients) and law.is_uniform
-                try:
-                    evaluated = law if is_uniform else law.at(rows.points[chosen])
-                except ValueError as error:
-                    raise LawError(f"contact {rows.name!r}: friction law: {error}") from error
-                laws.setdefault(law if is_uniform else first, (evaluated, []))[1].append(numbers[chosen])
+            if not rows.n_contact:
+                continue
+            is_uniform = isinstance(rows.law, LawOfCoefficients) and rows.law.is_uniform
+            try:
+                evaluated = rows.law if is_uniform else rows.law.at(rows.points)
+            except ValueError as error:
+                raise LawError(f"contact {rows.name!r}: friction law: {error}") from error
+            laws.setdefault(rows.law if is_uniform else first, (evaluated, []))[1].append(numbers)
         if len(laws) < 2:
             return next((law for law, _ in laws.values()), Frictionless())
         return PiecewiseLaw(*zip(*((law, np.concatenate(nodes)) for law, nodes in laws.values()), strict=True))
 
     @property
-    def tangent_is_eliminated(self) -> BoolArray:
-        """(n_contact,) bool array: nodes without friction, or held by a support."""
-        return np.concatenate([np.zeros(0, bool), *(rows.is_held | rows.law.is_frictionless for rows in self.rows)])
+    def tangent_follows(self) -> BoolArray:
+        """(n_contact,) bool array: nodes whose tangential displacement a support or a second obstacle gives."""
+        return np.concatenate([np.zeros(0, bool), *(rows.tangent_follows for rows in self.rows)])
+
+    @property
+    def is_on_line(self) -> BoolArray:
+        """(n_contact,) bool array: nodes of contacts between bodies that lie on a symmetry line."""
+        return np.concatenate([np.zeros(0, bool), *(rows.is_on_line for rows in self.rows)])
 
     def map_data(self, number: int) -> GivenData:
         """Return the forces and displacements under which the map of a body is solved; see `given_data`."""

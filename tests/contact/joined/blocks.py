@@ -88,7 +88,7 @@ def rectangle(width, height, per_unit, **material):
     return Block(corners, round(2 * per_unit * (width + height)), **material)
 
 
-def joined(members, angles, pairs, *, is_frictionless=None, offset=None, **options):
+def joined(members, angles, pairs, *, offset=None, **options):
     """Join members by pairs of nodes: rows (a, node, b, node, n_x, n_y, weight), b = -1 for a rigid foundation."""
     pairs = np.asarray(pairs, float)
     a, i, b, j = pairs[:, :4].astype(int).T
@@ -106,13 +106,11 @@ def joined(members, angles, pairs, *, is_frictionless=None, offset=None, **optio
     entries = [np.concatenate([part.ravel() for part in parts]) for parts in (values, rows, columns)]
     relative = sparse.csr_array((entries[0], (entries[1], entries[2])), (2 * len(pairs), first[-1]))
     relative.eliminate_zeros()
-    none = np.zeros(len(pairs), bool)
     return JoinedBodies(
         tuple(members),
         relative,
         np.zeros(2 * len(pairs)) if offset is None else offset,
         pairs[:, 6],
-        none if is_frictionless is None else none | is_frictionless,
         **options,
     )
 
