@@ -18,7 +18,8 @@ from typing import NamedTuple
 import numpy as np
 
 from bemkit.arrays import IntArray, read_only
-from bemkit.contact.problem import ContactProblem, ContactState, certificate_scales
+from bemkit.contact.certificate import Scales
+from bemkit.contact.problem import ContactProblem, ContactState
 from bemkit.errors import NoResultError
 from bemkit.geometry.meshing.discretise import Algebraic
 from bemkit.model.contact_model import Model, build_model
@@ -169,7 +170,7 @@ def _outer_steps(problem: ContactProblem, driver: AugmentedLagrangian) -> tuple[
     """Return outer steps and linear solves until the paper's criterion is met."""
     # The start has no tractions, and all its nodes overlap a little, so that they begin in contact: otherwise the first
     # active set would be empty and the floating body of Example 1 would not be held.
-    _, length = certificate_scales(problem, problem.sticking_state)
+    length = Scales.of(problem, problem.sticking_state).length
     overlap = np.stack([np.maximum(problem.gap, 0.0) + length, problem.slip_origin], axis=1)
     iterate = driver.init(problem, ContactState(overlap, np.zeros_like(overlap)))
     for step in range(1, driver.max_steps + 1):

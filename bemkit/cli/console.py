@@ -11,7 +11,7 @@ from rich.console import Console, Group
 from rich.table import Table
 from rich.text import Text
 
-from bemkit.contact.problem import Certificate
+from bemkit.contact.certificate import Certificate
 from bemkit.geometry.shapes import Shape
 from bemkit.operators.counts import OperationCounts
 from bemkit.plan import Plan

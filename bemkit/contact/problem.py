@@ -1,10 +1,10 @@
-"""The contact problem: a body, a gap, a friction law; and the certificate of a solution, numbers anyone can check."""
+"""The contact problem: a body, a gap, a friction law."""
 
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -17,31 +17,18 @@ from bemkit.contact.laws import FrictionLaw, LawError
 from bemkit.errors import InputError
 
 __all__ = [
-    "Certificate",
     "ContactProblem",
     "ContactState",
     "DenseBody",
     "LawError",
     "LinearBody",
     "SingularResponse",
-    "certificate_scales",
-    "certify",
 ]
 
 Result = TypeVar("Result")
 
-_ROUND_OFF = 1e-13
-"""Tractions below this share of those of the sticking state are round-off (450 eps) of the sums they come from. Larger
-ones count, however small they are."""
-_LARGEST_STICKING_RATIO = 100.0
-"""The tractions of the sticking state measure a state only up to this multiple of its own tractions. These are then
-known to 1e-7 at a tolerance of 1e-9, and to 1e-6 (the mean of an element) where few nodes carry all."""
 _RESTS = 1e-9
 """Slip below this share of the largest displacement is round-off of the frames of contact and support."""
-DEFORMED = 1e-3
-"""Share of its displacement that counts as deformation of a body without contact tractions. It lies above the round-off
-of the displacement at a tolerance of 1e-9, and below the deformation by a load under which the body gives way to an
-overlap."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -244,163 +231,3 @@ _BODY_MEMBERS = (
     *("respond", "rigid_motions", "rigid_load", "moving_bodies", "partners_of", "shares", "imbalance"),
 )
 _LAW_MEMBERS = ("bound", "bound_derivative", "is_frictionless", "acts_across_gap", "scaled")
-
-
-@dataclass(frozen=True)
-class Certificate:
-    """Largest violation of each condition over all contact nodes; all numbers are dimensionless and zero is perfect.
-
-    Parameters
-    ----------
-    penetration : float
-        ``u_n - g`` where positive.
-    tension : float
-        ``sigma_n`` where positive.
-    complementarity : float
-        The smaller of traction and distance to the obstacle: both are there where an open node carries traction.
-    cone_excess : float
-        ``|sigma_t| - bound(sigma_n)`` where positive, the bound taken at the *present* normal traction.
-    slip_opposition : float
-        The smaller of ``|slip|`` and ``|sigma_t + bound(sigma_n) sign(slip)|``: slip without full, opposing friction.
-    force_imbalance, moment_imbalance : float
-        Distance of all forces on the body from equilibrium, see `LinearBody.imbalance`.
-    round_off : float
-        No violation: how much of the two imbalances may be round-off, at most 1e-6.
-    """
-
-    penetration: float
-    tension: float
-    complementarity: float
-    cone_excess: float
-    slip_opposition: float
-    force_imbalance: float
-    moment_imbalance: float
-    round_off: float = 0.0
-
-    @property
-    def violations(self) -> dict[str, float]:
-        """The measured violations by name: all entries but `round_off`."""
-        return {name: value for name, value in self.as_dict().items() if name != "round_off"}
-
-    @property
-    def worst(self) -> float:
-        """The largest violation, round-off included; ``nan`` if any violation is."""
-        return float(np.max(list(self.violations.values())))
-
-    def is_below(self, tolerance: float) -> bool:
-        """Whether violations are at most `tolerance`, imbalances at most `tolerance + round_off`; never for ``nan``."""
-        allowed = {name: tolerance for name in self.violations}
-        for name in ("force_imbalance", "moment_imbalance"):
-            allowed[name] += self.round_off
-        return all(value <= allowed[name] for name, value in self.violations.items())
-
-    def as_dict(self) -> dict[str, float]:
-        """Return all numbers by name."""
-        return dict(vars(self))
-
-
-def certify(problem: ContactProblem, state: ContactState) -> Certificate:
-    """Measure how far a state violates conditions (6) to (8) of the paper and the equilibrium of the body.
-
-    Parameters
-    ----------
-    problem : ContactProblem
-    state : ContactState
-        Of any origin: it need not be a response of the body.
-
-    Returns
-    -------
-    Certificate
-
-    Raises
-    ------
-    LawError
-        If the friction law fails.
-
-    Notes
-    -----
-    Tractions are divided by a stress, distances and slips by a length:
-
-    * The stress is the largest traction of the state or of the sticking state (all nodes held), whichever is larger, so
-      that a nearly lifted body is judged by its load. It is at most a hundred times the largest traction of the state.
-    * At a node the stress is at most the largest nodal force divided by the weight of the node, so that the high
-      tractions of tiny elements in a corner do not loosen the test elsewhere.
-    * The length is the displacement that the largest nodal force causes at its node, ``force / E'``, however few nodes
-      carry it. It is at least 1e-6 of the largest displacement: further digits are round-off. So a far obstacle or a
-      long rigid motion does not loosen the test until it exceeds the length a million times.
-    * Of several bodies each contact is measured by the partner that carries less, down to a thousandth of what the
-      others carry: a light block is not judged by the heaviest. See `LinearBody.shares`.
-    * A state without tractions, such as that of a loose body which has given way to an overlap, has no length but its
-      displacement: a thousandth of it counts as deformation.
-    """
-    scales = _scales(problem, state)
-    stress = np.minimum(scales.stress, scales.force / problem.body.weights) * scales.share
-    length = np.maximum(scales.length * scales.share, scales.least_length)
-    clearance = problem.gap - state.u_n
-    slip = state.u_t - problem.slip_origin
-    # friction given across the gap is no sign of contact
-    shear = np.where(problem.law.acts_across_gap, 0.0, np.abs(state.sigma_t))
-    traction, distance = np.maximum(np.abs(state.sigma_n), shear) / stress, np.abs(clearance) / length
-    bound = problem.friction_bound(state.sigma_n, is_closed=traction > distance)
-    against_slip = np.where(slip > 0.0, state.sigma_t + bound, state.sigma_t - bound)
-    imbalance = problem.body.imbalance(state)
-    return Certificate(
-        penetration=_largest(-clearance / length),
-        tension=_largest(state.sigma_n / stress),
-        complementarity=_largest(np.minimum(traction, distance)),
-        cone_excess=_largest((np.abs(state.sigma_t) - bound) / stress),
-        slip_opposition=_largest(np.minimum(np.abs(slip) / length, np.abs(against_slip) / stress)),
-        force_imbalance=imbalance.force,
-        moment_imbalance=imbalance.moment,
-        round_off=imbalance.round_off,
-    )
-
-
-def certificate_scales(problem: ContactProblem, state: ContactState) -> tuple[float, float]:
-    """Return the largest traction [Pa] and the length [m] by which `certify` measures; see its notes."""
-    scales = _scales(problem, state)
-    return scales.stress, scales.length
-
-
-class _Scales(NamedTuple):
-    """What `certify` divides by: a stress [Pa], a nodal force [N/m], lengths [m], and the share of each node."""
-
-    stress: float
-    force: float
-    length: float
-    least_length: float
-    share: FloatArray
-
-
-def _scales(problem: ContactProblem, state: ContactState) -> _Scales:
-    weights, modulus = problem.body.weights, problem.modulus
-    largest_displacement = float(np.abs(state.displacement).max())
-    present, sticking = (np.abs(each.traction).max(axis=1) for each in (state, problem.sticking_state))
-    # Without tractions, friction that needs no pressure is one to be met, however small beside those of the sticking
-    # state. Tractions that are there are no larger because a law would allow more.
-    required = present if present.max() > _ROUND_OFF * sticking.max() else np.maximum(present, problem.cohesion)
-    if required.max() > _ROUND_OFF * sticking.max() and max(present.max(), sticking.max()) > 0.0:
-        # Holding a nearly incompressible body may take a million times the tractions of the solution. Measured by
-        # those, errors of the solution would not be seen.
-        stress, force = (
-            max(
-                float((factor * present).max()),
-                min(float((factor * sticking).max()), _LARGEST_STICKING_RATIO * float((factor * required).max())),
-            )
-            for factor in (1.0, weights)
-        )
-        least_length = 1e-6 * largest_displacement
-        share = problem.body.shares(
-            weights * np.maximum(present, np.minimum(sticking, _LARGEST_STICKING_RATIO * required))
-        )
-        return _Scales(stress, force, max(force / modulus, least_length), least_length, share)
-    # Contact carries nothing, so the displacement is the only length there is. A body that has not moved is measured by
-    # the force that would hold it or, if that is zero, by the gaps.
-    gaps = np.abs(problem.gap[np.isfinite(problem.gap)])
-    force = float((weights * sticking).max())
-    length = DEFORMED * largest_displacement or force / modulus or float(gaps.max(initial=0.0)) or 1.0
-    return _Scales(float(sticking.max()) or 1.0, force or float(weights.max()), length, length, np.ones(len(weights)))
-
-
-def _largest(values: FloatArray) -> float:
-    return float(np.maximum(values, 0.0).max())

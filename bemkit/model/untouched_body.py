@@ -9,8 +9,8 @@ import numpy as np
 
 from bemkit.arrays import FloatArray
 from bemkit.contact.body import ContactState, LinearBody
+from bemkit.contact.certificate import Certificate
 from bemkit.contact.conditions import LinearConditions
-from bemkit.contact.problem import Certificate
 from bemkit.geometry.spaces import BoundarySpace, dof_points
 from bemkit.operators.counts import OperationCounts
 from bemkit.operators.equilibrium import Imbalance, resultant_imbalance, round_off_of

@@ -30,9 +30,9 @@ _ROUND_OFF = 64.0 * float(np.finfo(float).eps)
 class BetweenNodes:
     """Largest violation of each contact condition at points between the nodes; zero is perfect.
 
-    Names and signs are those of `bemkit.contact.problem.Certificate`, which is about the nodes. These violations are
-    errors of the discretisation: they fall as elements become smaller or their degree higher. The opposition of slip is
-    measured at nodes only.
+    Names and signs are those of `bemkit.contact.certificate.Certificate`, which is about the nodes. These violations
+    are errors of the discretisation: they fall as elements become smaller or their degree higher. The opposition of
+    slip is measured at nodes only.
 
     Parameters
     ----------

@@ -27,7 +27,7 @@ import numpy as np
 
 from bemkit.arrays import FloatArray
 from bemkit.contact.body import ContactState, SlipHistory
-from bemkit.contact.problem import Certificate
+from bemkit.contact.certificate import Certificate
 from bemkit.errors import InputError
 from bemkit.hdf5 import Reader, rows_of, write_table, write_text
 from bemkit.results.assembly_solution import AssemblySolution

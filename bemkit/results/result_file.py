@@ -41,7 +41,7 @@ import numpy as np
 
 from bemkit.arrays import FloatArray
 from bemkit.atomic_files import OutputFileError
-from bemkit.contact.problem import Certificate
+from bemkit.contact.certificate import Certificate
 from bemkit.errors import InputError
 from bemkit.geometry.curves import Curve
 from bemkit.geometry.mesh import BoundaryMesh

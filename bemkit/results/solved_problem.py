@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, TypeVar, cast
 import numpy as np
 
 from bemkit.contact.body import SlipHistory
-from bemkit.contact.problem import Certificate
+from bemkit.contact.certificate import Certificate
 from bemkit.errors import InputError
 from bemkit.notebook import ShownInNotebooks
 from bemkit.operators.counts import OperationCounts

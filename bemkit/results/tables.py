@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bemkit.arrays import FloatArray
-from bemkit.contact.problem import Certificate
+from bemkit.contact.certificate import Certificate
 from bemkit.errors import InputError
 from bemkit.geometry.local_values import values_on_elements
 from bemkit.results.load_history import step_rows

@@ -6,7 +6,8 @@ from enum import Enum
 import numpy as np
 
 from bemkit.arrays import FloatArray
-from bemkit.contact.problem import ContactProblem, ContactState, certificate_scales
+from bemkit.contact.certificate import Scales
+from bemkit.contact.problem import ContactProblem, ContactState
 from bemkit.solvers.active_sets import ProjectionEquations
 from bemkit.solvers.base import Iterate, Status, check_max_steps, check_rho
 from bemkit.solvers.newton import negligible
@@ -135,7 +136,7 @@ class AugmentedLagrangian:
 def _solves(equations: ProjectionEquations, iterate: NewtonIterate, following: NewtonIterate) -> bool:
     """Whether a step has solved the equations: no residual, or the same sets and an exactly linear bound."""
     before, reached = iterate.residual, following.residual
-    stress, _ = certificate_scales(equations.problem, following.state)
+    stress = Scales.of(equations.problem, following.state).stress
     tolerance = negligible(equations.problem.body) * stress
     if np.abs(reached.value).max() <= tolerance:
         return True

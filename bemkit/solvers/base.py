@@ -9,7 +9,8 @@ from typing import Protocol
 import numpy as np
 
 from bemkit.arrays import IntArray
-from bemkit.contact.problem import Certificate, ContactProblem, ContactState, SingularResponse, certify
+from bemkit.contact.certificate import Certificate, certify
+from bemkit.contact.problem import ContactProblem, ContactState, SingularResponse
 from bemkit.contact.solvability import find_long_travel, find_unsolvable_load, needs_contact
 from bemkit.errors import InputError, NoResultError
 from bemkit.solvers.active_sets import ActiveSets, NodeStatus, contact_sets

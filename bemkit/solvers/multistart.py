@@ -5,7 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from bemkit.arrays import IntArray
-from bemkit.contact.problem import ContactProblem, ContactState, certificate_scales
+from bemkit.contact.certificate import Scales
+from bemkit.contact.problem import ContactProblem, ContactState
 from bemkit.errors import InputError
 from bemkit.solvers.base import ContactSolution, ContactSolver, solve
 
@@ -69,22 +70,22 @@ def start_with(problem: ContactProblem, node_status: Sequence[int] | IntArray) -
         Not in equilibrium; `solve` takes its statuses only.
     """
     status = np.asarray(node_status)
-    stress, length = certificate_scales(problem, problem.sticking_state)
+    scales = Scales.of(problem, problem.sticking_state)
     is_closed = (status != 0) & np.isfinite(problem.gap)
     direction = np.where(status == 2, 1.0, 0.0) - np.where(status == 3, 1.0, 0.0)
-    sigma_n = np.where(is_closed, -stress, 0.0)
-    slip = direction * (2.0 * problem.friction_bound(sigma_n) / problem.body.stiffness_scale + length)
+    sigma_n = np.where(is_closed, -scales.stress, 0.0)
+    slip = direction * (2.0 * problem.friction_bound(sigma_n) / problem.body.stiffness_scale + scales.length)
     resting = np.where(np.isfinite(problem.gap), problem.gap, 0.0)
-    u_n = np.where(is_closed, resting, resting - length)
+    u_n = np.where(is_closed, resting, resting - scales.length)
     return ContactState(
         np.stack([u_n, problem.slip_origin + slip], axis=1), np.stack([sigma_n, np.zeros_like(sigma_n)], axis=1)
     )
 
 
 def _is_same(problem: ContactProblem, state: ContactState, other: ContactState) -> bool:
-    stress, length = certificate_scales(problem, state)
-    length = max(length, float(np.abs(state.displacement).max()))
+    scales = Scales.of(problem, state)
+    length = max(scales.length, float(np.abs(state.displacement).max()))
     return bool(
         np.abs(state.displacement - other.displacement).max() < 1e-6 * length
-        and np.abs(state.traction - other.traction).max() < 1e-6 * stress
+        and np.abs(state.traction - other.traction).max() < 1e-6 * scales.stress
     )

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray
+from bemkit.contact.certificate import DEFORMED, Scales
 from bemkit.contact.conditions import (
     LinearConditions,
     RigidMotions,
@@ -18,14 +19,7 @@ from bemkit.contact.conditions import (
     separated,
     stick,
 )
-from bemkit.contact.problem import (
-    DEFORMED,
-    ContactProblem,
-    ContactState,
-    LinearBody,
-    SingularResponse,
-    certificate_scales,
-)
+from bemkit.contact.problem import ContactProblem, ContactState, LinearBody, SingularResponse
 from bemkit.errors import InputError
 from bemkit.solvers.active_sets import ActiveSets, ProjectionEquations, Residual, coheres
 
@@ -110,7 +104,7 @@ def respond(equations: ProjectionEquations, residual: Residual, sets: ActiveSets
 
 def spring_stiffness(problem: ContactProblem, state: ContactState) -> float:
     """Return the stiffness of springs [Pa/m] so weak that the body reaches a far obstacle in about one step."""
-    stress, _ = certificate_scales(problem, state)
+    stress = Scales.of(problem, state).stress
     nearest = float(np.min(problem.gap - state.u_n))
     stiffness = problem.body.stiffness_scale
     if np.isfinite(nearest) and nearest > 0.0:
@@ -147,7 +141,7 @@ def merit(problem: ContactProblem, residual: Residual) -> float:
     """Return the weighted root mean square of the residual of (15), (16), relative to the stress of the certificate."""
     weights = problem.body.weights
     mean_square = float(weights @ (residual.value**2).sum(axis=1)) / float(weights.sum())
-    stress, _ = certificate_scales(problem, residual.state)
+    stress = Scales.of(problem, residual.state).stress
     return float(np.sqrt(mean_square)) / stress
 
 

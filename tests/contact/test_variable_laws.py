@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
+from bemkit.contact.certificate import certify
 from bemkit.contact.further_laws import CohesiveCoulomb, PiecewiseLaw
 from bemkit.contact.laws import Coulomb, Frictionless, LawError, Tresca
-from bemkit.contact.problem import ContactProblem, certify
+from bemkit.contact.problem import ContactProblem
 from bemkit.formulas import Expression
 from bemkit.solvers.alm import AugmentedLagrangian
 from bemkit.solvers.base import solve

@@ -4,9 +4,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from bemkit.contact.certificate import certify
 from bemkit.contact.further_laws import CohesiveCoulomb
 from bemkit.contact.laws import Coulomb
-from bemkit.contact.problem import ContactProblem, certify
+from bemkit.contact.problem import ContactProblem
 from bemkit.solvers.base import Iterate, Status, solve
 from bemkit.solvers.fallbacks import Fallbacks, drivers_at_work
 from bemkit.solvers.fixed_point import FixedPoint

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 import bemkit as bk
+from bemkit.contact.certificate import certify
 from bemkit.contact.laws import Coulomb
-from bemkit.contact.problem import ContactProblem, ContactState, DenseBody, certify
+from bemkit.contact.problem import ContactProblem, ContactState, DenseBody
 from bemkit.solvers.active_sets import NodeStatus, contact_sets
 from bemkit.testing.independent_check import violations_of_body
 from tests.slow import slow_only

@@ -6,9 +6,10 @@ from functools import cache
 import numpy as np
 import pytest
 
+from bemkit.contact.certificate import certify
 from bemkit.contact.further_laws import CohesiveCoulomb
 from bemkit.contact.laws import Coulomb, Frictionless, Tresca
-from bemkit.contact.problem import ContactProblem, ContactState, DenseBody, certify
+from bemkit.contact.problem import ContactProblem, ContactState, DenseBody
 from bemkit.solvers.active_sets import ActiveSets, NodeStatus, contact_sets
 from bemkit.solvers.alm import AugmentedLagrangian, BoundUpdate
 from bemkit.solvers.base import solve

@@ -7,11 +7,12 @@ import pytest
 from scipy import sparse
 
 from bemkit.contact.body import ContactState
+from bemkit.contact.certificate import certify
 from bemkit.contact.conditions import LinearConditions, separated, slip, stick
 from bemkit.contact.joined.joined_bodies import JoinedBodies
 from bemkit.contact.joined.member import Member
 from bemkit.contact.laws import Coulomb
-from bemkit.contact.problem import ContactProblem, SingularResponse, certify
+from bemkit.contact.problem import ContactProblem, SingularResponse
 from bemkit.errors import InputError
 from bemkit.operators.linear.dense import SingularMatrixError
 from bemkit.solvers.alm import AugmentedLagrangian
