@@ -186,6 +186,8 @@ class CoupledMembers:
         return is_moved
 
     def _named(self, is_named: BoolArray) -> str:
+        if len(self.members) == 1 and not self.members[0].name:
+            return "the body"
         numbers = np.flatnonzero(is_named)
         names = [f"{self.members[k].name!r}" if self.members[k].name else f"number {k + 1}" for k in numbers]
         if len(names) == 1:

@@ -1,0 +1,162 @@
+"""Contact nodes at nodes of one body between obstacles: relative displacements determine the retained ones.
+
+The stiffness of the relative displacements w is then ``R^T K R``, without any flexibility, and R has two entries in a
+column at most.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from bemkit.arrays import BoolArray, FloatArray, IntArray
+from bemkit.contact.condensation.dense_body import FollowingTangents
+from bemkit.contact.condensation.nodes import ContactNodes
+from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_array
+
+
+@dataclass(frozen=True, eq=False)
+class NodeCoupling:
+    """How retained displacements u move contact nodes that lie at nodes of one body: ``w = B u + offset``.
+
+    Parameters
+    ----------
+    columns : (n_contact, 2) int array
+        The retained directions of the node of the body, the same in both rows of a node between two obstacles; -1 for
+        a direction that a support holds.
+    blocks : (n_contact, 2, 2) array
+        Entries of B, axes (node, component, direction); zero where there is no direction.
+
+    Notes
+    -----
+    The unknowns are the normal displacements of all contact nodes, and the tangential ones of nodes that are free: not
+    where a support holds one direction, nor between two obstacles, whose normal displacements give both tangents.
+    """
+
+    columns: IntArray
+    blocks: FloatArray
+
+    @classmethod
+    def of(cls, conditions: NodalConditions, contact: ContactNodes) -> NodeCoupling:
+        """Return the coupling of contact nodes to the retained directions of the conditions."""
+        is_retained = conditions.is_retained
+        number = np.where(is_retained, np.cumsum(is_retained).reshape(is_retained.shape) - 1, -1)
+        columns = number[contact.nodes]
+        blocks = np.einsum("nkc,njc->nkj", contact.frame, conditions.frame[contact.nodes])
+        return cls(columns, np.where(columns[:, None] >= 0, blocks, 0.0))
+
+    @classmethod
+    def from_matrix(cls, relative: csr_array, tangent_follows: BoolArray) -> NodeCoupling | None:
+        """Return the coupling of a matrix B (2 n_contact, n), None if its rows do not determine all displacements.
+
+        Parameters
+        ----------
+        relative : (2 n_contact, n) sparse array
+        tangent_follows : (n_contact,) bool array
+            Tangents that are no unknowns.
+        """
+        n_contact, n = relative.shape[0] // 2, relative.shape[1]
+        row = np.repeat(np.arange(2 * n_contact), np.diff(relative.indptr))
+        # the directions of each contact node, in ascending order; more than two are those of several nodes
+        pairs, pair = np.unique(row // 2 * n + relative.indices, return_inverse=True)
+        node, column = np.divmod(pairs, n)
+        count = np.bincount(node, minlength=n_contact)
+        if count.min() < 1 or count.max() > 2:
+            return None
+        slot = np.arange(node.size) - (np.cumsum(count) - count)[node]
+        columns, blocks = np.full((n_contact, 2), -1), np.zeros((n_contact, 2, 2))
+        columns[node, slot] = column
+        np.add.at(blocks, (row // 2, row % 2, slot[pair]), relative.data)
+        coupling = cls(columns, blocks)
+        is_like = np.array_equal(coupling.tangent_follows, tangent_follows)
+        return coupling if is_like and coupling.unknown_dofs.size == n else None
+
+    @cached_property
+    def partner(self) -> IntArray:
+        """(n_contact,) array: the other row of a node between two obstacles; itself elsewhere."""
+        key, node = self.columns.max(axis=1), np.arange(len(self.columns))
+        first = np.full(int(key.max()) + 1, -1)
+        last = first.copy()
+        last[key] = node
+        first[key[::-1]] = node[::-1]
+        return np.asarray(np.where(first[key] == node, last[key], first[key]))
+
+    @cached_property
+    def tangent_follows(self) -> BoolArray:
+        """(n_contact,) bool array."""
+        return np.asarray((self.columns < 0).any(axis=1) | (self.partner != np.arange(len(self.columns))))
+
+    @cached_property
+    def unknown_dofs(self) -> IntArray:
+        """(n_unknowns,) array: the indices ``2 node + component`` of the unknowns, ascending."""
+        is_unknown = np.ones((len(self.columns), 2), bool)
+        is_unknown[self.tangent_follows, 1] = False
+        return np.flatnonzero(is_unknown)
+
+    @cached_property
+    def inverse(self) -> tuple[IntArray, FloatArray]:
+        """R by columns: the retained directions (n_unknowns, 2) that move with each unknown, and by how much.
+
+        Notes
+        -----
+        Of each node of the body the rows of its unknowns make a block of 2 x 2: normal and tangent of a free node, both
+        normals between two obstacles, one normal and the direction that is held where there is a support.
+        """
+        node, component = np.divmod(self.unknown_dofs, 2)
+        partner, columns = self.partner[node], self.columns[node]
+        own = self.blocks[node, component]
+        other = np.where((partner == node)[:, None], self.blocks[node, 1 - component], self.blocks[partner, 0])
+        is_held = (columns < 0).any(axis=1)
+        other[is_held] = np.where(columns[is_held] < 0, 1.0, 0.0)
+        # the first column of the inverse of [own, other]
+        determinant = own[:, 0] * other[:, 1] - own[:, 1] * other[:, 0]
+        values = np.stack([other[:, 1], -other[:, 0]], axis=1) / determinant[:, None]
+        return np.maximum(columns, 0), np.where(columns < 0, 0.0, values)
+
+    def on_unknowns(self, forces: FloatArray) -> FloatArray:
+        """Return ``R^T f`` (n_unknowns, ...) of forces (n_retained, ...) along the retained directions."""
+        index, value = self.inverse
+        parts = [(value[:, k] * forces[index[:, k]].T).T for k in (0, 1)]
+        return np.asarray(parts[0] + parts[1])
+
+    def retained(self, unknowns: FloatArray) -> FloatArray:
+        """Return ``R w`` (n_retained,) of the unknown relative displacements (n_unknowns,) without offset."""
+        index, value = self.inverse
+        amounts = (value * unknowns[:, None]).ravel()
+        return np.asarray(np.bincount(index.ravel(), amounts, minlength=unknowns.size), dtype=float)
+
+    def moved(self, retained: FloatArray) -> FloatArray:
+        """Return ``B u`` (..., n_contact, 2) of retained displacements (..., n_retained)."""
+        moved: FloatArray = np.einsum("nkj,...nj->...nk", self.blocks, retained[..., self.columns])
+        return moved
+
+    @cached_property
+    def follow(self) -> FloatArray:
+        """(n_following, n_unknowns) array: the tangents that follow, by the unknowns."""
+        node = np.flatnonzero(self.tangent_follows)
+        position = np.full((len(self.columns), 2), -1)
+        position.flat[self.unknown_dofs] = np.arange(self.unknown_dofs.size)
+        response, each = np.zeros((node.size, self.unknown_dofs.size)), np.arange(node.size)
+        _, value = self.inverse
+        for rows in (node, self.partner[node]):
+            unknown = position[rows, 0]
+            response[each, unknown] = np.sum(self.blocks[node, 1] * value[unknown], axis=1)
+        return response
+
+    def following(self, offset: FloatArray) -> FollowingTangents | None:
+        """Return how tangents follow from the unknowns under an offset (2 n_contact,) [m], None if there are none."""
+        nodes = np.flatnonzero(self.tangent_follows)
+        if not nodes.size:
+            return None
+        at_rest = offset[2 * nodes + 1] - self.follow @ offset[self.unknown_dofs]
+        return FollowingTangents(nodes, self.follow, at_rest)
+
+    def stiffness(self, of_body: FloatArray) -> FloatArray:
+        """Return ``R^T K R`` (n_unknowns, n_unknowns) of the stiffness (n_retained, n_retained) of the body."""
+        return self.on_unknowns(self.on_unknowns(of_body.T).T)
