@@ -5,9 +5,8 @@ from __future__ import annotations
 import contextlib
 import glob
 import os
-import shutil
 import uuid
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -23,16 +22,12 @@ class OutputFileError(BemkitError, OSError):
     """A file that cannot be written; one line with its name and the remedy."""
 
 
-def check_target(path: Path, kind: str, is_own: Callable[[Path], bool]) -> Path:
+def check_target(path: Path) -> Path:
     """Find out, before any work is done, whether a file can be written.
 
     Parameters
     ----------
     path : Path
-    kind : str
-        What will be written, for messages: "bemkit result".
-    is_own : callable
-        Tells whether an existing file is of this kind, and so may be replaced.
 
     Returns
     -------
@@ -42,7 +37,7 @@ def check_target(path: Path, kind: str, is_own: Callable[[Path], bool]) -> Path:
     Raises
     ------
     OutputFileError
-        If the folder does not exist or cannot be written to, or another kind of file stands in the way.
+        If the folder does not exist or cannot be written to, or the path names something that is no file.
     """
     try:
         target = path.resolve()
@@ -58,8 +53,6 @@ def check_target(path: Path, kind: str, is_own: Callable[[Path], bool]) -> Path:
         )
     if exists and not is_file:
         raise OutputFileError(f"{shown_path(path)}: exists and is not a file: choose another name")
-    if exists and not is_own(target):
-        raise OutputFileError(f"{shown_path(path)}: exists and is not a {kind}: choose another name or delete it first")
     return target
 
 
@@ -92,6 +85,12 @@ def replacing(target: Path) -> Iterator[Path]:
         raise OutputFileError(f"{shown_path(target)}: cannot be written ({reason}): choose another place") from error
     finally:
         temporary.unlink(missing_ok=True)
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write a text to a file, all or nothing."""
+    with replacing(path.resolve()) as temporary:
+        temporary.write_text(text, encoding="utf-8")
 
 
 @contextmanager
@@ -142,19 +141,6 @@ def _remove_leftovers(target: Path) -> None:
         with contextlib.suppress(OSError), contextlib.closing(FileLock(path, may_create=False)) as lock:
             if lock.is_sure:
                 path.unlink()
-
-
-def check_room(target: Path, n_bytes: int) -> None:
-    """Refuse a file that does not fit on the disk, for libraries that do not survive when it runs full.
-
-    Raises
-    ------
-    OutputFileError
-    """
-    free = shutil.disk_usage(target.parent).free
-    if free < n_bytes:
-        sizes = f"{n_bytes / 1e9:.3g} GB are needed and {free / 1e9:.3g} GB free"
-        raise OutputFileError(f"{shown_path(target)}: {sizes}: choose another place")
 
 
 class HeldElsewhereError(BemkitError, OSError):

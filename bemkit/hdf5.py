@@ -17,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from bemkit.arrays import FloatArray, IntArray
-from bemkit.atomic_files import check_room, check_target, replacing
+from bemkit.atomic_files import OutputFileError, check_target, replacing
 from bemkit.errors import InputError, printable, shown_path
 from bemkit.version import __version__
 
@@ -61,29 +61,26 @@ def rows_of(columns: Mapping[str, Any]) -> list[dict[str, Any]]:
 
 
 @contextmanager
-def created(target: Path, mark: bytes = MARK, n_bytes: int = 0) -> Iterator[h5py.File]:
+def created(target: Path, mark: bytes = MARK) -> Iterator[h5py.File]:
     """Give an empty HDF5 file that replaces the target, with a checksum of its content, if all goes well.
 
-    It is built in memory and written at the end: the HDF5 library itself does not survive a disk that runs full. A file
-    whose size is given is written at once, after it was made sure that there is room for it.
+    It is built in memory and written at the end: the HDF5 library itself does not survive a disk that runs full.
 
     Raises
     ------
     OutputFileError
-        If there is no room, or the system refuses.
+        If the system refuses.
     """
     import h5py
 
-    if n_bytes:
-        check_room(target, n_bytes + _OVERHEAD)
-    in_memory: dict[str, Any] = {} if n_bytes else {"driver": "core", "backing_store": False}
     with replacing(target) as temporary:
-        with h5py.File(str(temporary), "w", userblock_size=USER_BLOCK, locking=False, **in_memory) as file:
+        with h5py.File(
+            str(temporary), "w", userblock_size=USER_BLOCK, locking=False, driver="core", backing_store=False
+        ) as file:
             yield file
             file.flush()
-            image = b"" if n_bytes else file.id.get_file_image()
-        if image:
-            temporary.write_bytes(bytes(USER_BLOCK) + image)  # the image begins after the user block
+            image = file.id.get_file_image()
+        temporary.write_bytes(bytes(USER_BLOCK) + image)  # the image begins after the user block
         seal(temporary, mark)
 
 
@@ -131,8 +128,13 @@ class FileFormat:
     command: str
 
     def check_target(self, path: str | Path) -> Path:
-        """Find out, before any work is done, whether a file can be written; see `bemkit.atomic_files.check_target`."""
-        return check_target(Path(path), self.kind, self._is_own)
+        """Find out, before any work is done, whether a file can be written, in place of one of its kind or of none."""
+        target = check_target(Path(path))
+        if target.exists() and not self._is_own(target):
+            raise OutputFileError(
+                f"{shown_path(Path(path))}: exists and is not a {self.kind}: choose another name or delete it first"
+            )
+        return target
 
     @contextmanager
     def created(self, path: str | Path) -> Iterator[h5py.File]:

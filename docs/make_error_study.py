@@ -17,8 +17,8 @@ from PIL import Image
 
 import bemkit as bk
 from bemkit.reference import MEASURES, Reference, find_reference, over_resolved
+from bemkit.studies.accuracy.figures import draw_errors
 from bemkit.studies.accuracy.records import ErrorRecord, by_series, fitted_rate, pareto_front
-from bemkit.studies.accuracy.report import draw_errors
 from bemkit.studies.accuracy.runs import adaptive, all_runs, error_tasks, graded, uniform
 from bemkit.studies.engine import compute
 

@@ -12,14 +12,6 @@ from bemkit import atomic_files
 from bemkit.atomic_files import FileLock, HeldElsewhereError, OutputFileError, check_target, replacing, reserved
 
 
-def yes(path: Path) -> bool:
-    return True
-
-
-def no(path: Path) -> bool:
-    return False
-
-
 def test_a_finished_file_replaces_the_old_one(tmp_path: Path) -> None:
     target = tmp_path / "a.txt"
     target.write_text("old", "utf-8")
@@ -55,16 +47,14 @@ def test_refusals_of_the_system_are_one_line(tmp_path: Path) -> None:
 def test_targets_are_checked_before_any_work(tmp_path: Path) -> None:
     file = tmp_path / "a.txt"
     file.write_text("mine", "utf-8")
-    assert check_target(file, "result", yes) == file.resolve()
-    assert check_target(tmp_path / "new", "result", no) == (tmp_path / "new").resolve()
-    with pytest.raises(OutputFileError, match="exists and is not a result: choose another name"):
-        check_target(file, "result", no)
+    assert check_target(file) == file.resolve()
+    assert check_target(tmp_path / "new") == (tmp_path / "new").resolve()
     with pytest.raises(OutputFileError, match="does not exist: create it first"):
-        check_target(tmp_path / "no" / "a", "result", yes)
+        check_target(tmp_path / "no" / "a")
     with pytest.raises(OutputFileError, match="exists and is not a file"):
-        check_target(tmp_path, "result", yes)
+        check_target(tmp_path)
     with pytest.raises(OutputFileError, match="not a usable file name"):
-        check_target(Path("a\0b"), "result", yes)
+        check_target(Path("a\0b"))
 
 
 @pytest.mark.skipif(os.geteuid() == 0, reason="the superuser may write everywhere")
@@ -72,7 +62,7 @@ def test_folders_without_permission_are_refused(tmp_path: Path) -> None:
     tmp_path.chmod(0o500)
     try:
         with pytest.raises(OutputFileError, match="no permission"):
-            check_target(tmp_path / "a", "result", yes)
+            check_target(tmp_path / "a")
     finally:
         tmp_path.chmod(0o700)
 
@@ -81,7 +71,7 @@ def test_a_link_is_followed_not_replaced(tmp_path: Path) -> None:
     target, link = tmp_path / "a.txt", tmp_path / "link"
     target.write_text("old", "utf-8")
     link.symlink_to(target)
-    with replacing(check_target(link, "text", yes)) as temporary:
+    with replacing(check_target(link)) as temporary:
         temporary.write_text("new", "utf-8")
     assert link.is_symlink()
     assert target.read_text("utf-8") == "new"

@@ -11,13 +11,13 @@ from rich.console import Console, Group
 from rich.table import Table
 from rich.text import Text
 
+from bemkit.cli.outputs import plain_table, stdout_console
 from bemkit.contact.certificate import Certificate
 from bemkit.geometry.shapes import Shape
 from bemkit.operators.counts import OperationCounts
 from bemkit.plan import Plan
 from bemkit.result_warning import ResultWarning
 from bemkit.results.between_nodes import BetweenNodes
-from bemkit.results.outputs import plain_table, stdout_console
 from bemkit.results.solution import Solution
 from bemkit.scene.registry import DISCRETISATIONS, SOLVERS
 from bemkit.scene.unit_names import UnitNames, amount

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING
 import click
 
 from bemkit.cli.options import shown_progress
+from bemkit.cli.outputs import Outputs, TextFile
 from bemkit.errors import concerning
-from bemkit.results.outputs import JSON_START, Outputs, TextFile, json_text
+from bemkit.table import json_text
 
 if TYPE_CHECKING:
     from bemkit.runs.critical_friction import CriticalFriction
@@ -31,7 +32,7 @@ def critical_friction(scene: str, elements: int | None, accuracy: float | None, 
         def as_json(found: CriticalFriction) -> str:
             return json_text({"title": chosen.title, **found.as_dict()})
 
-        outputs = Outputs((TextFile(json_file, "JSON file", JSON_START, as_json),))
+        outputs = Outputs((TextFile(json_file, as_json),))
         outputs.check()
         found = critical_friction_of(chosen)
     outputs.write(found)

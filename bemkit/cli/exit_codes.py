@@ -1,5 +1,13 @@
 """The exit codes of commands; 0 says solved, or done."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from bemkit.results.assembly_solution import AssemblySolution
+    from bemkit.results.solution import Solution
+
 NOT_CONVERGED = 1
 """Solved, but not converged; or a method that ends without a result."""
 BAD_INPUT = 2
@@ -7,3 +15,10 @@ BAD_INPUT = 2
 INACCURATE = 3
 """Certified, but less accurate than asked for."""
 INTERRUPTED, PIPE_CLOSED, TERMINATED = 130, 141, 143
+
+
+def exit_code_of(solution: Solution | AssemblySolution) -> int:
+    """Return the exit code of a command that solves, draws or reports one solution."""
+    if solution.is_converged:
+        return 0
+    return INACCURATE if solution.is_certified else NOT_CONVERGED

@@ -17,8 +17,8 @@ from typing import NoReturn
 import click
 
 from bemkit.cli.exit_codes import BAD_INPUT, INTERRUPTED, NOT_CONVERGED, PIPE_CLOSED, TERMINATED
+from bemkit.cli.streams import PipeClosedError, guarded_streams
 from bemkit.errors import BemkitError, NoResultError, one_line, printable
-from bemkit.results.streams import PipeClosedError, guarded_streams
 from bemkit.version import __version__
 
 _COMMANDS = {

@@ -10,16 +10,17 @@ from typing import TYPE_CHECKING, Literal
 
 import click
 
-from bemkit.results.outputs import JSON_START, Outputs, TextFile
+from bemkit.cli.outputs import Content, Outputs, TableFile, TextFile
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from bemkit.results.assembly_solution import AssemblySolution
-    from bemkit.results.record_file import R
     from bemkit.results.solution import Solution
     from bemkit.solvers.base import StepRecord
     from bemkit.studies.engine import Task
+    from bemkit.studies.row_file import R
+    from bemkit.table import Table
 
 
 def degree_of(context: click.Context, parameter: click.Parameter, value: str | None) -> int | Literal["hp"] | None:
@@ -34,12 +35,14 @@ def degree_of(context: click.Context, parameter: click.Parameter, value: str | N
 
 
 def pictures_of(context: click.Context, parameter: click.Parameter, value: str | None) -> tuple[str, ...] | None:
-    """Return the names of pictures, all of them known; None if none is named."""
+    """Return the names of pictures in an option, all of them known; None if it is not given."""
     if value is None:
         return None
     from bemkit.pictures.catalogue import find_picture
+    from bemkit.pictures.files import ANIMATION
 
-    return tuple(find_picture(name.strip()).name for name in value.split(","))
+    names = tuple(name.strip() for name in value.split(",") if name.strip())
+    return tuple(name if name == ANIMATION else find_picture(name).name for name in names)
 
 
 def outputs_of(
@@ -54,7 +57,7 @@ def outputs_of(
         raise click.UsageError("--what names figures: add --plot DIR")
     if json_file is csv_file is folder is None:
         return Outputs()
-    from bemkit.results.tables import CSV_STARTS, to_csv, to_json
+    from bemkit.results.tables import to_csv, to_json
 
     def as_csv(solution: Solution | AssemblySolution) -> str:
         return to_csv(solution, table)
@@ -62,11 +65,11 @@ def outputs_of(
     def pictures(solution: Solution | AssemblySolution) -> Mapping[str, Figure]:
         from bemkit.pictures.catalogue import figures
 
-        return figures(solution, what)
+        return figures(solution, what if what is None else [name for name in what if name != "animation"])
 
     texts = (
-        TextFile(json_file, "JSON file", JSON_START, to_json),
-        TextFile(csv_file, f"CSV file of the {table} table", CSV_STARTS[table], as_csv),
+        TextFile(json_file, to_json),
+        TextFile(csv_file, as_csv),
     )
     return Outputs(texts, folder, pictures, "deformation")
 
@@ -80,6 +83,23 @@ def result_target(output: str | None, inside: int) -> list[Path]:
     from bemkit.results.export import format_of
 
     return [format_of(output, inside).check(Path(output))]
+
+
+def write_animation(solution: Solution | AssemblySolution, folder: str | None, what: tuple[str, ...] | None) -> None:
+    """Write the load steps of a solution as a moving picture into the folder of its figures, if it is named."""
+    if folder is None or "animation" not in (what or ()):
+        return
+    from bemkit.pictures.animation import save_animation
+
+    n_steps = 0 if solution.loading is None else len(solution.loading.steps)
+    steps = [solution.at_step(1 + k) for k in range(n_steps)] or [solution]
+    save_animation(Path(folder) / "animation.gif", steps)
+
+
+def study_output(place: str | None, table: Callable[[Content], Table]) -> tuple[str | None, TableFile[Content]]:
+    """Return the file of ``-o`` that keeps rows as they are ready, .jsonl, and the one that gets the whole table."""
+    keeps_rows = place is not None and place.lower().endswith(".jsonl")
+    return (place, TableFile(None, table)) if keeps_rows else (None, TableFile(place, table))
 
 
 def reserve(paths: Iterable[Path]) -> None:
@@ -126,8 +146,8 @@ class StudyProgress(ExitStack):
         cluster: str | None = None,
         finished: Mapping[Hashable, R] | None = None,
     ) -> Iterator[R]:
-        """Return records as they are ready; see `bemkit.studies.engine.compute_with_progress`."""
-        from bemkit.studies.engine import compute_with_progress
+        """Return records as they are ready; see `bemkit.cli.progress.compute_with_progress`."""
+        from bemkit.cli.progress import compute_with_progress
 
         self.close()  # its bar takes the place of the first
         return compute_with_progress(

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from bemkit.cli.options import shown_progress
-from bemkit.results.outputs import Outputs, TextFile
+from bemkit.cli.outputs import Outputs, TextFile
 
 if TYPE_CHECKING:
     from bemkit.geometry.outline import Outline
@@ -43,7 +43,7 @@ def outline(
         from bemkit.cli.sides import print_sides, shape_file
         from bemkit.geometry.files.shape_file import DrawingFile, MeshFile
         from bemkit.pictures.outline import draw_outline
-        from bemkit.scene.starting_scene import START, starting_scene
+        from bemkit.scene.starting_scene import starting_scene
         from bemkit.scene.toml import load_single_body, shipped_files
 
         shape: Shape
@@ -54,7 +54,7 @@ def outline(
             shape, units = scene.shape, scene.units
         else:
             shape, units = shape_file(file, scale, only, corner_angle, tolerance), None
-        text = TextFile[str](output, "scene to start from", START, str)
+        text = TextFile[str](output, str)
 
         def drawn(each: Outline) -> dict[str, Any]:
             return {"outline": draw_outline(each, Path(file).name, units=units).get_figure(root=True)}

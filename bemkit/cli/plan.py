@@ -7,7 +7,9 @@ from typing import TYPE_CHECKING, Literal
 import click
 
 from bemkit.cli.options import degree_of, shown_progress
+from bemkit.cli.outputs import STDOUT, TextFile
 from bemkit.errors import concerning
+from bemkit.table import json_text
 
 if TYPE_CHECKING:
     from bemkit.plan import Plan
@@ -23,33 +25,35 @@ if TYPE_CHECKING:
 @click.option(
     "--degree", metavar="P|hp", callback=degree_of, help="Galerkin elements of that degree, or of rising ones."
 )
-@click.option("--json", "is_json", is_flag=True, help="Print the plan as JSON.")
+@click.option("--json", "json_file", metavar="FILE", help="Write the plan as JSON; - is standard output.")
 def plan(
     scene: str,
     elements: int | None,
     accuracy: float | None,
     discretisation: str | None,
     degree: int | Literal["hp"] | None,
-    is_json: bool,
+    json_file: str | None,
 ) -> None:
     """Say what SCENE needs and what it leaves out, without solving it."""
-    with shown_progress(is_json):
+    with shown_progress(json_file is not None):
         from bemkit.scene.toml import load_scene, with_overrides
 
+        text = TextFile(json_file, _as_json)
+        text.check()
         chosen = with_overrides(
             load_scene(scene), elements=elements, accuracy=accuracy, discretisation=discretisation, degree=degree
         )
         with concerning(scene):
             made = _planned(chosen)
-    if is_json:
-        from bemkit.results.outputs import json_text
-        from bemkit.results.streams import print_data
-
-        print_data(json_text(made.as_dict()))
-    else:
+    text.write(made)
+    if json_file != STDOUT:
         from bemkit.cli.console import print_plan
 
         print_plan(chosen.title, made)
+
+
+def _as_json(made: Plan) -> str:
+    return json_text(made.as_dict())
 
 
 def _planned(scene: Scene | Assembly) -> Plan:

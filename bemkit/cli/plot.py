@@ -7,12 +7,8 @@ from pathlib import Path
 
 import click
 
-from bemkit.cli.options import reserve, shown_progress
-
-
-def picture_names(context: click.Context, parameter: click.Parameter, value: str | None) -> tuple[str, ...] | None:
-    """Return the names of pictures in an option, None if it is not given."""
-    return None if value is None else tuple(name.strip() for name in value.split(",") if name.strip())
+from bemkit.cli.exit_codes import exit_code_of
+from bemkit.cli.options import pictures_of, reserve, shown_progress
 
 
 class _PlotCommand(click.Command):
@@ -30,15 +26,15 @@ class _PlotCommand(click.Command):
 
 @click.command(cls=_PlotCommand)
 @click.argument("source")
-@click.option("--what", metavar="NAME,...", callback=picture_names, help="The pictures, from the list below.")
+@click.option("--what", metavar="NAME,...", callback=pictures_of, help="The pictures, from the list below.")
 @click.option("-o", "--output", "place", default="figures", metavar="PLACE", help="Folder, or file for one picture.")
 @click.option("--dpi", "dots_per_inch", type=click.IntRange(20, 1200), default=150, help="Dots per inch (150).")
 @click.option("-q", "--quiet", is_flag=True, help="Do not print the names of the files.")
-def plot(source: str, what: tuple[str, ...] | None, place: str, dots_per_inch: int, quiet: bool) -> None:
+def plot(source: str, what: tuple[str, ...] | None, place: str, dots_per_inch: int, quiet: bool) -> int:
     """Draw SOURCE: a result file, or a scene, which is solved first.
 
     Without --what the pictures that suit the result are drawn. The place is a folder, or a file ending in .png, .svg
-    or .pdf for one picture, in .gif or .mp4 for the animation.
+    or .pdf for one picture, in .gif or .mp4 for the animation. The exit code is that of bemkit run.
     """
     with shown_progress(quiet) as callback:
         from bemkit.cli.sources import solved, solved_steps
@@ -54,3 +50,4 @@ def plot(source: str, what: tuple[str, ...] | None, place: str, dots_per_inch: i
         print(path)
     if not steps[-1].is_converged:
         print(f"bemkit: {steps[-1].status.name.lower()}: {steps[-1].message}", file=sys.stderr)
+    return exit_code_of(steps[-1])

@@ -3,12 +3,21 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 from rich.console import Console
-from rich.progress import BarColumn, Progress, ProgressColumn, Task, TextColumn, TimeElapsedColumn
+from rich.progress import (
+    BarColumn,
+    MofNCompleteColumn,
+    Progress,
+    ProgressColumn,
+    Task,
+    TextColumn,
+    TimeElapsedColumn,
+    TimeRemainingColumn,
+)
 from rich.progress_bar import ProgressBar
 from rich.text import Text
 
@@ -16,6 +25,8 @@ from bemkit.operators.stopwatch import PROGRESS
 
 if TYPE_CHECKING:
     from bemkit.solvers.base import StepRecord
+    from bemkit.studies.engine import Task as Job
+    from bemkit.studies.row_file import R
 
 _ALMOST = 0.98
 """Share of the bar at which it waits when a run takes longer than planned."""
@@ -43,6 +54,38 @@ def live_progress() -> Iterator[Callable[[StepRecord], None]]:
         finally:
             PROGRESS.removeHandler(display)
             PROGRESS.setLevel(level)
+
+
+def compute_with_progress(
+    tasks: Sequence[Job[R]],
+    name: str,
+    *,
+    is_live: bool,
+    processes: int = 1,
+    cluster: str | None = None,
+    finished: Mapping[Hashable, R] | None = None,
+) -> Iterator[R]:
+    """Compute records as `bemkit.studies.engine.compute` does, while a bar on standard error shows the progress.
+
+    Raises
+    ------
+    StudyError
+        As `compute` and `executor_of` do.
+    """
+    from bemkit.studies.engine import compute, executor_of
+
+    counts = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn())
+    times = (TimeElapsedColumn(), TextColumn("left"), TimeRemainingColumn())
+    bar = Progress(*counts, *times, console=Console(stderr=True), transient=True, disable=not is_live)
+    with executor_of(processes, cluster) as (executor, n_workers), bar:
+        row = bar.add_task(name, total=len(tasks))
+
+        def begins(task: Job[R]) -> None:
+            bar.update(row, description=task.label)
+
+        for record in compute(tasks, executor, finished=finished, begins=begins, n_workers=n_workers):
+            bar.advance(row)
+            yield record
 
 
 class _Display(logging.Handler):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import click
 
+from bemkit.cli.exit_codes import exit_code_of
 from bemkit.cli.options import reserve, shown_progress
 
 
@@ -11,16 +12,19 @@ from bemkit.cli.options import reserve, shown_progress
 @click.argument("source")
 @click.option("-o", "--output", "place", default="report.html", metavar="FILE", help="The page (report.html).")
 @click.option("-q", "--quiet", is_flag=True, help="Do not print the name of the file.")
-def report(source: str, place: str, quiet: bool) -> None:
+def report(source: str, place: str, quiet: bool) -> int:
     """Write a page on SOURCE: a result file, or a scene, which is solved first.
 
     The page holds summary, pictures, tables, certificate, plan, scene and versions, and needs no other file.
+    The exit code is that of bemkit run.
     """
     with shown_progress(quiet) as callback:
         from bemkit.cli.sources import solved
         from bemkit.report.page import check_report, save_report
 
         reserve([check_report(place)])
-        path = save_report(place, solved(source, callback))
+        solution = solved(source, callback)
+        path = save_report(place, solution)
     if not quiet:
         print(path)
+    return exit_code_of(solution)

@@ -11,8 +11,16 @@ from typing import TYPE_CHECKING, Literal
 
 import click
 
-from bemkit.cli.exit_codes import INACCURATE, NOT_CONVERGED
-from bemkit.cli.options import degree_of, outputs_of, pictures_of, reserve, result_target, shown_progress
+from bemkit.cli.exit_codes import exit_code_of
+from bemkit.cli.options import (
+    degree_of,
+    outputs_of,
+    pictures_of,
+    reserve,
+    result_target,
+    shown_progress,
+    write_animation,
+)
 from bemkit.errors import concerning
 
 if TYPE_CHECKING:
@@ -92,6 +100,7 @@ def run(
 
             export_result(output, solution, inside=inside)
         outputs.write(solution)
+        write_animation(solution, folder, what)
         output_seconds = time.perf_counter() - begin
     if not quiet and not outputs.uses_stdout:
         from bemkit.cli.console import print_summary
@@ -101,9 +110,7 @@ def run(
         from bemkit.cli.console import print_explanation
 
         print_explanation(solution, output_seconds, to_stderr=outputs.uses_stdout)
-    if solution.is_converged:
-        return 0
-    return INACCURATE if solution.is_certified else NOT_CONVERGED
+    return exit_code_of(solution)
 
 
 def _history_file(scene: Scene | Assembly, output: str | None) -> str | None:

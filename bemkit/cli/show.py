@@ -6,16 +6,15 @@ from contextlib import ExitStack
 
 import click
 
-from bemkit.cli.options import outputs_of, pictures_of, result_target, shown_progress
-from bemkit.results.outputs import STDOUT
-from bemkit.results.streams import print_data
+from bemkit.cli.options import outputs_of, pictures_of, result_target, shown_progress, write_animation
+from bemkit.cli.outputs import STDOUT
+from bemkit.cli.streams import print_data
 
 
 @click.command()
 @click.argument("result")
-@click.option(
-    "--csv", "table", type=click.Choice(["contact", "boundary", "history", "steps"]), help="Print a table as CSV."
-)
+@click.option("--csv", "csv_file", metavar="FILE", help="Write a table as CSV; - is standard output.")
+@click.option("--table", type=click.Choice(["contact", "boundary", "history", "steps"]), help="Which (contact).")
 @click.option("--json", "json_file", metavar="FILE", help="Write the summary as JSON; - is standard output.")
 @click.option("--plot", "folder", metavar="DIR", help="Draw figures into a folder.")
 @click.option("--what", metavar="NAME,...", callback=pictures_of, help="Which figures; bemkit plot --help lists them.")
@@ -25,6 +24,7 @@ from bemkit.results.streams import print_data
 @click.option("--inside", type=int, default=0, metavar="N", help="Stress inside on N points across, in a .vtu or .vtp.")
 def show(
     result: str,
+    csv_file: str | None,
     table: str | None,
     json_file: str | None,
     folder: str | None,
@@ -35,9 +35,11 @@ def show(
     inside: int,
 ) -> None:
     """Show RESULT, a file written by bemkit run -o."""
-    if sum([table is not None, json_file == STDOUT, shows_scene]) > 1:
-        raise click.UsageError("--csv, --json - and --scene all print to standard output: give one of them")
-    outputs = outputs_of(json_file, STDOUT if table else None, folder, table=table or "contact", what=what)
+    if table is not None and csv_file is None:
+        raise click.UsageError("--table names the table of --csv: add --csv FILE, or --csv -")
+    if shows_scene and STDOUT in (csv_file, json_file):
+        raise click.UsageError("--scene prints to standard output: give files to --csv and --json")
+    outputs = outputs_of(json_file, csv_file, folder, table=table or "contact", what=what)
     outputs.check(result_target(output, inside))
     with ExitStack() as stack:
         stack.enter_context(shown_progress(quiet=False))
@@ -53,11 +55,12 @@ def show(
         if outputs.uses_stdout:
             stack.close()  # no bar among the data
         outputs.write(solution)
+        write_animation(solution, folder, what)
     if shows_scene:
         from bemkit.scene.toml import scene_to_toml
 
         print_data(scene_to_toml(solution.stated))
-    elif not (table or json_file or folder or output):
+    elif not (csv_file or json_file or folder or output):
         from bemkit.cli.console import print_summary
 
         print_summary(solution)

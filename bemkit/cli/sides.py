@@ -6,12 +6,12 @@ import click
 import numpy as np
 from rich.text import Text
 
+from bemkit.cli.outputs import plain_table, stdout_console
 from bemkit.geometry.curves import Arc
 from bemkit.geometry.files.chords import CORNER_ANGLE
 from bemkit.geometry.files.shape_file import DrawingFile, MeshFile, is_drawing
 from bemkit.geometry.outline import Outline, Side
 from bemkit.geometry.vectors import norms
-from bemkit.results.outputs import plain_table, stdout_console
 
 _SEEN = np.linspace(0.5 / 64, 1.0 - 0.5 / 64, 64)
 

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 
 import click
 
-from bemkit.cli.options import StudyProgress, reserve
-from bemkit.results.outputs import Outputs, TextFile
+from bemkit.cli.options import StudyProgress, reserve, study_output
+from bemkit.cli.outputs import Outputs, TextFile
 
 if TYPE_CHECKING:
     from bemkit.studies.engine import Task
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 @click.command()
 @click.argument("scene", required=False)
 @click.option("--axis", "axis", multiple=True, metavar="NAME", help="Only this axis; may be given several times.")
-@click.option("-o", "--output", metavar="FILE", help="Keep the rows (HDF5); rows already in the file are not repeated.")
+@click.option("-o", "--output", metavar="FILE", help="Rows as .csv, .json, .md, .h5; .jsonl also resumes.")
 @click.option("--csv", "csv", metavar="FILE", help="Write the rows as CSV; - is standard output.")
 @click.option("--markdown", "markdown", metavar="FILE", help="Write tables as Markdown; - is standard output.")
 @click.option("--plot", "plot", metavar="DIR", help="Draw one figure for each axis into a folder.")
@@ -43,33 +43,36 @@ def stability(
     ``python -m checks.random_scenes 200``.
     """
     with StudyProgress(quiet) as progress:
+        from bemkit.cli.printed_stability import print_axis, print_left_out, print_verdicts
         from bemkit.scene.assembly import Assembly
         from bemkit.scene.toml import load_scene, scene_to_toml, with_overrides
         from bemkit.studies.stability.assembly_axes import ASSEMBLY_AXES
         from bemkit.studies.stability.axes import AXES, find_axes
-        from bemkit.studies.stability.records import CSV_START, FILE, MARKDOWN_START, to_csv, to_markdown
-        from bemkit.studies.stability.report import draw_axes, figure_name, print_axis, print_left_out, print_verdicts
+        from bemkit.studies.stability.figures import draw_axes, figure_name
+        from bemkit.studies.stability.records import FILE, table_of, to_csv, to_markdown
         from bemkit.studies.stability.sweep import sweep
 
         chosen = with_overrides(load_scene(scene or "paper-1"), elements=elements, discretisation=discretisation)
         every = find_axes(axis, ASSEMBLY_AXES if isinstance(chosen, Assembly) else AXES)
         # an axis that is asked for by its name is refused by the sweep
         axes = every if axis else tuple(each for each in every if not each.reason_against(chosen))
+        rows, table = study_output(output, table_of)
         texts = (
-            TextFile(csv, "CSV file of stability rows", CSV_START, to_csv),
-            TextFile(markdown, "Markdown file of stability tables", MARKDOWN_START, partial(to_markdown, axes)),
+            table,
+            TextFile(csv, to_csv),
+            TextFile(markdown, partial(to_markdown, axes)),
         )
         outputs = Outputs(texts, plot, partial(draw_axes, axes), figure_name(axes[0]))
-        reserve(outputs.check(FILE.check(output)))
+        reserve(outputs.check(FILE.check(rows)))
         shows_tables = not quiet and not outputs.uses_stdout
-        labels = {"scene": scene_to_toml(chosen) if output else ""}
-        finished = FILE.finished(output, labels)
+        labels = {"scene": scene_to_toml(chosen) if rows else ""}
+        finished = FILE.finished(rows, labels)
         remaining = iter(axes)
 
         def run_axis(tasks: Sequence[Task[StabilityRecord]]) -> list[StabilityRecord]:
             axis = next(remaining)
             computed = progress.compute(tasks, axis.name, finished=finished)
-            records = list(FILE.keep(output, computed, finished, labels))
+            records = list(FILE.keep(rows, computed, finished, labels))
             if shows_tables:
                 print_axis(axis, records)
             return records

@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING
 import click
 
 from bemkit.cli.exit_codes import NOT_CONVERGED
-from bemkit.cli.options import StudyProgress, reserve, shown_progress
+from bemkit.cli.options import StudyProgress, reserve, shown_progress, study_output
+from bemkit.cli.outputs import STDOUT, Outputs, TextFile, plain_table, stdout_console
 from bemkit.errors import concerning
-from bemkit.results.outputs import JSON_START, STDOUT, Outputs, TextFile, json_text, plain_table, stdout_console
+from bemkit.table import json_text
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -53,7 +54,7 @@ def study() -> None:
 @click.option("--repeat", type=click.IntRange(1), metavar="N", help="Timed repetitions of each run (3).")
 @click.option("--jobs", type=click.IntRange(1), default=1, metavar="N", help="Processes; more than one: no times.")
 @click.option("--errors", "measures", default=DEFAULT_MEASURES, metavar="WORD,...", help="Errors to show and draw.")
-@click.option("-o", "--output", metavar="FILE", help="Keep the rows (HDF5); rows already in the file are not repeated.")
+@click.option("-o", "--output", metavar="FILE", help="Rows as .csv, .json, .md, .h5; .jsonl also resumes.")
 @click.option("--csv", "csv_file", metavar="FILE", help="Write the rows as CSV; - is standard output.")
 @click.option("--plot", "folder", metavar="DIR", help="Draw error-against-run-time.png into a folder.")
 @click.option("-q", "--quiet", is_flag=True, help="Print neither progress nor tables.")
@@ -84,10 +85,11 @@ def errors(
     if jobs > 1 and repeat is not None:
         raise click.UsageError("--jobs measures no run times: leave out --repeat, or --jobs")
     with StudyProgress(quiet) as progress:
+        from bemkit.cli.printed_errors import print_reference, print_study
         from bemkit.scene.toml import load_single_body
+        from bemkit.studies.accuracy.figures import FIGURE, draw_errors
         from bemkit.studies.accuracy.options import StudyOptions, read_measures
-        from bemkit.studies.accuracy.records import CSV_START, FILE, to_csv
-        from bemkit.studies.accuracy.report import FIGURE, draw_errors, print_reference, print_study
+        from bemkit.studies.accuracy.records import FILE, table_of, to_csv
         from bemkit.studies.accuracy.runs import error_tasks
 
         shown = read_measures(measures)
@@ -96,10 +98,11 @@ def errors(
         def figures(records: Sequence[ErrorRecord]) -> dict[str, Figure]:
             return {FIGURE: draw_errors(records, shown, title=problem.title)}
 
-        table = TextFile(csv_file, "CSV file of an error study", CSV_START, to_csv)
+        rows, table = study_output(output, table_of)
+        texts = table, TextFile(csv_file, to_csv)
         # sharp at the width of a page, and a small file
-        outputs = Outputs((table,), folder, figures, FIGURE, dots_per_inch=110)
-        reserve(outputs.check(FILE.check(output)))
+        outputs = Outputs(texts, folder, figures, FIGURE, dots_per_inch=110)
+        reserve(outputs.check(FILE.check(rows)))
         options = StudyOptions(
             elements=elements,
             accuracies=accuracies,
@@ -116,13 +119,13 @@ def errors(
         shows_tables = not quiet and not outputs.uses_stdout
         with concerning(scene):
             labels = options.labels(problem)
-            finished = FILE.finished(output, labels)
+            finished = FILE.finished(rows, labels)
             reference = options.reference(problem)
             tasks = error_tasks(runs, reference, options.repeat)
             computed = progress.compute(tasks, "error study", processes=jobs, finished=finished)
             if shows_tables:
                 print_reference(problem.title, reference)
-            by_key = {record.key: record for record in FILE.keep(output, computed, finished, labels)}
+            by_key = {record.key: record for record in FILE.keep(rows, computed, finished, labels)}
             records = [by_key[run.key] for run in runs]
             if shows_tables:
                 print_study(records, shown)
@@ -144,7 +147,7 @@ def solutions(scene: str, starts: int, elements: int | None, json_file: str | No
         def as_json(found: Sequence[Solution]) -> str:
             return json_text({"starts": starts, "solutions": [solution.summary() for solution in found]})
 
-        summaries = TextFile(json_file, "JSON file", JSON_START, as_json)
+        summaries = TextFile(json_file, as_json)
         summaries.check()
         chosen = with_overrides(load_single_body(scene), elements=elements)
         with concerning(scene):

@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import partial
 from typing import TYPE_CHECKING
 
 import click
 
 from bemkit.cli.exit_codes import NOT_CONVERGED
-from bemkit.cli.options import StudyProgress, reserve
+from bemkit.cli.options import StudyProgress, reserve, study_output
+from bemkit.cli.outputs import Outputs, TextFile
 from bemkit.errors import concerning
-from bemkit.results.outputs import JSON_START, Outputs, TextFile, csv_text
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from bemkit.studies.sweep.table import Sweep
 
 DEFAULT_SHOWN = "force_tangential"
@@ -21,7 +24,7 @@ DEFAULT_SHOWN = "force_tangential"
 @click.command()
 @click.argument("scene")
 @click.option("--vary", multiple=True, required=True, metavar="KEY=...", help="A:B:N or A,B,...; several make a grid.")
-@click.option("-o", "--output", metavar="FILE", help="Keep the rows (HDF5); rows already in the file are not repeated.")
+@click.option("-o", "--output", metavar="FILE", help="Rows as .csv, .json, .md, .h5; .jsonl also resumes.")
 @click.option("--csv", "csv_file", metavar="FILE", help="Write all rows as CSV; - is standard output.")
 @click.option("--json", "json_file", metavar="FILE", help="Write all rows as JSON; - is standard output.")
 @click.option("--plot", "folder", metavar="DIR", help="Draw figures into a folder.")
@@ -64,42 +67,35 @@ def sweep(
         from bemkit.studies.sweep.grid import read_variations
         from bemkit.studies.sweep.records import FILE
         from bemkit.studies.sweep.sweep import run_sweep
+        from bemkit.studies.sweep.table import Sweep
 
         values = read_variations(vary)
-        outputs = _outputs(tuple(values), csv_file, json_file, folder, over, show or (DEFAULT_SHOWN,))
-        own = FILE.check(output)  # reserved by the sweep itself
+        rows, table = study_output(output, Sweep.as_table)
+        texts = table, TextFile(csv_file, Sweep.to_csv), TextFile(json_file, Sweep.to_json)
+        outputs = Outputs(texts, folder, *_figures(tuple(values), over, show or (DEFAULT_SHOWN,)))
+        own = FILE.check(rows)  # reserved by the sweep itself
         reserve(path for path in outputs.check(own) if path not in own)
         chosen = with_overrides(load_scene(scene), elements=elements, accuracy=accuracy, discretisation=discretisation)
         computed = partial(progress.compute, name="sweep", processes=jobs or 1, cluster=cluster)
         with concerning(scene):
-            found = run_sweep(chosen, values, computed, file=output, cold=cold)
+            found = run_sweep(chosen, values, computed, file=rows, cold=cold)
     outputs.write(found)
     if not quiet and not outputs.uses_stdout:
-        from bemkit.studies.sweep.report import print_sweep
+        from bemkit.cli.printed_sweep import print_sweep
 
         print_sweep(found)
     return 0 if all(row.status == "converged" for row in found.rows) else NOT_CONVERGED
 
 
-def _outputs(
-    keys: tuple[str, ...],
-    csv_file: str | None,
-    json_file: str | None,
-    folder: str | None,
-    over: str | None,
-    shown: tuple[str, ...],
-) -> Outputs[Sweep]:
-    """Return where the table goes, with figures of some columns over the first key or another column."""
-    from bemkit.studies.sweep.records import QUANTITIES, RESULTS
-    from bemkit.studies.sweep.report import draw_all, figure_name
-    from bemkit.studies.sweep.table import Sweep
+def _figures(
+    keys: tuple[str, ...], over: str | None, shown: tuple[str, ...]
+) -> tuple[Callable[[Sweep], dict[str, Figure]], str]:
+    """Return how to draw some columns over the first key or another column, and the name of the first figure."""
+    from bemkit.studies.sweep.figures import draw_all, figure_name
+    from bemkit.studies.sweep.records import QUANTITIES
 
     abscissa, names = over or keys[0], [*keys, *QUANTITIES]
     for name in (abscissa, *shown):
         if name not in names:
             raise click.UsageError(f"{name!r} is no column of numbers: give one of {', '.join(names)}")
-    texts = (
-        TextFile(csv_file, "CSV file of a sweep over these keys", csv_text([*keys, *RESULTS], ()), Sweep.to_csv),
-        TextFile(json_file, "JSON file", JSON_START, Sweep.to_json),
-    )
-    return Outputs(texts, folder, partial(draw_all, abscissa, shown), figure_name(abscissa, shown[0]))
+    return partial(draw_all, abscissa, shown), figure_name(abscissa, shown[0])

@@ -6,8 +6,8 @@ from functools import partial
 
 import click
 
-from bemkit.cli.options import StudyProgress, reserve
-from bemkit.results.outputs import JSON_START, Outputs, TextFile
+from bemkit.cli.options import StudyProgress, reserve, study_output
+from bemkit.cli.outputs import Outputs, TextFile
 
 MISSED = 1
 
@@ -15,7 +15,7 @@ MISSED = 1
 @click.command()
 @click.argument("names", nargs=-1)
 @click.option("--quick", is_flag=True, help="Leave out the finest resolutions: at most one minute.")
-@click.option("-o", "--output", metavar="FILE", help="Keep the rows (HDF5); rows already in the file are not repeated.")
+@click.option("-o", "--output", metavar="FILE", help="Rows as .csv, .json, .md, .h5; .jsonl also resumes.")
 @click.option("--json", "json_file", metavar="FILE", help="Write the rows as JSON; - is standard output.")
 @click.option("--markdown", metavar="FILE", help="Write the table as Markdown; - is standard output.")
 @click.option("-q", "--quiet", is_flag=True, help="Print neither progress nor the table.")
@@ -28,17 +28,16 @@ def verify(
     """
     with StudyProgress(quiet) as progress:
         from bemkit.studies.verification.records import FILE, Verification
-        from bemkit.studies.verification.report import MARKDOWN_START, print_verification, to_markdown
         from bemkit.studies.verification.verification import verify as verify_cases
 
-        texts = (
-            TextFile(json_file, "JSON file", JSON_START, Verification.to_json),
-            TextFile(markdown, "Markdown file of a verification", MARKDOWN_START, to_markdown),
-        )
-        outputs = Outputs(texts)
-        reserve(outputs.check(FILE.check(output)))
-        found = verify_cases(names, quick=quick, run=partial(progress.compute, name="verification"), file=output)
+        rows, table = study_output(output, Verification.as_table)
+        texts = TextFile(json_file, Verification.to_json), TextFile(markdown, Verification.to_markdown)
+        outputs = Outputs((table, *texts))
+        reserve(outputs.check(FILE.check(rows)))
+        found = verify_cases(names, quick=quick, run=partial(progress.compute, name="verification"), file=rows)
     outputs.write(found)
     if not quiet and not outputs.uses_stdout:
+        from bemkit.cli.printed_verification import print_verification
+
         print_verification(found)
     return 0 if found.is_met else MISSED

@@ -7,8 +7,8 @@ from itertools import groupby
 import numpy as np
 
 from bemkit.pictures.contact_axes import axes_with_strip, cut_peaks
+from bemkit.pictures.drawing import BLUE, VERMILION, Axes, axes_or_new, label_values
 from bemkit.pictures.traction_curves import boundary_curve
-from bemkit.results.drawing import BLUE, VERMILION, Axes, axes_or_new, label_values
 from bemkit.results.solution import Solution
 from bemkit.scene.unit_names import UnitNames, with_unit
 

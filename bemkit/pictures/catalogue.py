@@ -19,11 +19,11 @@ from bemkit.pictures.contact_curves import (
 from bemkit.pictures.contact_map import draw_contact_map, draw_zoom, is_short
 from bemkit.pictures.convergence import draw_convergence
 from bemkit.pictures.deformation import draw_deformation, draw_scene
+from bemkit.pictures.drawing import Axes, Figure
 from bemkit.pictures.load_history import draw_friction_loop, draw_status_over_time, draw_work, has_friction
 from bemkit.pictures.shown import Result
 from bemkit.pictures.stress import STRESSES, draw_stress
 from bemkit.results.assembly_solution import AssemblySolution
-from bemkit.results.drawing import Axes, Figure
 
 MOST_CONTACTS = 6
 """Contacts up to which each has pictures of its own where none is named."""

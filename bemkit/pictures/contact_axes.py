@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray
+from bemkit.pictures.drawing import BLUE, GREY, ORANGE, VERMILION, Axes, axes_or_new
 from bemkit.pictures.shown import Result
-from bemkit.results.drawing import BLUE, GREY, ORANGE, VERMILION, Axes, axes_or_new
 from bemkit.scene.unit_names import UnitNames, amount, with_unit
 
 STATUS_COLOURS: Mapping[str, str] = MappingProxyType({"separated": "#D9D9D9", "slip": ORANGE, "stick": BLUE})

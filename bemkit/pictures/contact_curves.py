@@ -16,9 +16,9 @@ from bemkit.pictures.contact_axes import (
     traction_scale,
 )
 from bemkit.pictures.crowds import MANY, marked
+from bemkit.pictures.drawing import BLUE, VERMILION, Axes, axes_or_new, ignore_round_off, label_values, show_grid
 from bemkit.pictures.shown import Result
 from bemkit.pictures.traction_curves import traction_curve
-from bemkit.results.drawing import BLUE, VERMILION, Axes, axes_or_new, ignore_round_off, label_values, show_grid
 from bemkit.scene.unit_names import UnitNames, with_unit
 
 

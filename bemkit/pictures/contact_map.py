@@ -10,12 +10,12 @@ from bemkit.arrays import FloatArray
 from bemkit.pictures.contact_axes import STATUS_COLOURS
 from bemkit.pictures.contact_nodes import Nodes, contact_directions, contact_nodes, is_closed, node_points
 from bemkit.pictures.crowds import marked
+from bemkit.pictures.drawing import VERMILION, Axes, legend_below
 from bemkit.pictures.magnification import magnification
 from bemkit.pictures.obstacles import draw_obstacles, draw_rigid_bodies
 from bemkit.pictures.plane import draw_arrows, draw_bodies, draw_initial, joined_frame, plane_axes, set_frame
 from bemkit.pictures.shown import Result, Shown, shown
 from bemkit.results.contact_table import ContactTable
-from bemkit.results.drawing import VERMILION, Axes, legend_below
 from bemkit.scene.unit_names import UnitNames, amount
 
 _TOOTH, _SHARE, _SHORTEST = 0.1, 1.0 / 3.0, 0.03

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from bemkit.pictures.drawing import BLUE, VERMILION, Axes, axes_or_new, show_grid
 from bemkit.pictures.shown import Result
-from bemkit.results.drawing import BLUE, VERMILION, Axes, axes_or_new, show_grid
 
 
 def draw_convergence(solution: Result, axes: Axes | None = None) -> Axes:

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
+from bemkit.pictures.drawing import Axes, legend_below
 from bemkit.pictures.loads import draw_loads
 from bemkit.pictures.magnification import magnification
 from bemkit.pictures.obstacles import draw_obstacles, draw_rigid_bodies
 from bemkit.pictures.plane import draw_bodies, draw_initial, draw_symmetry_lines, joined_frame, plane_axes, set_frame
 from bemkit.pictures.shown import Drawable, Result, Shown, shown
 from bemkit.pictures.supports import draw_supports
-from bemkit.results.drawing import Axes, legend_below
 from bemkit.scene.unit_names import UnitNames
 
 

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from bemkit.atomic_files import OutputFileError
+from bemkit.atomic_files import OutputFileError, check_target
 from bemkit.errors import InputError
 from bemkit.pictures.animation import GIF, MP4, check_animation, save_animation
 from bemkit.pictures.catalogue import figures, find_picture
+from bemkit.pictures.figure_files import FIGURE_FORMATS, check_figure_folder, write_figure, write_figures
 from bemkit.pictures.shown import Result
-from bemkit.results.outputs import FIGURE_FORMATS, check_figure, check_figure_folder, write_figure, write_figures
 
 ANIMATION = "animation"
 """The one picture that moves; see `bemkit.pictures.animation`."""
@@ -79,11 +79,11 @@ def check_place(place: str | Path, what: Sequence[str] | None) -> list[Path]:
     check_figure_folder(None)
     if place.suffix in (GIF, MP4):
         if what is not None and list(what) != [ANIMATION]:
-            raise OutputFileError(f"{place}: a moving picture is the picture 'animation' alone: name it, and no other")
+            raise OutputFileError(f"{place}: only the picture 'animation' can be written to .gif or .mp4")
         return [check_animation(place)]
     if place.suffix in FIGURE_FORMATS:
         if what is None or len(set(what)) != 1 or ANIMATION in what:
             raise OutputFileError(f"{place}: one file takes one picture: name one, or give a folder")
-        return [check_figure(place)]
+        return [check_target(place)]
     check_figure_folder(place)
     return []

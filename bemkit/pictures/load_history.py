@@ -6,9 +6,9 @@ import numpy as np
 
 from bemkit.errors import InputError
 from bemkit.pictures.contact_axes import STATUS_COLOURS
+from bemkit.pictures.drawing import BLUE, GREEN, GREY, VERMILION, Axes, axes_or_new, ignore_round_off, show_grid
 from bemkit.pictures.shown import Result
 from bemkit.results.contact_table import STATUS_WORDS
-from bemkit.results.drawing import BLUE, GREEN, GREY, VERMILION, Axes, axes_or_new, ignore_round_off, show_grid
 from bemkit.results.load_history import LoadHistory
 from bemkit.scene.unit_names import UnitNames, with_unit
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from bemkit.arrays import FloatArray
+from bemkit.pictures.drawing import VERMILION, Axes
 from bemkit.pictures.plane import Stations, draw_arrows, stations
 from bemkit.pictures.shown import Shown, ShownBody
-from bemkit.results.drawing import VERMILION, Axes
 from bemkit.scene.body_forces import Gravity
 from bemkit.scene.conditions import Pressure, Traction
 

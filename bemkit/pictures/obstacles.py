@@ -15,9 +15,9 @@ from bemkit.errors import InputError
 from bemkit.formulas import evaluate_field
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.neighbours import along_boundary
+from bemkit.pictures.drawing import GREY, Axes
 from bemkit.pictures.plane import set_frame
 from bemkit.pictures.shown import Shown
-from bemkit.results.drawing import GREY, Axes
 from bemkit.scene.conditions import Contact
 
 _EDGE, _HATCH = "#555555", "#888888"

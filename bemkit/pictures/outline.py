@@ -6,7 +6,7 @@ import numpy as np
 
 from bemkit.geometry.outline import Outline
 from bemkit.geometry.vectors import norms, turned_right
-from bemkit.results.drawing import BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILION, Axes, axes_or_new, show_grid
+from bemkit.pictures.drawing import BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILION, Axes, axes_or_new, show_grid
 from bemkit.scene.unit_names import UnitNames, with_unit
 
 _COLOURS = (BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY)

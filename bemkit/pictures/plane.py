@@ -9,8 +9,8 @@ import numpy as np
 from bemkit.arrays import FloatArray, IntArray
 from bemkit.geometry.neighbours import along_boundary
 from bemkit.geometry.symmetry import Symmetry
+from bemkit.pictures.drawing import BLUE, GREY, Axes, axes_or_new
 from bemkit.pictures.shown import Shown, ShownBody
-from bemkit.results.drawing import BLUE, GREY, Axes, axes_or_new
 from bemkit.scene.unit_names import UnitNames, with_unit
 
 if TYPE_CHECKING:

@@ -12,11 +12,11 @@ from bemkit.arrays import FloatArray
 from bemkit.errors import InputError
 from bemkit.operators.material import Material
 from bemkit.operators.somigliana.stress import principal_stresses, von_mises
+from bemkit.pictures.drawing import Axes
 from bemkit.pictures.obstacles import draw_obstacles, draw_rigid_bodies
 from bemkit.pictures.plane import draw_initial, inside, joined_frame, plane_axes, set_frame
 from bemkit.pictures.shown import Result, shown
 from bemkit.pictures.stress_points import StressPoints, stress_points
-from bemkit.results.drawing import Axes
 from bemkit.scene.unit_names import UnitNames, amount, with_unit
 
 

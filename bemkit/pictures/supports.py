@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from bemkit.arrays import FloatArray
+from bemkit.pictures.drawing import GREEN, Axes
 from bemkit.pictures.plane import Stations, draw_arrows, stations
 from bemkit.pictures.shown import Shown
-from bemkit.results.drawing import GREEN, Axes
 from bemkit.scene.conditions import Clamped, PrescribedDisplacement, Roller
 
 _SPACING, _SIZE = 0.035, 0.012

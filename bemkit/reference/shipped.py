@@ -15,6 +15,7 @@ from types import MappingProxyType
 
 import numpy as np
 
+from bemkit.operators.linear.solvers import Automatic
 from bemkit.reference.column import uniaxial_strain_modulus
 from bemkit.reference.compare import Answer, Places, Reference, Zone
 from bemkit.reference.disc import DiscBetweenPlates
@@ -33,8 +34,8 @@ def find_reference(scene: Scene) -> Reference | None:
     Parameters
     ----------
     scene : Scene
-        Its problem must be that of a shipped scene with a reference, to the last number; mesh, discretisation and
-        solver may differ.
+        Its problem must be that of a shipped scene with a reference, to the last number; mesh, discretisation,
+        solvers and names of units may differ.
 
     Returns
     -------
@@ -56,6 +57,8 @@ def _problem(scene: Scene) -> Scene:
         mesh=MeshOptions(),
         discretisation=Galerkin(1),
         solver=Fallbacks(),
+        linear_solver=Automatic(),
+        units=None,
     )
 
 

@@ -9,7 +9,7 @@ from io import BytesIO
 from typing import TypeAlias
 from xml.etree import ElementTree
 
-from bemkit.results.drawing import Figure
+from bemkit.pictures.drawing import Figure
 
 Element: TypeAlias = "ElementTree.Element[str]"
 Content: TypeAlias = "Element | str"

@@ -9,6 +9,7 @@ from typing import Any
 from bemkit.errors import BemkitError
 from bemkit.pictures.catalogue import find_picture
 from bemkit.pictures.deformation import draw_deformation, draw_scene
+from bemkit.pictures.drawing import Axes
 from bemkit.pictures.load_history import draw_friction_loop
 from bemkit.pictures.shown import Result
 from bemkit.plan import Plan
@@ -16,7 +17,6 @@ from bemkit.report.html import Element, element, facts, image, render, table
 from bemkit.report.pictures import has_pictures
 from bemkit.report.sections import badge, headline_rows, plan_section
 from bemkit.results.assembly_solution import AssemblySolution
-from bemkit.results.drawing import Axes
 from bemkit.results.solution import Solution
 from bemkit.results.solved_problem import SolvedSteps
 from bemkit.scene.assembly import Assembly

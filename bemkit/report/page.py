@@ -5,7 +5,7 @@ from __future__ import annotations
 from importlib import resources
 from pathlib import Path
 
-from bemkit.atomic_files import OutputFileError, check_target
+from bemkit.atomic_files import OutputFileError, check_target, write_text
 from bemkit.pictures.shown import Result
 from bemkit.report.html import Element, element, facts, render
 from bemkit.report.pictures import has_pictures, picture_elements
@@ -21,7 +21,6 @@ from bemkit.report.sections import (
     version_section,
     warnings_section,
 )
-from bemkit.results.outputs import begins_with, write_text
 
 _START = "<!DOCTYPE html>"
 
@@ -48,7 +47,7 @@ def report(result: Result) -> str:
         "Plan": plan_section(result.plan),
         "Scene": scene_section(result),
         "Run times": timing_section(result),
-        "Versions": version_section(),
+        "Versions": version_section(result),
     }
     links = [element("li", element("a", name, href=f"#{_identifier(name)}")) for name in sections]
     body = element(
@@ -80,7 +79,7 @@ def save_report(path: str | Path, result: Result) -> Path:
         If the file cannot be written, or a file that is no page stands in the way.
     """
     target = check_report(path)
-    write_text(str(target), report(result))
+    write_text(target, report(result))
     return target
 
 
@@ -88,7 +87,7 @@ def check_report(path: str | Path) -> Path:
     """Find out whether a report can be written, and return its path; OutputFileError if not."""
     if Path(path).suffix.lower() not in (".html", ".htm"):
         raise OutputFileError(f"{path}: a report is a page of HTML: give a name that ends in .html")
-    return check_target(Path(path), "report", lambda existing: begins_with(existing, _START))
+    return check_target(Path(path))
 
 
 def _style() -> str:

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import platform
-from collections.abc import Iterator, Mapping
-from importlib.metadata import PackageNotFoundError, version
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
+from bemkit.hdf5 import provenance
 from bemkit.pictures.shown import Result
 from bemkit.plan import Plan
 from bemkit.report.html import Element, element, facts, number, table
@@ -20,7 +19,6 @@ _MOST_ROWS = 200
 """Of a table; the files hold all."""
 _QUANTITIES = {"force_normal": "force", "force_tangential": "force", "energy": "energy"}
 _COUNTED = ("n_bodies", "n_elements", "n_contact", "linear_solves", "outer_steps")
-_PACKAGES = ("numpy", "scipy", "h5py", "matplotlib")
 
 
 def badge(result: Result) -> Element:
@@ -53,14 +51,14 @@ def forces_section(result: Result) -> list[Element]:
     """Return what contacts and parts carry, and where the status changes."""
     summary, found = result.summary(), []
     if summary["contacts"]:
-        found.append(table(_shortened(summary["contacts"]), "What each contact transmits"))
+        found.append(_shortened(summary["contacts"], "What each contact transmits"))
     parts = summary.get("parts") or [
         {"body": name, **part} for name, body in summary.get("bodies", {}).items() for part in body["parts"]
     ]
     if parts:
-        found.append(table(_shortened(parts), "Resultants of the tractions on each part"))
+        found.append(_shortened(parts, "Resultants of the tractions on each part"))
     if summary["transitions"]:
-        found.append(table(_shortened(summary["transitions"]), "Where the contact status changes"))
+        found.append(_shortened(summary["transitions"], "Where the contact status changes"))
     return found or [element("p", "No part of the boundary has a name.")]
 
 
@@ -84,7 +82,7 @@ def convergence_section(result: Result) -> list[Element]:
     columns["worst"] = [record.certificate.worst for record in result.history]
     names = ("step", "linear_solves", "n_separated", "n_stick", "n_slip", "n_changed", "relative_change", "worst")
     rows = [{name: _plain(columns[name][k]) for name in (*names, "message")} for k in range(len(result.history))]
-    return [element("p", result.message or result.status.value), table(_shortened(rows), "Steps of the solver")]
+    return [element("p", result.message or result.status.value), _shortened(rows, "Steps of the solver")]
 
 
 def plan_section(plan: Plan) -> list[Element]:
@@ -108,14 +106,9 @@ def timing_section(result: Result) -> list[Element]:
     return [facts([(name, f"{seconds:.3g} s") for name, seconds in result.timings.items()], "Run times")]
 
 
-def version_section() -> list[Element]:
-    """Return the versions of what computed and drew."""
-    rows = [("bemkit", __version__), ("Python", platform.python_version()), ("system", platform.system())]
-    for name in _PACKAGES:
-        try:
-            rows.append((name, version(name)))
-        except PackageNotFoundError:
-            rows.append((name, "not installed"))
+def version_section(result: Result) -> list[Element]:
+    """Return the versions that computed the result and the version that drew this page."""
+    rows = [*(result.provenance or provenance()).items(), ("page drawn by", f"bemkit {__version__}")]
     return [facts(rows, "Versions")]
 
 
@@ -130,6 +123,8 @@ def _plain(value: Any) -> Any:
     return value.item() if hasattr(value, "item") else value
 
 
-def _shortened(rows: list[Mapping[str, Any]] | list[dict[str, Any]]) -> list[Mapping[str, Any]]:
-    """Return the first rows of a long table."""
-    return [{key: _plain(value) for key, value in row.items()} for row in rows[:_MOST_ROWS]]
+def _shortened(rows: Sequence[Mapping[str, Any]], caption: str) -> Element:
+    """Return a table of the first rows, whose caption says how many there are."""
+    first = [{key: _plain(value) for key, value in row.items()} for row in rows[:_MOST_ROWS]]
+    cut = "" if len(first) == len(rows) else f" (the first {len(first)} of {len(rows)} rows)"
+    return table(first, caption + cut)

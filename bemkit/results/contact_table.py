@@ -14,6 +14,7 @@ from bemkit.arrays import BoolArray, FloatArray, IntArray, read_only
 from bemkit.contact.laws import FrictionLaw
 from bemkit.errors import InputError
 from bemkit.solvers.active_sets import NodeStatus
+from bemkit.table import Column
 
 STATUS_WORDS: Mapping[NodeStatus, str] = MappingProxyType(
     {
@@ -23,6 +24,21 @@ STATUS_WORDS: Mapping[NodeStatus, str] = MappingProxyType(
         NodeStatus.SLIP_BACKWARD: "slip",
     }
 )
+CONTACT_COLUMNS = (
+    Column("x", "m", "first coordinate", ".6g"),
+    Column("y", "m", "second coordinate", ".6g"),
+    Column("s", "m", "arc length from the start of the part", ".6g"),
+    Column("u_n", "m", "displacement towards the obstacle or the partner", ".6g"),
+    Column("u_t", "m", "displacement along the tangent", ".6g"),
+    Column("sigma_n", "Pa", "normal traction, negative where pressed", ".6g"),
+    Column("sigma_t", "Pa", "tangential traction", ".6g"),
+    Column("gap", "m", "initial distance", ".6g"),
+    Column("clearance", "m", "distance left, gap - u_n", ".6g"),
+    Column("status", "", "separated, slip or stick; in files 0, 1 stick, 2 slip along the tangent, 3 slip against it"),
+    Column("weight", "m", "length of boundary that the node stands for", ".6g"),
+    Column("part", "", "contact part or contact of each node"),
+)
+"""Columns of the contact table in results, tables and files."""
 FLICKER = 1e-8
 """Changes of status within this share of a side count as one. Clearances grow like d**1.5 with the distance d from the
 edge, so that they are round-off there, and the status may change from node to node."""
@@ -132,8 +148,7 @@ class ContactTable:
 
     def columns(self) -> dict[str, FloatArray | IntArray]:
         """Return the numerical columns by name."""
-        names = ("x", "y", "s", "u_n", "u_t", "sigma_n", "sigma_t", "gap", "clearance", "status", "weight")
-        return {name: getattr(self, name) for name in names}
+        return {head.name: getattr(self, head.name) for head in CONTACT_COLUMNS if head.name != "part"}
 
     def status_words(self) -> list[str]:
         """Return ``"separated"``, ``"slip"`` or ``"stick"`` for each node."""

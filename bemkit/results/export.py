@@ -11,11 +11,10 @@ from typing import Any
 import numpy as np
 
 from bemkit.arrays import FloatArray, IntArray
-from bemkit.atomic_files import OutputFileError, check_target, replacing
+from bemkit.atomic_files import OutputFileError, check_target, replacing, write_text
 from bemkit.results.assembly_solution import AssemblySolution
-from bemkit.results.outputs import JSON_START, STDOUT, begins_with, write_text
 from bemkit.results.solution import Solution
-from bemkit.results.tables import CSV_STARTS, to_csv, to_json
+from bemkit.results.tables import to_csv, to_json
 from bemkit.results.vtk import bodies_of, write_vtk
 
 MOST_ACROSS = 1000
@@ -55,7 +54,7 @@ def format_of(path: str | Path, inside: int = 0) -> Format:
     OutputFileError
         If the ending is unknown, naming those there are, or the format holds no fields inside that are asked for.
     """
-    if str(path) == STDOUT:
+    if str(path) == "-":
         raise OutputFileError("- is standard output, which cannot take a result: give a file name")
     ending = Path(path).suffix.lower()
     if ending not in FORMATS:
@@ -86,7 +85,7 @@ def export_result(path: str | Path, solution: Solution | AssemblySolution, *, in
     Raises
     ------
     OutputFileError
-        If the ending is unknown, the file cannot be written, or one of another kind stands in the way.
+        If the ending is unknown, or the file cannot be written.
     """
     chosen = format_of(path, inside)
     target = chosen.check(Path(path))
@@ -126,24 +125,19 @@ def _write_hdf5(path: Path, solution: Solution | AssemblySolution) -> None:
     write_result(path, solution)
 
 
-def _text(kind: str, start: str, text: Callable[[Solution | AssemblySolution], str]) -> Format:
-    def check(path: Path) -> Path:
-        return check_target(path, kind, lambda existing: begins_with(existing, start))
-
-    return Format(check, lambda path, solution: write_text(str(path), text(solution)))
+def _text(text: Callable[[Solution | AssemblySolution], str]) -> Format:
+    return Format(check_target, lambda path, solution: write_text(path, text(solution)))
 
 
-_VTK = Format(
-    lambda path: check_target(path, "VTK file", lambda existing: begins_with(existing, "<")), write_vtk, write_vtk
-)
+_VTK = Format(check_target, write_vtk, write_vtk)
 _HDF5 = Format(_check_hdf5, _write_hdf5)
 FORMATS: Mapping[str, Format] = MappingProxyType(
     {
         ".h5": _HDF5,
         ".hdf5": _HDF5,
-        ".json": _text("JSON file", JSON_START, to_json),
-        ".csv": _text("CSV file of the contact table", CSV_STARTS["contact"], lambda each: to_csv(each, "contact")),
-        ".npz": Format(lambda path: check_target(path, "NPZ file", lambda old: begins_with(old, "PK")), _write_npz),
+        ".json": _text(to_json),
+        ".csv": _text(lambda each: to_csv(each, "contact")),
+        ".npz": Format(check_target, _write_npz),
         ".vtu": _VTK,
         ".vtp": _VTK,
     }

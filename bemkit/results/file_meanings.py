@@ -6,11 +6,13 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
+from bemkit.results.contact_table import CONTACT_COLUMNS
 from bemkit.scene.unit_names import UnitNames, unit_of
 
 if TYPE_CHECKING:
     import h5py
 
+_QUANTITIES = {"": "", "m": "length", "Pa": "stress"}
 _POINTS = {"x": ("length", "first coordinate"), "y": ("length", "second coordinate")}
 _RESULTANTS = {
     "force_x": ("force", "resultant along x, per unit of thickness"),
@@ -38,17 +40,7 @@ MEANINGS: Mapping[str, Mapping[str, tuple[str, str]]] = MappingProxyType(
             "reaction": ("force", "force of supports along x and y at the points"),
         },
         "contact": {
-            **_POINTS,
-            "part": ("", "contact part or contact of each node"),
-            "s": ("length", "arc length from the start of the part"),
-            "u_n": ("length", "displacement towards the obstacle or the partner"),
-            "u_t": ("length", "displacement along the tangent"),
-            "sigma_n": ("stress", "normal traction, negative where pressed"),
-            "sigma_t": ("stress", "tangential traction"),
-            "gap": ("length", "initial distance"),
-            "clearance": ("length", "distance left, gap - u_n"),
-            "status": ("", "0 separated, 1 stick, 2 slip along the tangent, 3 slip against it"),
-            "weight": ("length", "length of boundary that the node stands for"),
+            **{head.name: (_QUANTITIES[head.unit], head.meaning) for head in CONTACT_COLUMNS},
             "direction_x": ("", "direction of contact, first component"),
             "direction_y": ("", "direction of contact, second component"),
             "friction_bound": ("stress", "largest tangential traction that the law allows"),

@@ -55,7 +55,6 @@ from bemkit.results.assembly_solution import AssemblySolution, BodyResult
 from bemkit.results.contact_table import ContactTable, Transition
 from bemkit.results.file_meanings import annotate
 from bemkit.results.history_file import TRANSITION_COLUMNS, read_history, write_history
-from bemkit.results.outputs import STDOUT
 from bemkit.results.part_forces import ContactForce, PartForce, RigidResult
 from bemkit.results.solution import BoundaryFields, Solution
 from bemkit.results.tables import CERTIFICATE_ENTRIES, RECORD_COUNTS, columns_of, history_columns
@@ -94,7 +93,7 @@ def check_result_target(path: str | Path) -> Path:
     OutputFileError
         If the folder cannot be written to, or a file that is not a bemkit result stands in the way.
     """
-    if str(path) == STDOUT:
+    if str(path) == "-":
         raise OutputFileError("- is standard output, which cannot take a binary result: give a file name")
     return FORMAT.check_target(path)
 
@@ -232,6 +231,7 @@ def _write_outcome(
     for name in ("plan", "work"):
         write_text(file, name, json.dumps(unstructure(getattr(solution, name))))
     file.create_group("memory").attrs.update(solution.memory)
+    file["provenance"].attrs.update(solution.provenance)
     write_text(file, "warnings", json.dumps([unstructure(warning) for warning in solution.warnings]))
 
 
@@ -252,6 +252,7 @@ def _read_outcome(reader: Reader, columns: tuple[str, ...] = ()) -> tuple[dict[s
         "plan": structure(json.loads(reader.text("plan", _MAX_PLAN)), Plan),
         "work": structure(json.loads(reader.text("work", _MAX_PLAN)), OperationCounts),
         "memory": {name: int(value) for name, value in reader.attributes("memory").items()},
+        "provenance": {name: str(value) for name, value in reader.attributes("provenance").items()},
         "warnings": structure(json.loads(reader.text("warnings", _MAX_PLAN)), tuple[ResultWarning, ...]),
     }
     return outcome, further

@@ -58,6 +58,8 @@ class SolvedProblem(ShownInNotebooks):
         See `bemkit.results.warnings`.
     loading : LoadHistory, optional
         The steps up to this one; None without a load history.
+    provenance : mapping of str to str
+        Versions, platform and time of a result from a file; empty otherwise.
     """
 
     status: Status
@@ -74,6 +76,7 @@ class SolvedProblem(ShownInNotebooks):
     memory: Mapping[str, int] = field(default_factory=dict)
     warnings: WhenAsked[tuple[ResultWarning, ...]] = WhenAsked(())  # noqa: RUF009 - a descriptor, shared by all on purpose
     loading: LoadHistory | None = None
+    provenance: Mapping[str, str] = field(default_factory=dict)
 
     if TYPE_CHECKING:  # a field of the one kind, a property of the other
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import fields
-from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,29 +12,27 @@ from bemkit.arrays import FloatArray
 from bemkit.contact.certificate import Certificate
 from bemkit.errors import InputError
 from bemkit.geometry.local_values import values_on_elements
+from bemkit.results.contact_table import CONTACT_COLUMNS
 from bemkit.results.load_history import step_rows
-from bemkit.results.outputs import csv_text, json_text
 from bemkit.results.solution import Solution
 from bemkit.results.solved_body import SolvedBody
 from bemkit.solvers.base import StepRecord
+from bemkit.table import Column, Table, json_text
 
 if TYPE_CHECKING:
     from bemkit.results.assembly_solution import AssemblySolution
 
 TABLES = ("contact", "boundary", "history", "steps")
-CSV_STARTS: Mapping[str, str] = MappingProxyType(
-    {
-        "contact": "x,y,s,u_n,",
-        "boundary": "element,part,x,",
-        "history": "step,linear_solves,",
-        "steps": "time,external_work,",
-    }
-)
-"""How the first line of each table begins, by which its files are recognised."""
-
 CERTIFICATE_ENTRIES = tuple(entry.name for entry in fields(Certificate))
 RECORD_COUNTS = ("step", "linear_solves", "n_separated", "n_stick", "n_slip", "n_changed")
-_CONTACT = ("x", "y", "s", "u_n", "u_t", "sigma_n", "sigma_t", "gap", "clearance")
+_BOUNDARY = (
+    Column("body", "", "name of the body"),
+    Column("element", "", "index of the element"),
+    Column("u_x", "m", "displacement along x at the centre", ".6g"),
+    Column("u_y", "m", "displacement along y at the centre", ".6g"),
+    Column("t_x", "Pa", "mean traction along x", ".6g"),
+    Column("t_y", "Pa", "mean traction along y", ".6g"),
+)
 
 
 def to_csv(solution: Solution | AssemblySolution, table: str) -> str:
@@ -53,10 +50,16 @@ def to_csv(solution: Solution | AssemblySolution, table: str) -> str:
     InputError
         If there is no table of that name, or no load history.
     """
+    return table_of(solution, table).to_csv()
+
+
+def table_of(solution: Solution | AssemblySolution, table: str) -> Table:
+    """Return one table of a solution; see `to_csv`."""
     if table not in TABLES:
         raise InputError(f"table is {table!r}: give one of {', '.join(TABLES)}")
-    columns = _columns(solution, table)
-    return csv_text(columns, zip(*(np.asarray(column).tolist() for column in columns.values()), strict=True))
+    arrays = _columns(solution, table)
+    known = {head.name: head for head in (*CONTACT_COLUMNS, *_BOUNDARY)}
+    return Table.from_arrays([known.get(name) or Column(name) for name in arrays], arrays)
 
 
 def columns_of(
@@ -95,8 +98,8 @@ def _columns(solution: Solution | AssemblySolution, table: str) -> dict[str, Any
     match table:
         case "contact":
             contact = solution.contact
-            columns = {name: getattr(contact, name) for name in _CONTACT}
-            return columns | {"status": contact.status_words(), "part": list(contact.part)}
+            columns: dict[str, Any] = contact.columns() | {"status": contact.status_words(), "part": list(contact.part)}
+            return {head.name: columns[head.name] for head in CONTACT_COLUMNS if head.name != "weight"}
         case "boundary":
             return _boundary_columns(solution)
         case "steps":

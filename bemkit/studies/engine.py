@@ -7,7 +7,7 @@ import signal
 import time
 from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExecutor, as_completed
-from contextlib import ExitStack, contextmanager
+from contextlib import contextmanager
 from dataclasses import dataclass
 from itertools import groupby
 from multiprocessing import get_context, parent_process
@@ -15,8 +15,8 @@ from threading import Thread
 from typing import Generic, NamedTuple
 
 from bemkit.errors import CANNOT_BE_SENT, BemkitError, InputError, printable, why_not_sent
-from bemkit.results.record_file import R
 from bemkit.results.solved_problem import AnySolution
+from bemkit.studies.row_file import R
 
 REFUSED = "refused"
 """Status of a scene that is refused by a named error before any step."""
@@ -121,56 +121,30 @@ def compute(
         yield finished[task.key] if task.key in finished else task.compute()
 
 
-def compute_with_progress(
-    tasks: Sequence[Task[R]],
-    name: str,
-    *,
-    is_live: bool,
-    processes: int = 1,
-    cluster: str | None = None,
-    finished: Mapping[Hashable, R] | None = None,
-) -> Iterator[R]:
-    """Compute records as `compute` does, here or in several processes, while a bar on standard error shows how far.
+@contextmanager
+def executor_of(processes: int = 1, cluster: str | None = None) -> Iterator[tuple[Executor | None, int]]:
+    """Give an executor of some processes, none for one, and the number of its workers.
 
-    The bar bears a name, and is shown only if it is live. With the address of a `distributed` scheduler, such as
-    ``tcp://10.0.0.1:8786``, the workers of its cluster take the place of processes.
+    With the address of a `distributed` scheduler, such as ``tcp://10.0.0.1:8786``, the workers of its cluster take the
+    place of processes.
 
     Raises
     ------
     StudyError
-        As `compute` does, also if the cluster cannot be reached.
+        If the cluster cannot be reached.
     """
-    from rich.console import Console
-    from rich.progress import (
-        BarColumn,
-        MofNCompleteColumn,
-        Progress,
-        TextColumn,
-        TimeElapsedColumn,
-        TimeRemainingColumn,
-    )
-
-    counts = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn())
-    times = (TimeElapsedColumn(), TextColumn("left"), TimeRemainingColumn())
-    with ExitStack() as stack:
-        executor: Executor | None = None
-        if cluster is not None:
-            executor, processes = stack.enter_context(_cluster(cluster))
-        elif processes > 1:
-            # spawned processes do not inherit threads that hold locks
-            executor = ProcessPoolExecutor(processes, get_context("spawn"), initializer=_prepare_process)
-            stack.callback(executor.shutdown, cancel_futures=True)  # what has not begun is left out
-        bar = Progress(*counts, *times, console=Console(stderr=True), transient=True, disable=not is_live)
-        row = stack.enter_context(bar).add_task(name, total=len(tasks))
-        for record in compute(
-            tasks,
-            executor,
-            finished=finished,
-            begins=lambda task: bar.update(row, description=task.label),
-            n_workers=processes,
-        ):
-            bar.advance(row)
-            yield record
+    if cluster is not None:
+        with _cluster(cluster) as found:
+            yield found
+    elif processes > 1:
+        # spawned processes do not inherit threads that hold locks
+        executor = ProcessPoolExecutor(processes, get_context("spawn"), initializer=_prepare_process)
+        try:
+            yield executor, processes
+        finally:
+            executor.shutdown(cancel_futures=True)
+    else:
+        yield None, 1
 
 
 @contextmanager
@@ -203,7 +177,7 @@ def _computed_elsewhere(tasks: Sequence[Task[R]], executor: Executor, n_workers:
     except BrokenExecutor as error:
         reason = str(error) or type(error).__name__
         raise StudyError(
-            f"the executor broke down ({reason}): finished rows are good; go on with fewer processes or with one"
+            f"the executor failed ({reason}): finished rows are saved; run again with fewer processes"
         ) from error
     except CANNOT_BE_SENT as error:
         if not (reason := why_not_sent([task.compute for task in tasks])):

@@ -14,7 +14,7 @@ from collections.abc import Sequence
 from os import cpu_count
 from pathlib import Path
 
-from bemkit.studies.engine import compute_with_progress
+from bemkit.cli.progress import compute_with_progress
 from checks.trials import Outcome, Trial, save_trial, trial_tasks
 
 OUTCOMES = {

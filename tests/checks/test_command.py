@@ -6,8 +6,9 @@ from pathlib import Path
 
 import pytest
 
+from bemkit.cli.progress import compute_with_progress
 from bemkit.scene.toml import load_scene
-from bemkit.studies.engine import compute, compute_with_progress
+from bemkit.studies.engine import compute
 from checks.random_scenes import random_case
 from checks.random_scenes.__main__ import main
 from checks.trials import Outcome, Trial, trial_tasks

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 import bemkit as bk
+from bemkit.cli.progress import compute_with_progress
 from bemkit.results.assembly_solution import AssemblySolution
 from bemkit.results.result_file import read_result, write_result
 from bemkit.scene.toml import scene_from_toml
-from bemkit.studies.engine import compute_with_progress
 from checks.random_assemblies import random_assembly
 from checks.trials import (
     EVERY,

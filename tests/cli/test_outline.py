@@ -82,7 +82,7 @@ def test_the_sides_of_a_scene_that_comes_with_bemkit_are_shown() -> None:
         (["part.msh", "--tolerance", "5"], "--tolerance is for drawings"),
         (["scene.toml", "--scale", "5"], "a scene file says how its shape is read"),
         (["part.msh", "--scale", "-1"], "file: scale is -1.0: give a positive"),
-        (["version-4.msh", "-o", "notes.txt"], "notes.txt"),
+        (["version-4.msh", "-o", "no/notes.txt"], "does not exist: create it first"),
     ],
 )
 def test_refused_in_one_line(arguments: list[str], message: str, tmp_path, monkeypatch, capsys) -> None:

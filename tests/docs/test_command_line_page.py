@@ -108,5 +108,5 @@ def test_json_fields() -> None:
 @pytest.mark.parametrize("name", TABLES)
 def test_columns(name: str, result: Path) -> None:
     text = section(PAGE, "Tables").partition(f"`{name}` has one row per")[2]
-    printed = CliRunner().invoke(cli.commands, ["show", str(result), "--csv", name]).output
+    printed = CliRunner().invoke(cli.commands, ["show", str(result), "--csv", "-", "--table", name]).output
     assert all_names(text) == next(csv.reader(io.StringIO(printed)))

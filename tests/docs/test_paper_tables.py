@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 import docs.paper_tables as module
+from bemkit.cli.progress import compute_with_progress
 from bemkit.solvers.alm import AugmentedLagrangian, InnerNewton
-from bemkit.studies.engine import Task, compute_with_progress
+from bemkit.studies.engine import Task
 from docs.paper_tables import (
     PRINTED,
     PaperCell,

@@ -24,8 +24,8 @@ from bemkit.pictures import (
     draw_zoom,
 )
 from bemkit.pictures.contact_axes import STATUS_COLOURS
+from bemkit.pictures.drawing import ignore_round_off
 from bemkit.pictures.traction_curves import traction_curve
-from bemkit.results.drawing import ignore_round_off
 from bemkit.results.solution import Solution
 from bemkit.runs.run import run
 from bemkit.scene.toml import load_scene, with_overrides

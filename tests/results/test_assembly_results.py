@@ -145,7 +145,7 @@ def test_the_command_line_takes_assemblies(tmp_path: Path, monkeypatch: pytest.M
     assert "2, with 96 elements" in " ".join(shown.split())
     assert json.loads(Path("r.json").read_text())["converged"]
     assert sorted(path.name for path in Path("p").iterdir()) == ["contacts.png", "deformation.png"]
-    assert call("show", "r.h5", "--csv", "boundary") == 0
+    assert call("show", "r.h5", "--csv", "-", "--table", "boundary") == 0
     assert capsys.readouterr().out.startswith("body,element")
     assert call("show", "r.h5", "--scene") == 0
     assert "[bodies.upper" in capsys.readouterr().out

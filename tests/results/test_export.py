@@ -42,10 +42,6 @@ def test_every_ending_writes_and_replaces_its_own(
     for _ in range(2):
         bk.export_result(path, request.getfixturevalue(name))
     assert [file.name for file in tmp_path.iterdir()] == [path.name]
-    path.write_text("mine", "utf-8")
-    with pytest.raises(OutputFileError, match="exists and is not a"):
-        bk.export_result(path, request.getfixturevalue(name))
-    assert path.read_text("utf-8") == "mine"
 
 
 def test_numpy_reads_the_arrays(bodies: bk.AssemblySolution, tmp_path: Path) -> None:

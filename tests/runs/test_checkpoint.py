@@ -214,7 +214,7 @@ def test_the_command_line_shows_steps(tmp_path: Path, capsys: pytest.CaptureFixt
     file = tmp_path / "loop.h5"
     bk.write_result(file, bk.run(LOOP))
     for arguments in (
-        ["--csv", "steps"],
+        ["--csv", "-", "--table", "steps"],
         ["--scene"],
         ["--json", "-"],
         ["--plot", str(tmp_path / "figures"), "--what", "friction-loop,work"],

@@ -4,26 +4,29 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 
+import h5py
 import pytest
 
 from bemkit.atomic_files import OutputFileError
-from bemkit.hdf5 import FileFormat, ResultFileError
-from bemkit.results.outputs import Outputs, TextFile
-from bemkit.results.record_file import RecordFile, RowJournal
-from bemkit.studies.engine import Task, compute, compute_with_progress
+from bemkit.cli.options import study_output
+from bemkit.cli.outputs import Outputs, TextFile
+from bemkit.cli.progress import compute_with_progress
+from bemkit.studies.engine import Task, compute
+from bemkit.studies.row_file import RowFile, RowFileError
+from bemkit.table import Table, column
 
 
 @dataclass(frozen=True)
 class Square:
     """The square of a number."""
 
-    number: int
-    value: float
-    remark: str = ""
+    number: int = column("a number")
+    value: float = column("its square", "m2", ".3g")
+    remark: str = field(default="", metadata={"meaning": "a | bar", "unit": "", "format": ""})
 
     @property
     def key(self) -> int:
@@ -31,8 +34,7 @@ class Square:
         return self.number
 
 
-FORMAT = FileFormat("bemkit-squares", 1, "bemkit squares file", "bemkit squares -o")
-FILE = RecordFile(FORMAT, Square, ("title",))
+FILE = RowFile("bemkit-squares 1", Square, ("title",))
 LABELS = {"title": "squares"}
 
 
@@ -64,7 +66,7 @@ def test_records_come_in_order_and_finished_ones_are_handed_on() -> None:
 
 
 def test_every_record_is_in_the_file_before_the_next_is_computed(tmp_path: Path) -> None:
-    path = tmp_path / "squares.h5"
+    path = tmp_path / "squares.jsonl"
     assert FILE.check(str(path)) == [path]
     with pytest.raises(ValueError, match="no such number"):
         list(FILE.keep(path, compute(tasks(1, 2, -1, 3)), FILE.finished(path, LABELS), LABELS))
@@ -75,62 +77,70 @@ def test_every_record_is_in_the_file_before_the_next_is_computed(tmp_path: Path)
     assert path.read_bytes() == content  # nothing new, nothing written
     list(FILE.keep(path, compute(tasks(3), finished=finished), finished, LABELS))
     assert [record.key for record in FILE.read(path)[1]] == [1, 2, 3]
-    with pytest.raises(ResultFileError, match="holds the sweep with title squares, not cubes: choose another name"):
+    with pytest.raises(RowFileError, match="holds a study with title squares, not cubes: choose another name"):
         FILE.finished(path, {"title": "cubes"})
 
 
-def test_the_file_is_written_twice_however_many_records_there_are(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    path, written, sizes = tmp_path / "squares.h5", [], []
-    write = RecordFile.write
-    monkeypatch.setattr(RecordFile, "write", lambda *args: (written.append(len(args[3])), write(*args)))
+def test_a_row_is_appended_and_what_was_there_stays(tmp_path: Path) -> None:
+    path, content = tmp_path / "squares.jsonl", ""
     for record in FILE.keep(path, compute(tasks(*range(50))), {}, LABELS):
         assert FILE.read(path)[1][-1] == record
-        sizes.append(path.stat().st_size)
-    assert written == [1, 50]
-    assert len(set(sizes)) == 1  # what was there stays as it was
-    assert [each.name for each in tmp_path.iterdir()] == ["squares.h5"]
+        assert path.read_text().startswith(content)
+        content = path.read_text()
+    assert [each.name for each in tmp_path.iterdir()] == ["squares.jsonl"]
 
 
-def test_the_journal_of_a_killed_study_goes_into_the_file_without_its_last_half_line(tmp_path: Path) -> None:
-    path, killed = tmp_path / "squares.h5", tmp_path / "killed.h5"
-    records = FILE.keep(path, compute(tasks(1, 2, 3, 4)), {}, LABELS)
-    for _ in range(4):
-        next(records)
-    killed.write_bytes(path.read_bytes())
-    journal = tmp_path / ".killed.h5.rows"
-    journal.write_bytes((tmp_path / ".squares.h5.rows").read_bytes()[:-3])
-    records.close()
-    finished = FILE.finished(killed, LABELS)
+def test_a_killed_study_resumes_after_its_last_whole_line(tmp_path: Path) -> None:
+    path = tmp_path / "squares.jsonl"
+    list(FILE.keep(path, compute(tasks(1, 2, 3, 4)), {}, LABELS))
+    path.write_bytes(path.read_bytes()[:-3])
+    finished = FILE.finished(path, LABELS)
     assert list(finished) == [1, 2, 3]
-    assert list(FILE.keep(killed, compute(tasks(1, 2), finished=finished), finished, LABELS))
-    assert not journal.exists()
-    assert [record.key for record in FILE.read(killed)[1]] == [1, 2, 3]
+    list(FILE.keep(path, compute(tasks(3, 4, 5), finished=finished), finished, LABELS))
+    assert [record.key for record in FILE.read(path)[1]] == [1, 2, 3, 4, 5]
 
 
-def test_a_journal_of_another_file_is_passed_over(tmp_path: Path) -> None:
-    path, other = tmp_path / "squares.h5", tmp_path / "other.h5"
-    for name in (path, other):
-        FILE.write(name, LABELS, [square(len(name.name))])
-    journal = RowJournal(other)
-    journal.begin()
-    journal.add([5, 25.0, ""])
-    (tmp_path / ".squares.h5.rows").write_bytes((tmp_path / ".other.h5.rows").read_bytes())
-    assert [record.key for record in FILE.read(path)[1]] == [10]
-    assert [record.key for record in FILE.read(other)[1]] == [8, 5]
-    journal.add([6, 36.0])
-    with pytest.raises(ResultFileError, match=r"other\.h5: a row in \.other\.h5\.rows is damaged: delete that file"):
-        FILE.read(other)
-    (tmp_path / ".other.h5.rows").unlink()
-    (tmp_path / ".other.h5.rows").mkdir()
-    with pytest.raises(OutputFileError, match=r"other\.h5: cannot be written \(Is a directory\): choose another place"):
-        journal.add([6, 36.0, ""])
+def test_rows_are_kept_in_files_that_say_so(tmp_path: Path) -> None:
+    with pytest.raises(OutputFileError, match=r"squares\.h5: rows are kept as JSON Lines: give a name that ends in"):
+        FILE.check(tmp_path / "squares.h5")
+    (tmp_path / "squares.jsonl").mkdir()
+    with pytest.raises(OutputFileError, match=r"squares\.jsonl: cannot be written \(Is a directory\): choose another"):
+        list(FILE.keep(tmp_path / "squares.jsonl", iter([square(1)]), {}, LABELS))
+
+
+def as_table(records: Sequence[Square]) -> Table:
+    return Table.from_records(Square, records)
+
+
+@pytest.mark.parametrize(
+    ("ending", "begin"), [(".csv", "number,value,"), (".json", "[\n"), (".md", "| number |"), (".h5", "")]
+)
+def test_a_table_obeys_the_ending_of_its_file(tmp_path: Path, ending: str, begin: str) -> None:
+    path = tmp_path / f"squares{ending}"
+    rows, table = study_output(str(path), as_table)
+    assert rows is None
+    outputs = Outputs((table,))
+    assert outputs.check() == [path]
+    outputs.write([square(1), square(2)])
+    if ending == ".h5":
+        with h5py.File(path) as file:
+            assert file["value"][()].tolist() == [1.0, 4.0]
+            assert dict(file["value"].attrs) == {"unit": "m2", "meaning": "its square"}
+    else:
+        assert path.read_text().startswith(begin)
+
+
+def test_an_ending_that_no_table_has_is_refused(tmp_path: Path) -> None:
+    message = (
+        r"rows\.xyz: the ending '\.xyz' names no format of tables: give one of \.csv, \.json, \.md, \.h5, or \.jsonl"
+    )
+    with pytest.raises(OutputFileError, match=message):
+        Outputs((study_output(str(tmp_path / "rows.xyz"), as_table)[1],)).check()
+    assert study_output("rows.jsonl", as_table)[0] == "rows.jsonl"
 
 
 def test_texts_are_written_only_where_they_are_wanted(tmp_path: Path) -> None:
-    wanted, other = TextFile(str(tmp_path / "a.txt"), "text", "1", as_text), TextFile(None, "text", "1", as_text)
-    outputs = Outputs((wanted, other))
+    outputs = Outputs((TextFile(str(tmp_path / "a.txt"), as_text), TextFile(None, as_text)))
     assert outputs.check() == [tmp_path / "a.txt"]
     outputs.write([square(1), square(2)])
     assert (tmp_path / "a.txt").read_text() == "1.0\n4.0\n"

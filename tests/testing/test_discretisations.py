@@ -74,9 +74,9 @@ def test_one_of_ones_own_goes_all_the_way(plugin: None, capsys: pytest.CaptureFi
     text = bk.scene_to_toml(replace(bk.load_scene("paper-1"), mesh=bk.MeshOptions(elements=24)))
     Path("own.toml").write_text(text.replace('discretisation = "constant"', 'discretisation = "jumping"'), "utf-8")
     for arguments in (
-        "plan own.toml --json",
+        "plan own.toml --json -",
         "run own.toml -o own.h5 --plot pictures --what deformation",
-        "show own.h5 --csv boundary",
+        "show own.h5 --csv - --table boundary",
     ):
         with pytest.raises(SystemExit) as end:
             main(arguments.split())

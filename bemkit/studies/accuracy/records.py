@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from itertools import groupby, pairwise
 
 import numpy as np
 
 from bemkit.arrays import FloatArray
-from bemkit.hdf5 import FileFormat
 from bemkit.reference.compare import MEASURES
-from bemkit.results.outputs import csv_text
-from bemkit.results.record_file import RecordFile
 from bemkit.scene.registry import RISING
+from bemkit.studies.row_file import RowFile
+from bemkit.table import Column, Table, column
 
 N_FITTED = 3
 """Meshes, from the finest on, to which an order is fitted."""
@@ -26,59 +25,35 @@ STAGES = ("mesh", "assemble", "condense", "solve", "recover")
 
 @dataclass(frozen=True)
 class ErrorRecord:
-    """One line of the table.
+    """One row of an error study: errors are relative, see `bemkit.reference.errors_of`, nan unless certified."""
 
-    Parameters
-    ----------
-    discretisation, map, meshes, solver : str
-        Element type, Steklov-Poincare map, sequence of meshes, driver.
-    size : float
-        Number of elements, or asked-for accuracy of adaptive meshes.
-    status : str
-        Of the driver in small letters, or ``refused``.
-    elements, unknowns, contact_nodes, linear_solves, outer_steps : int
-        The unknowns are the displacements of all nodes.
-    seconds : float [s]
-        Run time of everything; median over the repetitions, nan if it was not measured.
-    seconds_mesh, seconds_assemble, seconds_condense, seconds_solve, seconds_recover : float [s]
-        Its stages.
-    peak_memory : float [bytes]
-        Largest memory held by arrays and objects at one time, in a run of its own; nan if it was not measured.
-    estimated_error : float
-        In the energy norm, relative, as the solution itself tells; nan for collocation.
-    energy, sigma_n, sigma_t, displacement, force_normal, force_tangential, transitions : float
-        Relative errors, see `bemkit.reference.errors_of`; nan unless the record is certified.
-    message : str
-        Why there is no result, or why an accuracy was not reached.
-    """
-
-    discretisation: str
-    map: str
-    meshes: str
-    solver: str
-    size: float
-    status: str
-    elements: int
-    unknowns: int
-    contact_nodes: int
-    linear_solves: int
-    outer_steps: int
-    seconds: float
-    seconds_mesh: float
-    seconds_assemble: float
-    seconds_condense: float
-    seconds_solve: float
-    seconds_recover: float
-    peak_memory: float
-    estimated_error: float
-    energy: float
-    sigma_n: float
-    sigma_t: float
-    displacement: float
-    force_normal: float
-    force_tangential: float
-    transitions: float
-    message: str
+    discretisation: str = column("element type")
+    map: str = column("Steklov-Poincare operator")
+    meshes: str = column("sequence of meshes")
+    solver: str = column("nonlinear solver")
+    size: float = column("number of elements, or requested accuracy of adaptive meshes", format="g")
+    status: str = column("of the solver in small letters, or refused")
+    elements: int = column("number of elements")
+    unknowns: int = column("displacements of all nodes")
+    contact_nodes: int = column("number of contact nodes")
+    linear_solves: int = column("number of linear solves")
+    outer_steps: int = column("steps of the nonlinear solver")
+    seconds: float = column("run time, median over the repetitions; nan if not measured", "s", ".3f")
+    seconds_mesh: float = column("of the mesh", "s", ".3f")
+    seconds_assemble: float = column("of assembly", "s", ".3f")
+    seconds_condense: float = column("of condensation", "s", ".3f")
+    seconds_solve: float = column("of the contact problem", "s", ".3f")
+    seconds_recover: float = column("of the fields", "s", ".3f")
+    peak_memory: float = column("largest memory of arrays and objects, in a run of its own", "byte", ".3g")
+    estimated_error: float = column("in the energy norm, as the solution estimates it; nan for collocation", "", ".1e")
+    energy: float = column("error of the elastic energy", "", ".1e")
+    sigma_n: float = column("error of normal contact tractions", "", ".1e")
+    sigma_t: float = column("error of tangential contact tractions", "", ".1e")
+    displacement: float = column("error of displacements", "", ".1e")
+    force_normal: float = column("error of the normal contact force", "", ".1e")
+    force_tangential: float = column("error of the tangential contact force", "", ".1e")
+    transitions: float = column("error of the points where the status changes", "", ".1e")
+    message: str = column("why there is no result, or why an accuracy was not reached")
 
     @property
     def is_certified(self) -> bool:
@@ -167,25 +142,28 @@ def pareto_front(records: Sequence[ErrorRecord], measure: str) -> list[ErrorReco
     return front
 
 
-FORMAT = FileFormat("bemkit-study", 2, "bemkit study errors file", "bemkit study errors -o")
-FILE = RecordFile(FORMAT, ErrorRecord, ("scene", "reference", "grading", "budget", "repetitions"))
-CSV_START = "discretisation,map,meshes,solver,size,"
+FILE = RowFile("bemkit-study 3", ErrorRecord, ("scene", "reference", "grading", "budget", "repetitions"))
 
 
-def to_csv(records: Sequence[ErrorRecord]) -> str:
-    """Return the records as comma-separated values.
+def table_of(records: Sequence[ErrorRecord]) -> Table:
+    """Return the records as a table.
 
     Besides the fields of `ErrorRecord` there are, for each error, ``order_...`` against the mesh before and
     ``pareto_...``, which is 1 if no other record is both faster and more accurate.
     """
-    names = [field.name for field in fields(ErrorRecord)]
     fronts = {measure: {record.key for record in pareto_front(records, measure)} for measure in MEASURES}
-    lines = []
+    added = []
     for series in by_series(records):
-        steps = {measure: orders(series, measure) for measure in MEASURES}
-        for k, record in enumerate(series):
-            values = [getattr(record, name) for name in names]
-            values += [steps[measure][k] for measure in MEASURES]
-            lines.append([*values, *(int(record.key in fronts[measure]) for measure in MEASURES)])
-    head = [*names, *(f"order_{measure}" for measure in MEASURES), *(f"pareto_{measure}" for measure in MEASURES)]
-    return csv_text(head, lines)
+        steps = [orders(series, measure) for measure in MEASURES]
+        for record, *order in zip(series, *steps, strict=True):
+            added.append((*order, *(int(record.key in fronts[measure]) for measure in MEASURES)))
+    table = Table.from_records(ErrorRecord, records)
+    heads = [Column(f"order_{measure}", "", "order against the mesh before", ".1f") for measure in MEASURES]
+    heads += [Column(f"pareto_{measure}", "", "1 if no other run is faster and more accurate") for measure in MEASURES]
+    rows = tuple((*row, *more) for row, more in zip(table.rows, added, strict=True))
+    return Table((*table.columns, *heads), rows)
+
+
+def to_csv(records: Sequence[ErrorRecord]) -> str:
+    """Return the table of the records as comma-separated values."""
+    return table_of(records).to_csv()

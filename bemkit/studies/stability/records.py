@@ -1,18 +1,15 @@
-"""Records of a stability sweep: in HDF5 files that are complete after every record, as CSV, and as Markdown tables."""
+"""Rows of a stability sweep: their file, their table and their Markdown."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import astuple, dataclass, fields
+from dataclasses import dataclass
 from enum import Enum
 from typing import Any
 
-import numpy as np
-
-from bemkit.hdf5 import FileFormat
-from bemkit.results.outputs import csv_text
-from bemkit.results.record_file import RecordFile
+from bemkit.studies.row_file import RowFile
 from bemkit.studies.stability.axes import Axis
+from bemkit.table import Table, column, markdown_table
 
 
 class Verdict(Enum):
@@ -32,45 +29,21 @@ class Verdict(Enum):
 
 @dataclass(frozen=True)
 class StabilityRecord:
-    """One line of the tables.
+    """One row of a stability sweep."""
 
-    Parameters
-    ----------
-    axis : str
-    value : float
-    verdict, status : str
-        Values of `Verdict`; name of the solver's status in small letters, or `bemkit.studies.engine.REFUSED`.
-    linear_solves : int
-    certificate : float
-        Worst entry, as the driver says.
-    check : float
-        Worst entry of the independent check, see `IndependentCheck`.
-    reciprocity : float
-        Of the independent check: elasticity itself, up to the discretisation error.
-    condition : float
-        2-norm condition number of the contact stiffness with unit diagonal, free rigid motions left out.
-    drift : float
-        Largest difference to the reference, scaled back, relative to its largest displacement and traction.
-    twin : float
-        The same between the case and its similar twin: nothing but amplified round-off.
-    seconds : float [s]
-    message : str
-        The remark of the solver or the text of the error; what speaks against the record if it is wrong.
-    """
-
-    axis: str
-    value: float
-    verdict: str
-    status: str
-    linear_solves: int
-    certificate: float
-    check: float
-    reciprocity: float
-    condition: float
-    drift: float
-    twin: float
-    seconds: float
-    message: str
+    axis: str = column("what is varied")
+    value: float = column("its value", format=".8g")
+    verdict: str = column("value of `Verdict`")
+    status: str = column("status of the solver in small letters, or refused")
+    linear_solves: int = column("number of linear solves")
+    certificate: float = column("largest entry of the solver's certificate", format=".0e")
+    check: float = column("largest entry of the independent check", format=".0e")
+    reciprocity: float = column("error of Betti's theorem, up to the discretisation error", format=".0e")
+    condition: float = column("condition of the contact stiffness with unit diagonal", format=".0e")
+    drift: float = column("largest difference from the reference, scaled back", format=".0e")
+    twin: float = column("largest difference from the scaled copy", format=".0e")
+    seconds: float = column("run time", "s", ".2f")
+    message: str = column("of the solver or the error, or why the row is wrong")
 
     @property
     def key(self) -> tuple[str, float]:
@@ -78,37 +51,33 @@ class StabilityRecord:
         return self.axis, self.value
 
 
-FORMAT = FileFormat("bemkit-stability", 1, "bemkit stability file", "bemkit stability -o")
-FILE = RecordFile(FORMAT, StabilityRecord, ("scene",))
-CSV_START = "axis,value,verdict,status,"
-MARKDOWN_START = "### "
+FILE = RowFile("bemkit-stability 2", StabilityRecord, ("scene",))
+_HEADS = ("verdict", "status", "solves", "certificate", "check", "Betti", "condition", "drift", "twin")
 
 
-def to_csv(records: Sequence[StabilityRecord]) -> str:
-    """Return the records as comma-separated values with a header line."""
-    return csv_text([field.name for field in fields(StabilityRecord)], map(astuple, records))
+def table_of(records: Sequence[StabilityRecord]) -> Table:
+    """Return the records as a table."""
+    return Table.from_records(StabilityRecord, records)
 
 
 def to_markdown(axes: Sequence[Axis[Any]], records: Sequence[StabilityRecord]) -> str:
-    """Return one Markdown table for each axis; run times are left out, so that equal results make equal text."""
-    head = ("verdict", "status", "solves", "certificate", "check", "Betti", "condition", "drift", "twin")
-    lines = []
+    """Return one Markdown table for each axis, without run times, so that equal results make equal text."""
+    texts = []
     for axis in axes:
-        lines += [f"{MARKDOWN_START}{axis.name}", "", f"Promise: {axis.promise}.", ""]
-        lines += [f"| {axis.label} | {' | '.join(head)} |", "|---:|---|---|" + "---:|" * (len(head) - 2)]
-        lines += [f"| {' | '.join(cells(record))} |" for record in records if record.axis == axis.name]
-        lines.append("")
-    return "\n".join(lines)
+        rows = [cells(record) for record in records if record.axis == axis.name]
+        table = markdown_table((axis.label, *_HEADS), rows, [True, False, False, *(True,) * (len(_HEADS) - 2)])
+        texts.append(f"### {axis.name}\n\nPromise: {axis.promise}.\n\n{table}")
+    return "\n".join(texts)
 
 
 def cells(record: StabilityRecord) -> list[str]:
     """Return the entries of a record as short texts: value, verdict, status, linear solves, then the numbers."""
-    numbers = (record.certificate, record.check, record.reciprocity, record.condition, record.drift, record.twin)
-    solves = str(record.linear_solves) if record.linear_solves else ""
-    return [
-        f"{record.value:.8g}",
-        record.verdict,
-        record.status.replace("_", " "),
-        solves,
-        *("" if np.isnan(number) else f"{number:.0e}" for number in numbers),
-    ]
+    row = dict(zip(StabilityRecord.__dataclass_fields__, table_of([record]).cells()[0], strict=True))
+    solves = row["linear_solves"] if record.linear_solves else ""
+    numbers = (row[name] for name in ("certificate", "check", "reciprocity", "condition", "drift", "twin"))
+    return [row["value"], record.verdict, record.status.replace("_", " "), solves, *numbers]
+
+
+def to_csv(records: Sequence[StabilityRecord]) -> str:
+    """Return the table of the records as comma-separated values."""
+    return table_of(records).to_csv()

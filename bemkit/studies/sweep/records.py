@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from types import MappingProxyType
 
-from bemkit.hdf5 import FileFormat
 from bemkit.results.assembly_solution import AssemblySolution
 from bemkit.results.part_forces import contact_sizes
-from bemkit.results.record_file import RecordFile
 from bemkit.results.solution import Solution
 from bemkit.scene.unit_names import UnitNames, unit_of
 from bemkit.studies.engine import Attempt
+from bemkit.studies.row_file import RowFile
+from bemkit.table import column, columns_of
 
 QUANTITIES: Mapping[str, str] = MappingProxyType(
     {
@@ -41,51 +41,24 @@ def unit_of_column(column: str, units: UnitNames | None) -> str:
 
 @dataclass(frozen=True)
 class SweepRow:
-    """One scene of a sweep: the varied numbers, and what came out.
-
-    Parameters
-    ----------
-    values : tuple of float
-        In the order of the keys.
-    status : str
-        Of the solver in small letters, or ``refused`` where the scene is not well posed.
-    certified : int
-        1 if the result is certified; the numbers of all other rows are nan.
-    force_normal, force_tangential : float [N/m]
-        Sums over all contacts.
-    energy : float [J/m]
-    contact_length : float [m]
-        Of all contacts.
-    peak_pressure : float [Pa]
-    largest_slip : float [m]
-    estimated_error : float
-        In the energy norm, relative; nan where there is no estimate.
-    n_elements, n_contact, linear_solves : int
-    seconds : float [s]
-        Of the row alone; the first row of a body bears its assembly.
-    transitions : str
-        Where the contact status changes, such as ``floor: separated-slip at 0.25 (0.25, 0)``: arc length along the
-        part, x and y [m]; semicolons between them.
-    message : str
-        Why there is no result, or why an accuracy was not reached.
-    """
+    """One scene of a sweep: the varied numbers, in the order of the keys, and the results, nan unless certified."""
 
     values: tuple[float, ...]
-    status: str
-    certified: int
-    force_normal: float
-    force_tangential: float
-    energy: float
-    contact_length: float
-    peak_pressure: float
-    largest_slip: float
-    estimated_error: float
-    n_elements: int
-    n_contact: int
-    linear_solves: int
-    seconds: float
-    transitions: str
-    message: str
+    status: str = column("status of the solver in small letters, or refused where the scene is not well posed")
+    certified: int = column("1 if the result is certified")
+    force_normal: float = column("sum over all contacts", "N/m", ".6g")
+    force_tangential: float = column("sum over all contacts", "N/m", ".6g")
+    energy: float = column("elastic energy", "J/m", ".6g")
+    contact_length: float = column("of all contacts", "m", ".6g")
+    peak_pressure: float = column("largest contact pressure", "Pa", ".6g")
+    largest_slip: float = column("largest slip", "m", ".6g")
+    estimated_error: float = column("in the energy norm; nan without an estimate", "", ".6g")
+    n_elements: int = column("number of elements")
+    n_contact: int = column("number of contact nodes")
+    linear_solves: int = column("number of linear solves")
+    seconds: float = column("run time of the row; the first row of a body includes its assembly", "s", ".6g")
+    transitions: str = column("points where the status changes: status, arc length [m] and (x, y) [m] of each")
+    message: str = column("why there is no result, or why an accuracy was not reached")
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "values", tuple(self.values))
@@ -102,7 +75,7 @@ class SweepRow:
 
 
 _MEASURED = tuple(QUANTITIES)[:7]
-RESULTS = tuple(entry.name for entry in fields(SweepRow) if entry.name != "values")
+RESULTS = tuple(head.name for head in columns_of(SweepRow))
 """The names of all results of a row."""
 
 
@@ -145,5 +118,4 @@ def _places(solution: Solution | AssemblySolution) -> str:
     )
 
 
-FORMAT = FileFormat("bemkit-sweep", 1, "bemkit sweep file", "bemkit sweep -o")
-FILE = RecordFile(FORMAT, SweepRow, ("scene", "keys", "starts"))
+FILE = RowFile("bemkit-sweep 2", SweepRow, ("scene", "keys", "starts"))

@@ -55,7 +55,8 @@ def sweep(
         Places in scene files, such as ``"law.friction_coefficient"`` or ``"bodies.punch.placement.shift[0]"``, and the
         values to take.
     file : str or Path, optional
-        HDF5 file that holds each row as soon as it is there. Rows that are already in it are not computed again.
+        JSON Lines file (.jsonl) that gets each row as soon as it is ready. Rows that it already
+        has are not computed again.
     executor : Executor, optional
         Such as a `ProcessPoolExecutor`, or that of a `distributed` client. Without one rows are solved in turn.
     cold : bool
@@ -71,7 +72,7 @@ def sweep(
     ------
     StudyError
         If a key leads to no number of the scene, there are no values, or no row at all is a valid scene.
-    ResultFileError, OutputFileError
+    RowFileError, OutputFileError
         If the file cannot be written, or holds another sweep.
     """
     check_stated(scene)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -13,11 +13,11 @@ import numpy as np
 from bemkit.arrays import FloatArray
 from bemkit.errors import InputError
 from bemkit.formulas import closest
-from bemkit.results.outputs import csv_text, json_text
 from bemkit.scene.assembly import Assembly
 from bemkit.scene.scene import Scene
 from bemkit.scene.toml import scene_from_toml
 from bemkit.studies.sweep.records import FILE, QUANTITIES, RESULTS, SweepRow, unit_of_column
+from bemkit.table import Column, Table, columns_of, json_text
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,7 @@ class Sweep:
 
         Raises
         ------
-        ResultFileError
+        RowFileError
             If the file is not a complete file of this kind and version.
         """
         labels, rows = FILE.read(path)
@@ -83,6 +83,14 @@ class Sweep:
         """Return the entry of a row under a key or the name of a result."""
         return row.values[self.keys.index(name)] if name in self.keys else getattr(row, name)
 
+    def as_table(self) -> Table:
+        """Return all rows with the keys in front; numbers of failed rows are nan."""
+        units = self.scene.units
+        results = [replace(head, unit=unit_of_column(head.name, units)) for head in columns_of(SweepRow)]
+        keys = [Column(key, "", "varied", "g") for key in self.keys]
+        rows = ((*row.values, *(getattr(row, name) for name in RESULTS)) for row in self.rows)
+        return Table((*keys, *results), tuple(rows))
+
     def columns(self) -> dict[str, Any]:
         """Return the keys and all results of the solved rows: arrays of numbers, lists of texts."""
         numbers = {name: self.column(name) for name in (*self.keys, *QUANTITIES)}
@@ -91,9 +99,8 @@ class Sweep:
         }
 
     def to_csv(self) -> str:
-        """Return all rows as comma-separated values; numbers of failed rows are nan, messages stand at the end."""
-        lines = [[*row.values, *(getattr(row, name) for name in RESULTS)] for row in self.rows]
-        return csv_text([*self.keys, *RESULTS], lines)
+        """Return all rows as comma-separated values; numbers of failed rows are nan."""
+        return self.as_table().to_csv()
 
     def to_json(self) -> str:
         """Return one JSON object: title, keys, solved rows and, apart from them, failed ones."""
@@ -110,11 +117,7 @@ class Sweep:
         InputError
             If pandas is not installed.
         """
-        try:
-            import pandas as pd
-        except ImportError:
-            raise InputError("as_pandas needs pandas: pip install pandas, or use columns()") from None
-        return pd.DataFrame(self.columns())
+        return replace(self, rows=self.solved).as_table().to_pandas()
 
     def as_xarray(self) -> Any:
         """Return the numbers as an xarray Dataset with a dimension for each key; nan where a row failed or is missing.
@@ -127,7 +130,7 @@ class Sweep:
         try:
             import xarray as xr
         except ImportError:
-            raise InputError("as_xarray needs xarray: pip install xarray, or use columns()") from None
+            raise InputError('data sets need xarray: pip install "bemkit[pandas]"') from None
         axes = [np.unique([self.entry(row, key) for row in self.rows]) for key in self.keys]
         places = tuple(np.searchsorted(axis, self.column(key)) for axis, key in zip(axes, self.keys, strict=True))
         data = {}

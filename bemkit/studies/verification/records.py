@@ -6,38 +6,23 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from bemkit.hdf5 import FileFormat
-from bemkit.results.outputs import json_text
-from bemkit.results.record_file import RecordFile
+from bemkit.studies.row_file import RowFile
 from bemkit.studies.verification.case import Case, Quantity
+from bemkit.table import Column, Table, column, columns_of, json_text, markdown_table
 
 
 @dataclass(frozen=True)
 class VerificationRecord:
-    """One quantity at one resolution.
+    """One quantity at one resolution."""
 
-    Parameters
-    ----------
-    case, quantity : str
-    resolution : float
-        Number of elements, or accuracy, that was asked for.
-    n_elements : int
-    value, error : float
-        Infinite error if there is no certified solution.
-    seconds : float [s]
-        Of the solve, which all quantities of a case share.
-    message : str
-        Why there is no solution.
-    """
-
-    case: str
-    quantity: str
-    resolution: float
-    n_elements: int
-    value: float
-    error: float
-    seconds: float
-    message: str
+    case: str = column("name of the case")
+    quantity: str = column("compared quantity")
+    resolution: float = column("requested number of elements, or accuracy", format="g")
+    n_elements: int = column("number of elements")
+    value: float = column("computed value", format=".6g")
+    error: float = column("its error; infinite without a certified solution", format=".1e")
+    seconds: float = column("run time of the solve, which all quantities of a case share", "s", ".2f")
+    message: str = column("why there is no solution")
 
     @property
     def key(self) -> tuple[str, str, float]:
@@ -45,10 +30,10 @@ class VerificationRecord:
         return self.case, self.quantity, self.resolution
 
 
+HEAD = ("case", "quantity", "source", "expected", "errors", "order", "bound")
 ROUND_OFF = 1e-12
 """Errors below it fall no further."""
-FORMAT = FileFormat("bemkit-verification", 1, "bemkit verification file", "bemkit verify -o")
-FILE = RecordFile(FORMAT, VerificationRecord, ("version",))
+FILE = RowFile("bemkit-verification 2", VerificationRecord, ("version",))
 
 
 @dataclass(frozen=True)
@@ -139,6 +124,24 @@ class Verification:
         """Whether all rows are met."""
         return not self.missed
 
+    def as_table(self) -> Table:
+        """Return a row for each quantity at each resolution, with its bound."""
+        heads = (*columns_of(VerificationRecord), Column("bound", "", "largest error allowed", ".1e"))
+        rows = [
+            (*(getattr(record, head.name) for head in heads[:-1]), bound)
+            for row in self.rows
+            for record, bound in zip(row.records, row.bounds, strict=True)
+        ]
+        return Table(heads, tuple(rows))
+
+    def to_markdown(self) -> str:
+        """Return the table of all rows, and below it the validity of each case."""
+        cells = [(*cells_of(row), "yes" if row.is_met else "**no**") for row in self.rows]
+        cases = {row.name: row.case for row in self.rows}
+        about = [(name, case.title, case.validity) for name, case in cases.items()]
+        table = markdown_table((*HEAD, "met"), cells, [False] * (len(HEAD) + 1))
+        return table + "\n" + markdown_table(("case", "problem", "holds for"), about, [False] * 3)
+
     def to_json(self) -> str:
         """Return everything as JSON; numbers that do not exist are null."""
         content = {"met": self.is_met, "rows": [row.as_dict() for row in self.rows]}
@@ -154,3 +157,11 @@ def rows_of(cases: dict[str, Case], records: Sequence[VerificationRecord]) -> tu
         return VerifiedRow(name, case, quantity, tuple(by_key[key] for key in keys if key in by_key))
 
     return tuple(of(name, case, quantity) for name, case in cases.items() for quantity in case.quantities)
+
+
+def cells_of(row: VerifiedRow) -> tuple[str, ...]:
+    """Return the entries of a row as short texts; see `HEAD`."""
+    expected = f"{row.quantity.expected:.6g}" if row.quantity.expected else "-"
+    errors = " ".join(f"{error:.1e}" for error in row.errors)
+    order = "-" if math.isnan(row.order) or row.order < 0.0 else f"{row.order:.1f}"
+    return row.name, row.quantity.name, row.case.source, expected, errors, order, f"{row.bounds[-1]:.1e}"

@@ -52,7 +52,7 @@ def verify(
     run : callable (tasks) -> records
         `bemkit.studies.engine.compute`, or with a progress bar `compute_with_progress`.
     file : str or Path, optional
-        Where records are kept (HDF5) as soon as they exist; those already in it are not computed again.
+        Where records are kept (JSON Lines, .jsonl) as soon as they exist; those already in it are not computed again.
     cases : mapping of str to callable
         What there is to verify, by default all of bemkit's own; each is made when it is needed.
 
@@ -64,7 +64,7 @@ def verify(
     ------
     InputError
         If a name fits no case.
-    OutputFileError, ResultFileError
+    OutputFileError, RowFileError
         If the file cannot be written or read, or is of another version of bemkit.
     """
     chosen = {name: cases[name]() for name in selected(names, tuple(cases))}

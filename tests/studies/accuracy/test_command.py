@@ -14,15 +14,16 @@ from rich.console import Console
 
 import bemkit as bk
 from bemkit.cli.main import commands
+from bemkit.cli.printed_errors import WIDE, print_study
+from bemkit.cli.progress import compute_with_progress
 from bemkit.errors import BemkitError, one_line
-from bemkit.hdf5 import MARK, ResultFileError, seal
+from bemkit.pictures import figure_files
 from bemkit.reference import MEASURES, find_reference
-from bemkit.results import outputs as outputs_module
 from bemkit.studies.accuracy import runs as runs_module
+from bemkit.studies.accuracy.figures import draw_errors
 from bemkit.studies.accuracy.records import FILE, to_csv
-from bemkit.studies.accuracy.report import WIDE, draw_errors, print_study
 from bemkit.studies.accuracy.runs import all_runs, error_tasks, uniform
-from bemkit.studies.engine import compute_with_progress
+from bemkit.studies.row_file import RowFileError
 from tests.studies.accuracy.records import row
 
 FEW = ("--elements", "12,24", "--discretisation", "linear", "--solver", "semismooth-newton", "--repeat", "1")
@@ -34,9 +35,9 @@ def call(*arguments: str | Path) -> Result:
 
 
 def test_everything_is_written_and_the_tables_are_printed(tmp_path: Path) -> None:
-    files = {name: tmp_path / f"rows.{name}" for name in ("h5", "csv")}
+    files = {name: tmp_path / f"rows.{name}" for name in ("jsonl", "csv")}
     arguments = ("study", "paper-1", *FEW, "--meshes", "uniform,adaptive", "--accuracies", "1e-1")
-    result = call(*arguments, "-o", files["h5"], "--csv", files["csv"], "--plot", tmp_path / "plots")
+    result = call(*arguments, "-o", files["jsonl"], "--csv", files["csv"], "--plot", tmp_path / "plots")
     assert result.exception is None
     assert result.return_value == 0
     for words in (
@@ -48,7 +49,7 @@ def test_everything_is_written_and_the_tables_are_printed(tmp_path: Path) -> Non
         "* no other run of this study is both faster and more accurate",
     ):
         assert words in result.output
-    labels, rows = FILE.read(files["h5"])
+    labels, rows = FILE.read(files["jsonl"])
     assert "title" in labels["scene"]
     assert [(row.meshes, row.size) for row in rows] == [("uniform", 12.0), ("uniform", 24.0), ("adaptive", 0.1)]
     assert files["csv"].read_text() == to_csv(rows)
@@ -69,7 +70,7 @@ def test_the_word_errors_may_be_left_out_and_the_other_commands_stay() -> None:
 def test_rows_in_the_file_are_not_computed_again_and_others_are_added(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    path = tmp_path / "rows.h5"
+    path = tmp_path / "rows.jsonl"
     assert call(*FAST, "-q", "-o", path).return_value == 0
     before = FILE.read(path)[1]
     more = call("study", "paper-1", *FEW, "--meshes", "graded", "-q", "-o", path)
@@ -84,41 +85,30 @@ def test_rows_in_the_file_are_not_computed_again_and_others_are_added(
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (("--repeat", "2"), "holds the sweep with repetitions 1, not 2: choose another name or delete it first"),
-        (("--exponent", "2"), "holds the sweep with grading exponent 3, not exponent 2"),
-        (("--most-elements", "90"), "holds the sweep with budget 500 elements, not 90 elements"),
-        (("--over-resolve", "90"), "holds the sweep with reference known, not over-resolved by 90 elements"),
+        (("--repeat", "2"), "holds a study with repetitions 1, not 2: choose another name or delete it first"),
+        (("--exponent", "2"), "holds a study with grading exponent 3, not exponent 2"),
+        (("--most-elements", "90"), "holds a study with budget 500 elements, not 90 elements"),
+        (("--over-resolve", "90"), "holds a study with reference known, not over-resolved by 90 elements"),
     ],
 )
 def test_changed_settings_and_other_scenes_are_not_mixed(
     tmp_path: Path, arguments: tuple[str, ...], message: str
 ) -> None:
-    path = tmp_path / "rows.h5"
+    path = tmp_path / "rows.jsonl"
     labels = {"scene": bk.scene_to_toml(bk.load_scene("paper-1")), "reference": "known", "grading": "exponent 3"}
-    FILE.write(path, labels | {"budget": "500 elements", "repetitions": "1"}, [row()])
+    list(FILE.keep(path, iter([row()]), {}, labels | {"budget": "500 elements", "repetitions": "1"}))
     content = path.read_bytes()
     assert message in str(call(*FAST, "-o", path, *arguments).exception)
     other = call("study", "paper-2", *FAST[2:], "-o", path)
-    assert "holds the sweep of another scene: choose another name" in str(other.exception)
+    assert "holds a study of another scene: choose another name" in str(other.exception)
     assert path.read_bytes() == content
 
 
-def test_files_of_others_and_damaged_ones_stay(tmp_path: Path) -> None:
-    path = tmp_path / "rows.h5"
+def test_files_of_others_stay(tmp_path: Path) -> None:
+    path = tmp_path / "rows.jsonl"
     path.write_text("my thesis")
-    assert "not an HDF5 file" in str(call(*FAST, "-o", path).exception)
-    assert "is not a CSV file of an error study" in str(call(*FAST, "--csv", path).exception)
+    assert "is no complete file of the format" in str(call(*FAST, "-o", path).exception)
     assert path.read_text() == "my thesis"
-    path.unlink()
-    assert call(*FAST, "-q", "-o", path).return_value == 0
-    path.write_bytes(path.read_bytes()[:5000])
-    result = call(*FAST, "-o", path)
-    assert "rows.h5" in str(result.exception)
-    assert len(str(result.exception).splitlines()) == 1
-    call("run", "paper-1", "--elements", "12", "-q", "-o", tmp_path / "result.h5")
-    assert "not a bemkit study errors file: give a file written by" in str(
-        call(*FAST, "-o", tmp_path / "result.h5").exception
-    )
 
 
 def test_a_scene_without_a_reference_says_what_a_fine_solution_costs() -> None:
@@ -173,7 +163,7 @@ def test_a_run_that_fails_shows_in_the_table_and_the_exit_code(tmp_path: Path) -
         (("study", "paper-1", "--errors", "sigma"), "errors: unknown 'sigma': the known ones are energy, sigma_n"),
         (("study", "paper-1", "--exponent", "0.5"), "exponent is 0.5: give a finite number of at least 1"),
         (("study", "paper-1", "--meshes", "adaptive", "--discretisation", "constant"), "nothing to run"),
-        (("study", "paper-1", "-o", "/nowhere/rows.h5"), "create it first"),
+        (("study", "paper-1", "-o", "/nowhere/rows.jsonl"), "create it first"),
         (("study", "paper-1", "--most-elements", "3"), "most_elements is 3"),
     ],
 )
@@ -185,21 +175,17 @@ def test_bad_input_is_one_line(arguments: tuple[str, ...], message: str) -> None
 
 
 def test_without_matplotlib_there_is_no_figure(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setattr(outputs_module, "find_spec", lambda name: None)
+    monkeypatch.setattr(figure_files, "find_spec", lambda name: None)
     assert 'figures need matplotlib: pip install "bemkit[plot]"' in str(call(*FAST, "--plot", tmp_path).exception)
 
 
 def test_a_label_that_is_missing_is_noticed(tmp_path: Path) -> None:
-    path = tmp_path / "rows.h5"
-    labels = dict.fromkeys(FILE.labels, "x")
-    FILE.write(path, labels, [row(), row(size=80.0, message="a \u00fc")])
-    assert FILE.read(path) == (labels, (row(), row(size=80.0, message="a \u00fc")))
-    import h5py
-
-    with h5py.File(path, "r+") as file:
-        del file["grading"]
-    seal(path, MARK)
-    with pytest.raises(ResultFileError, match=r"grading is missing: the file is damaged"):
+    path = tmp_path / "rows.jsonl"
+    labels, rows = dict.fromkeys(FILE.labels, "x"), (row(), row(size=80.0, message="a \u00fc"))
+    list(FILE.keep(path, iter(rows), {}, labels))
+    assert repr(FILE.read(path)) == repr((labels, rows))
+    path.write_text(path.read_text().replace('"grading": "x", ', ""))
+    with pytest.raises(RowFileError, match="is no complete file of the format 'bemkit-study 3': choose another name"):
         FILE.read(path)
 
 

@@ -13,8 +13,8 @@ import pytest
 from click.testing import CliRunner
 
 from bemkit.cli.main import commands
-from bemkit.hdf5 import ResultFileError
 from bemkit.studies.accuracy.records import FILE
+from bemkit.studies.row_file import RowFileError
 from tests.studies.accuracy.records import row
 
 ARGUMENTS = ("study", "paper-1", "--elements", "12,16,20", "--meshes", "uniform", "--discretisation", "linear")
@@ -23,23 +23,15 @@ import sys
 from bemkit.cli.main import main
 main([*{ARGUMENTS}, "--repeat", "1", "-q", "-o", sys.argv[1]])
 """
-WRITES_FOREVER = """
-import sys
-from bemkit.studies.accuracy.records import FILE
-labels, rows = FILE.read(sys.argv[1])
-print("ready", flush=True)
-while True:
-    FILE.write(sys.argv[1], labels, rows)
-"""
 
 
 @pytest.mark.slow
 def test_a_killed_study_keeps_its_rows_and_goes_on_where_it_stopped(tmp_path: Path) -> None:
-    path = tmp_path / "rows.h5"
+    path = tmp_path / "rows.jsonl"
     process = subprocess.Popen([sys.executable, "-c", STUDY, str(path)])
     deadline = time.monotonic() + 60.0
     while time.monotonic() < deadline and process.poll() is None:
-        with contextlib.suppress(ResultFileError):
+        with contextlib.suppress(RowFileError):
             if FILE.read(path)[1]:
                 break
         time.sleep(0.01)
@@ -55,27 +47,26 @@ def test_a_killed_study_keeps_its_rows_and_goes_on_where_it_stopped(tmp_path: Pa
     assert repr(after[: len(finished)]) == repr(finished)
 
 
-@pytest.mark.slow
-def test_a_process_killed_in_the_middle_of_a_write_leaves_a_whole_file(tmp_path: Path) -> None:
-    path = tmp_path / "rows.h5"
-    rows = tuple(row(size=float(n)) for n in range(200))
-    FILE.write(path, dict.fromkeys(FILE.labels, "x"), rows)
-    for delay in (0.0, 0.01):
-        process = subprocess.Popen([sys.executable, "-c", WRITES_FOREVER, str(path)], stdout=subprocess.PIPE)
-        assert process.stdout is not None
-        assert process.stdout.readline() == b"ready\n"
-        time.sleep(delay)
-        process.send_signal(signal.SIGKILL)
-        process.wait()
-        process.stdout.close()
-        assert FILE.read(path)[1] == rows
+@pytest.mark.parametrize("cut", [1, 40, 400])
+def test_a_last_line_that_was_cut_off_is_computed_again(tmp_path: Path, cut: int) -> None:
+    path, labels = tmp_path / "rows.jsonl", dict.fromkeys(FILE.labels, "x")
+    rows = [row(size=float(n)) for n in range(4)]
+    list(FILE.keep(path, iter(rows), {}, labels))
+    path.write_bytes(path.read_bytes()[:-cut])
+    finished = FILE.finished(path, labels)
+    assert [record.size for record in finished.values()] == [0.0, 1.0, 2.0]
+    list(FILE.keep(path, iter(rows[3:]), finished, labels))
+    assert [record.size for record in FILE.read(path)[1]] == [0.0, 1.0, 2.0, 3.0]
 
 
-@pytest.mark.parametrize("share", [0.0, 0.3, 0.9])
-def test_truncated_rows_are_refused(tmp_path: Path, share: float) -> None:
-    path = tmp_path / "rows.h5"
-    FILE.write(path, dict.fromkeys(FILE.labels, "x"), [row()])
-    content = path.read_bytes()
-    path.write_bytes(content[: int(share * len(content))])
-    with pytest.raises(ResultFileError, match=r"rows\.h5: .*: "):
+def test_a_damaged_line_and_a_foreign_file_are_refused(tmp_path: Path) -> None:
+    path = tmp_path / "rows.jsonl"
+    list(FILE.keep(path, iter([row(), row(size=80.0)]), {}, dict.fromkeys(FILE.labels, "x")))
+    content = path.read_text()
+    for damaged in ("my thesis\n", content.replace('"meshes"', '"mashes"'), content.replace("{", "[", 2), ""):
+        path.write_text(damaged)
+        with pytest.raises(RowFileError, match=r"rows\.jsonl: is no complete file of the format 'bemkit-study 3'"):
+            FILE.read(path)
+    path.write_text(content.replace("bemkit-study 3", "bemkit-study 2"))
+    with pytest.raises(RowFileError, match="has the format 'bemkit-study 2', not 'bemkit-study 3': delete it first"):
         FILE.read(path)

@@ -153,7 +153,7 @@ class Picky(Executor):
 
 def test_an_executor_that_fails_is_named() -> None:
     runs = paper_runs(uniform((20,)))
-    with pytest.raises(StudyError, match=r"the executor broke down .a process was terminated abruptly.: finished rows"):
+    with pytest.raises(StudyError, match=r"the executor failed .a process was terminated abruptly.: finished rows"):
         list(compute(error_tasks(runs, reference()), Doomed()))
     with pytest.raises(TypeError, match="wrong operand"):
         list(compute(error_tasks(runs, reference()), Picky()))

@@ -11,8 +11,8 @@ from click.testing import CliRunner, Result
 from bemkit.cli.main import commands
 from bemkit.studies.stability import sweep as sweep_module
 from bemkit.studies.stability.axes import AXES, find_axes
+from bemkit.studies.stability.figures import draw_axis
 from bemkit.studies.stability.records import FILE, StabilityRecord, cells, to_csv, to_markdown
-from bemkit.studies.stability.report import draw_axis
 
 FAST = ("stability", "paper-1", "--elements", "32", "--axis", "sliding")
 
@@ -24,21 +24,21 @@ def call(*arguments: str | Path) -> Result:
 @pytest.fixture(scope="module")
 def swept(tmp_path_factory: pytest.TempPathFactory) -> bytes:
     """A file with all rows of the sweep."""
-    path = tmp_path_factory.mktemp("swept") / "rows.h5"
+    path = tmp_path_factory.mktemp("swept") / "rows.jsonl"
     assert call(*FAST, "-q", "-o", path).return_value == 0
     return path.read_bytes()
 
 
 def test_everything_is_written_and_the_tables_are_printed(tmp_path: Path) -> None:
-    files = {name: tmp_path / f"rows.{name}" for name in ("h5", "csv", "md")}
+    files = {name: tmp_path / f"rows.{name}" for name in ("jsonl", "csv", "md")}
     result = call(
-        *FAST, "-o", files["h5"], "--csv", files["csv"], "--markdown", files["md"], "--plot", tmp_path / "plots"
+        *FAST, "-o", files["jsonl"], "--csv", files["csv"], "--markdown", files["md"], "--plot", tmp_path / "plots"
     )
     assert result.exception is None
     assert result.return_value == 0
     assert "11 rows: 6 right, 5 named" in result.output
     assert "promise: solved below 1, refused above" in result.output
-    labels, rows = FILE.read(files["h5"])
+    labels, rows = FILE.read(files["jsonl"])
     assert "title" in labels["scene"]
     assert len(rows) == 11
     assert [row["verdict"] for row in csv.DictReader(files["csv"].read_text().splitlines())] == [
@@ -50,11 +50,11 @@ def test_everything_is_written_and_the_tables_are_printed(tmp_path: Path) -> Non
 
 
 def test_rows_in_the_file_are_not_computed_again(swept: bytes, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    (tmp_path / "rows.h5").write_bytes(swept)
-    before = FILE.read(tmp_path / "rows.h5")
+    (tmp_path / "rows.jsonl").write_bytes(swept)
+    before = FILE.read(tmp_path / "rows.jsonl")
     monkeypatch.setattr(sweep_module, "solve_and_judge", None)  # calling it would fail
-    assert call(*FAST, "-q", "-o", tmp_path / "rows.h5").return_value == 0
-    assert repr(FILE.read(tmp_path / "rows.h5")) == repr(before)
+    assert call(*FAST, "-q", "-o", tmp_path / "rows.jsonl").return_value == 0
+    assert repr(FILE.read(tmp_path / "rows.jsonl")) == repr(before)
 
 
 def test_a_wrong_row_shows_in_the_exit_code(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -73,7 +73,7 @@ def test_a_wrong_row_shows_in_the_exit_code(monkeypatch: pytest.MonkeyPatch) -> 
         (("stability", "paper-3"), "no such file or shipped scene"),
         (("stability", "paper-1", "--axis", "rho"), "the axes are youngs-modulus"),
         (("stability", "paper-1", "--csv", "-", "--markdown", "-"), "two outputs go to the same place"),
-        (("stability", "paper-1", "-o", "/nowhere/rows.h5"), "create it first"),
+        (("stability", "paper-1", "-o", "/nowhere/rows.jsonl"), "create it first"),
     ],
 )
 def test_bad_input_is_one_line(arguments: tuple[str, ...], message: str) -> None:
@@ -81,13 +81,13 @@ def test_bad_input_is_one_line(arguments: tuple[str, ...], message: str) -> None
 
 
 def test_files_of_others_and_of_other_scenes_stay(swept: bytes, tmp_path: Path) -> None:
-    path = tmp_path / "rows.h5"
+    path = tmp_path / "rows.jsonl"
     path.write_text("my thesis")
-    assert "not an HDF5 file" in str(call(*FAST, "-o", path).exception)
+    assert "is no complete file of the format" in str(call(*FAST, "-o", path).exception)
     assert path.read_text() == "my thesis"
     path.write_bytes(swept)
     other = call("stability", "paper-2", "--elements", "32", "--axis", "sliding", "-q", "-o", path)
-    assert "holds the sweep of another scene: choose another name or delete it first" in str(other.exception)
+    assert "holds a study of another scene: choose another name or delete it first" in str(other.exception)
 
 
 def test_tables_leave_out_what_does_not_exist() -> None:

@@ -15,8 +15,9 @@ import h5py
 import pytest
 
 import bemkit as bk
-from bemkit.hdf5 import MARK, ResultFileError, seal
+from bemkit.hdf5 import ResultFileError
 from bemkit.results.result_file import read_result, write_result
+from bemkit.studies.row_file import RowFileError
 from bemkit.studies.stability.records import FILE, StabilityRecord
 from tests.scenes import small_paper_scene
 from tests.slow import slow_except
@@ -111,26 +112,21 @@ def test_a_full_disk_leaves_the_old_result_and_one_clear_line(result: Path, n_by
     assert os.listdir(result.parent) == ["result.h5"]
 
 
-@pytest.mark.parametrize("is_rows", [False, True])
-def test_any_flipped_bit_is_noticed(result: Path, is_rows: bool) -> None:
-    path = result
-    if is_rows:
-        path = result.parent / "rows.h5"
-        FILE.write(path, LABELS, [ROW] * 20)
-    expected = FILE.read(path) if is_rows else read_result(path).contact.sigma_n
-    content = path.read_bytes()
+def test_any_flipped_bit_is_noticed(result: Path) -> None:
+    expected = read_result(result).contact.sigma_n
+    content = result.read_bytes()
     chooser = random.Random(7)
     complaints: list[str] = []
     for _ in range(60):
         damaged = bytearray(content)
         damaged[chooser.randrange(len(content))] ^= 1 << chooser.randrange(8)
-        path.write_bytes(damaged)
+        result.write_bytes(damaged)
         try:
-            found = FILE.read(path) if is_rows else read_result(path).contact.sigma_n
+            found = read_result(result).contact.sigma_n
         except ResultFileError as error:
             complaints.append(str(error))
         else:  # unused bytes between the objects of the file
-            assert (found == expected) if is_rows else (found == expected).all()
+            assert (found == expected).all()
     assert len(complaints) >= 10
     assert all(": " in line and "\n" not in line for line in complaints)
 
@@ -140,29 +136,6 @@ def test_a_changed_number_is_noticed(result: Path) -> None:
         file["contact/sigma_n"][3] *= 1.0 + 1e-15
     with pytest.raises(ResultFileError, match="does not match its checksum: the file is damaged, run its scene again"):
         read_result(result)
-
-
-@pytest.mark.parametrize("share", [0.0, 0.3, 0.9])
-def test_truncated_rows_are_refused(tmp_path: Path, share: float) -> None:
-    path = tmp_path / "rows.h5"
-    FILE.write(path, LABELS, [ROW])
-    content = path.read_bytes()
-    path.write_bytes(content[: int(share * len(content))])
-    with pytest.raises(ResultFileError, match=r"rows\.h5: .*: "):
-        FILE.read(path)
-
-
-def test_rows_of_another_version_or_kind_are_refused(tmp_path: Path, result: Path) -> None:
-    path = tmp_path / "rows.h5"
-    FILE.write(path, LABELS, [ROW])
-    assert FILE.read(path) == (LABELS, (ROW,))
-    with h5py.File(path, "r+") as file:
-        file.attrs["schema_version"] = 99
-    seal(path, MARK)
-    with pytest.raises(ResultFileError, match=r"layout version 99, this bemkit .* reads version 1: use the bemkit"):
-        FILE.read(path)
-    with pytest.raises(ResultFileError, match="not a bemkit stability file: give a file written by"):
-        FILE.read(result)
 
 
 def sweep_process(path: Path, axes: tuple[str, ...]) -> subprocess.Popen[bytes]:
@@ -179,13 +152,13 @@ def sweep_process(path: Path, axes: tuple[str, ...]) -> subprocess.Popen[bytes]:
 def test_a_killed_sweep_keeps_its_rows_and_goes_on_where_it_stopped(
     tmp_path: Path, axes: tuple[str, ...], n_kills: int, n_rows: int
 ) -> None:
-    path = tmp_path / "rows.h5"
+    path = tmp_path / "rows.jsonl"
     n_before = 0
     for _ in range(n_kills):
         process = sweep_process(path, axes)
         deadline = time.monotonic() + 30.0
         while time.monotonic() < deadline and process.poll() is None:
-            with contextlib.suppress(ResultFileError):
+            with contextlib.suppress(RowFileError):
                 if len(FILE.read(path)[1]) > n_before:
                     break
             time.sleep(0.05)

@@ -20,11 +20,11 @@ from click.testing import CliRunner, Result
 import bemkit as bk
 from bemkit.cli.main import commands
 from bemkit.errors import BemkitError
-from bemkit.hdf5 import ResultFileError
 from bemkit.studies import engine
 from bemkit.studies.engine import MOST_TOGETHER, Task, compute
+from bemkit.studies.row_file import RowFileError
+from bemkit.studies.sweep.figures import draw_sweep, figure_name
 from bemkit.studies.sweep.records import FILE
-from bemkit.studies.sweep.report import draw_sweep, figure_name
 from bemkit.studies.sweep.table import Sweep
 from tests.studies.sweep.tables import equal_results
 
@@ -44,9 +44,9 @@ def call(*arguments: str | Path) -> Result:
 
 
 def test_a_grid_with_an_impossible_value_is_printed_written_and_drawn(tmp_path: Path) -> None:
-    files = {name: tmp_path / f"table.{name}" for name in ("h5", "csv", "json")}
+    files = {name: tmp_path / f"table.{name}" for name in ("jsonl", "csv", "json")}
     grid = ("--vary", f"{FRICTION}=0:1:3", "--vary", "material.poisson_ratio=0.2,0.7")
-    outputs = ("-o", files["h5"], "--csv", files["csv"], "--json", files["json"], "--plot", tmp_path / "figures")
+    outputs = ("-o", files["jsonl"], "--csv", files["csv"], "--json", files["json"], "--plot", tmp_path / "figures")
     result = call(*FAST, *grid, *outputs, "--show", "energy", "--show", "peak_pressure")
     assert result.exception is None
     assert result.return_value == 1
@@ -62,7 +62,7 @@ def test_a_grid_with_an_impossible_value_is_printed_written_and_drawn(tmp_path: 
     written = json.loads(files["json"].read_text())
     assert [row[FRICTION] for row in written["rows"]] == [0.0, 0.5, 1.0]
     assert [row["status"] for row in written["failed"]] == ["refused"] * 3
-    table = Sweep.read(files["h5"])
+    table = Sweep.read(files["jsonl"])
     assert table.keys == (FRICTION, "material.poisson_ratio")
     assert [float(line["energy"]) for line in lines] == pytest.approx([row.energy for row in table.rows], nan_ok=True)
     for name in ("energy", "peak_pressure"):
@@ -71,11 +71,11 @@ def test_a_grid_with_an_impossible_value_is_printed_written_and_drawn(tmp_path: 
 
 
 def test_a_killed_sweep_goes_on_and_ends_with_the_same_table(tmp_path: Path) -> None:
-    path, whole = tmp_path / "killed.h5", tmp_path / "whole.h5"
+    path, whole = tmp_path / "killed.jsonl", tmp_path / "whole.jsonl"
     process = subprocess.Popen([sys.executable, "-c", KILLED, str(path)])
     deadline = time.monotonic() + 60.0
     while time.monotonic() < deadline and process.poll() is None:
-        with contextlib.suppress(ResultFileError):
+        with contextlib.suppress(RowFileError):
             if FILE.read(path)[1]:
                 break
         time.sleep(0.005)
@@ -92,7 +92,7 @@ def test_a_killed_sweep_goes_on_and_ends_with_the_same_table(tmp_path: Path) -> 
 
 @pytest.mark.slow
 def test_processes_give_the_same_table(tmp_path: Path) -> None:
-    paths = tmp_path / "one.h5", tmp_path / "two.h5"
+    paths = tmp_path / "one.jsonl", tmp_path / "two.jsonl"
     for path, jobs in zip(paths, ("1", "2"), strict=True):
         assert call(*MANY, "-o", path, "--jobs", jobs).return_value == 0
     assert equal_results(*(Sweep.read(path).rows for path in paths))
@@ -134,11 +134,9 @@ def test_wrong_words_are_named_before_anything_is_computed(arguments: tuple[str,
 
 
 def test_files_of_others_stay(tmp_path: Path) -> None:
-    path = tmp_path / "table"
+    path = tmp_path / "table.jsonl"
     path.write_text("my thesis")
-    assert "not an HDF5 file" in str(call(*FAST, "--vary", f"{FRICTION}=1", "-o", path).exception)
-    result = call(*FAST, "--vary", f"{FRICTION}=1", "--csv", path)
-    assert "is not a CSV file of a sweep over these keys" in str(result.exception)
+    assert "is no complete file of the format" in str(call(*FAST, "--vary", f"{FRICTION}=1", "-o", path).exception)
     assert path.read_text() == "my thesis"
 
 
@@ -151,7 +149,7 @@ def test_a_cluster_that_is_not_there_is_named(monkeypatch: pytest.MonkeyPatch) -
 def test_a_cluster_is_reached_by_its_address_or_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     distributed = pytest.importorskip("distributed")
     monkeypatch.setattr(engine, "CONNECT_SECONDS", 0.5)
-    arguments = (*FAST, "--vary", f"{FRICTION}=0.1,0.2", "-q", "-o", tmp_path / "table.h5", "--on")
+    arguments = (*FAST, "--vary", f"{FRICTION}=0.1,0.2", "-q", "-o", tmp_path / "table.jsonl", "--on")
     message = str(call(*arguments, "tcp://127.0.0.1:1").exception)
     assert "cluster tcp://127.0.0.1:1: no scheduler answers" in message
     assert "start one with 'dask scheduler'" in message
@@ -160,14 +158,14 @@ def test_a_cluster_is_reached_by_its_address_or_named(tmp_path: Path, monkeypatc
         local.scale(1)
         local.wait_for_workers(1)
         assert call(*arguments, local.scheduler_address).return_value == 0
-    assert len(Sweep.read(tmp_path / "table.h5").solved) == 2
+    assert len(Sweep.read(tmp_path / "table.jsonl").solved) == 2
 
 
 def test_data_frames_need_their_packages(monkeypatch: pytest.MonkeyPatch) -> None:
     table = bk.sweep(SCENE, {FRICTION: [0.2]})
-    for package in ("pandas", "xarray"):
+    for package, kind in (("pandas", "data frames"), ("xarray", "data sets")):
         monkeypatch.setitem(sys.modules, package, None)
-        with pytest.raises(BemkitError, match=f"as_{package} needs {package}: pip install {package}, or use columns"):
+        with pytest.raises(BemkitError, match=rf'{kind} need {package}: pip install "bemkit\[pandas\]"'):
             getattr(table, f"as_{package}")()
 
 

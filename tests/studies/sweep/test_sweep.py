@@ -164,7 +164,7 @@ def test_scenes_with_python_functions_are_refused() -> None:
 
 
 def test_rows_are_on_disk_and_more_can_be_added(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    path = tmp_path / "table.h5"
+    path = tmp_path / "table.jsonl"
     first = bk.sweep(SCENE, {FRICTION: [0.4, 0.2]}, file=path)
     assert equal_rows(Sweep.read(path).rows, first.rows[::-1])
     assert Sweep.read(path).scene == SCENE
@@ -174,9 +174,9 @@ def test_rows_are_on_disk_and_more_can_be_added(tmp_path: Path, monkeypatch: pyt
     more = bk.sweep(SCENE, {FRICTION: [0.2, 0.3]}, file=path)
     assert equal_rows(more.rows[:1], first.rows[1:])
     assert [row.values for row in Sweep.read(path).rows] == [(0.2,), (0.3,), (0.4,)]
-    with pytest.raises(BemkitError, match="holds the sweep with keys"):
+    with pytest.raises(BemkitError, match="holds a study with keys"):
         bk.sweep(SCENE, {"material.poisson_ratio": [0.3]}, file=path)
-    with pytest.raises(BemkitError, match="holds the sweep with starts near, not cold"):
+    with pytest.raises(BemkitError, match="holds a study with starts near, not cold"):
         bk.sweep(SCENE, {FRICTION: [0.2]}, file=path, cold=True)
 
 

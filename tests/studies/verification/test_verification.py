@@ -14,11 +14,11 @@ from rich.console import Console
 
 import bemkit as bk
 from bemkit.cli.main import main
-from bemkit.hdf5 import ResultFileError
+from bemkit.cli.printed_verification import print_verification
 from bemkit.studies.engine import Task, compute
+from bemkit.studies.row_file import RowFileError
 from bemkit.studies.verification import verification as module
 from bemkit.studies.verification.case import CASES, Case, Quantity
-from bemkit.studies.verification.report import print_verification, to_markdown
 from bemkit.studies.verification.verification import Comparison, verify
 from tests.slow import slow_only
 
@@ -105,7 +105,7 @@ def test_nothing_measured_is_nothing_met() -> None:
 
 
 def test_what_is_in_the_file_is_not_computed_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    file, computed = tmp_path / "verification.h5", []
+    file, computed = tmp_path / "verification.jsonl", []
 
     def counting(tasks: Sequence[Task[Comparison]]) -> list[Comparison]:
         computed.append([task.key for task in tasks])
@@ -119,7 +119,7 @@ def test_what_is_in_the_file_is_not_computed_again(tmp_path: Path, monkeypatch: 
     ]
     assert second.rows[0].errors == first.rows[0].errors
     monkeypatch.setattr(module, "LABELS", {"version": "0.0"})
-    with pytest.raises(ResultFileError, match="holds the sweep with version"):
+    with pytest.raises(RowFileError, match="holds a study with version"):
         verify(["kirsch-hole"], file=file)
 
 
@@ -158,4 +158,4 @@ def test_the_table_fits_a_terminal() -> None:
     lines = console.export_text().splitlines()
     assert len(lines) == 1 + 2 + 4 + 1
     assert lines[-1].strip() == "4 of 4 rows met"
-    assert "**no**" not in to_markdown(found)
+    assert "**no**" not in found.to_markdown()

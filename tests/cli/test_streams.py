@@ -13,8 +13,8 @@ from pathlib import Path
 import pytest
 
 import bemkit as bk
+from bemkit.cli.streams import GuardedStream, PipeClosedError, StreamError, guarded_streams, print_data
 from bemkit.errors import printable
-from bemkit.results.streams import GuardedStream, PipeClosedError, StreamError, guarded_streams, print_data
 from tests.slow import slow_except
 
 PROGRAM = [sys.executable, "-m", "bemkit"]

@@ -1,0 +1,197 @@
+"""Where results go: texts and tables to files or standard output, figures to a folder, tables to the terminal.
+
+Files are checked before any work is done, then replaced as a whole or not at all.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Generic, TypeVar
+
+from bemkit.atomic_files import OutputFileError, check_target, write_text
+from bemkit.cli.streams import print_data
+from bemkit.table import Table
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+    from rich.console import Console
+    from rich.table import Table as PrintedTable
+
+STDOUT = "-"
+Content = TypeVar("Content")
+TABLE_TEXTS: dict[str, Callable[[Table], str]] = {
+    ".csv": Table.to_csv,
+    ".json": Table.to_json,
+    ".md": Table.to_markdown,
+}
+"""Texts of a table by the ending of a file."""
+
+
+@dataclass(frozen=True)
+class TextFile(Generic[Content]):
+    """A text that is asked for, or not.
+
+    Parameters
+    ----------
+    place : str or None
+        File name, ``"-"`` for standard output, or None if the text is not wanted.
+    text : callable (content) -> str
+    """
+
+    place: str | None
+    text: Callable[[Content], str]
+
+    def check(self) -> list[Path]:
+        """Find out, before any work is done, whether the text can be written; return the file, if it is one.
+
+        Raises
+        ------
+        OutputFileError
+        """
+        return [] if self.place in (None, STDOUT) else [check_target(Path(str(self.place)))]
+
+    def write(self, content: Content) -> None:
+        """Write the text of some content to the file or to standard output, if it is wanted.
+
+        Raises
+        ------
+        OutputFileError
+        """
+        if self.place == STDOUT:
+            print_data(self.text(content))
+        elif self.place is not None:
+            write_text(Path(self.place), self.text(content))
+
+
+@dataclass(frozen=True)
+class TableFile(Generic[Content]):
+    """A table in the format that the ending of its file names, or none.
+
+    Parameters
+    ----------
+    place : str or None
+    table : callable (content) -> Table
+    """
+
+    place: str | None
+    table: Callable[[Content], Table]
+
+    def check(self) -> list[Path]:
+        """Find out, before any work is done, whether the table can be written; return the file, if there is one.
+
+        Raises
+        ------
+        OutputFileError
+            If the ending is unknown, or the file cannot be written.
+        """
+        if self.place is None:
+            return []
+        path = Path(self.place)
+        if path.suffix.lower() not in (*TABLE_TEXTS, ".h5", ".hdf5"):
+            endings = ", ".join((*TABLE_TEXTS, ".h5"))
+            raise OutputFileError(
+                f"{path}: the ending {path.suffix!r} names no format of tables: give one of {endings}, or .jsonl for "
+                "rows that an interrupted study resumes from"
+            )
+        return [check_target(path)]
+
+    def write(self, content: Content) -> None:
+        """Write the table of some content, if it is wanted.
+
+        Raises
+        ------
+        OutputFileError
+        """
+        if self.place is None:
+            return
+        path, table = Path(self.place), self.table(content)
+        if path.suffix.lower() in TABLE_TEXTS:
+            write_text(path, TABLE_TEXTS[path.suffix.lower()](table))
+        else:
+            table.to_hdf5(path)
+
+
+@dataclass(frozen=True)
+class Outputs(Generic[Content]):
+    """Where a content goes; each may be left out.
+
+    Parameters
+    ----------
+    texts : tuple of TextFile and TableFile
+    folder : str or None
+        For figures; need not exist yet.
+    figures : callable (content) -> mapping of str to Figure
+        By file names without ``.png``.
+    figure : str
+        Name of one of them: if it can be written, any other can.
+    dots_per_inch : int
+    """
+
+    texts: tuple[TextFile[Content] | TableFile[Content], ...] = ()
+    folder: str | None = None
+    figures: Callable[[Content], Mapping[str, Figure]] = field(default=lambda content: {})
+    figure: str = ""
+    dots_per_inch: int = 150
+
+    @property
+    def uses_stdout(self) -> bool:
+        """Whether standard output is taken by data, so that nothing else may be printed there."""
+        return any(text.place == STDOUT for text in self.texts)
+
+    def check(self, others: Sequence[Path] = ()) -> list[Path]:
+        """Find out, before any work is done, whether everything can be written, `others` besides; return all files.
+
+        Raises
+        ------
+        OutputFileError
+            If a file or folder cannot be written, two outputs go to one place, or a package for figures is missing.
+        """
+        targets = [*others, *(target for text in self.texts for target in text.check())]
+        places = [text.place for text in self.texts if text.place is not None]
+        if len(set(targets)) < len(targets) or places.count(STDOUT) > 1:
+            shown = ", ".join([*map(str, others), *places])
+            raise OutputFileError(f"two outputs go to the same place ({shown}): give each its own")
+        if self.folder is not None:
+            from bemkit.pictures.figure_files import check_figure_folder
+
+            check_figure_folder(Path(self.folder), self.figure)
+        return targets
+
+    def write(self, content: Content) -> None:
+        """Write everything that is wanted.
+
+        Raises
+        ------
+        OutputFileError
+        """
+        for text in self.texts:
+            text.write(content)
+        if self.folder is not None:
+            from bemkit.pictures.figure_files import write_figures
+
+            write_figures(self.figures(content), Path(self.folder), self.dots_per_inch)
+
+
+def stdout_console(console: Console | None = None, *, width: int | None = None) -> Console:
+    """Return a console of rich, by default one that writes plain numbers to standard output."""
+    from rich.console import Console
+
+    return Console(highlight=False, width=width) if console is None else console
+
+
+def plain_table(left: Sequence[str] = (), right: Sequence[str] = (), *, gap: int = 1) -> PrintedTable:
+    """Return a table of rich without frame: columns of texts, which may be folded, then columns of numbers.
+
+    Columns are named and have some spaces between them.
+    """
+    from rich.box import SIMPLE_HEAD
+    from rich.table import Table
+
+    table = Table(box=SIMPLE_HEAD, show_edge=False, pad_edge=False, padding=(0, gap, 0, 0))
+    for name in left:
+        table.add_column(name, overflow="fold")
+    for name in right:
+        table.add_column(name, justify="right", no_wrap=True)
+    return table

@@ -1,0 +1,88 @@
+"""Outputs of commands: endings, exit codes and names that once were wrong."""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+
+import h5py
+import pytest
+
+import bemkit as bk
+from bemkit.cli.main import main
+from bemkit.hdf5 import MARK, seal
+from bemkit.reference import find_reference
+
+SMALL = ("--elements", "24", "--discretisation", "linear")
+
+
+def call(*arguments: str) -> int:
+    with pytest.raises(SystemExit) as caught:
+        main(list(arguments))
+    return caught.value.code
+
+
+@pytest.fixture(autouse=True)
+def here(tmp_path, monkeypatch) -> None:
+    monkeypatch.chdir(tmp_path)
+
+
+def test_the_animation_may_be_named_where_pictures_are(capsys) -> None:
+    assert call("run", "paper-1", *SMALL, "-q", "--plot", "figures", "--what", "moonlight") == 2
+    assert "moonlight" in capsys.readouterr().err
+    assert call("run", "paper-1", *SMALL, "-q", "--plot", "figures", "--what", "animation,contacts", "-o", "r.h5") == 0
+    assert sorted(path.name for path in Path("figures").iterdir()) == ["animation.gif", "contacts.png"]
+    assert call("show", "r.h5", "--plot", "shown", "--what", "animation") == 0
+    assert [path.name for path in Path("shown").iterdir()] == ["animation.gif"]
+
+
+def test_result_files_with_the_long_ending_are_cited(capsys) -> None:
+    assert call("run", "paper-1", *SMALL, "-q", "-o", "r.hdf5") == 0
+    assert call("cite", "r.hdf5") == 0
+    assert "Hinterm" in capsys.readouterr().out
+
+
+def test_report_and_plot_have_the_exit_code_of_run() -> None:
+    solution = bk.run(dataclasses.replace(bk.load_scene("paper-1"), mesh=bk.MeshOptions(elements=24)))
+    bk.write_result("good.h5", solution)
+    bk.write_result("bad.h5", dataclasses.replace(solution, status=bk.Status.STALLED))
+    for command in (("report", "-o", "r.html"), ("plot", "--what", "traction")):
+        assert call(command[0], "good.h5", *command[1:], "-q") == 0
+        assert call(command[0], "bad.h5", *command[1:], "-q") == 1
+
+
+def test_a_reference_belongs_to_a_scene_whatever_its_units_and_linear_solver() -> None:
+    scene = bk.load_scene("wavy-obstacle")
+    assert find_reference(dataclasses.replace(scene, linear_solver=bk.DenseCholesky())) is not None
+    units = bk.UnitNames(length="mm", stress="MPa")
+    assert find_reference(dataclasses.replace(scene, units=units)) is not None
+
+
+def test_a_report_shows_the_versions_in_its_file() -> None:
+    call("run", "paper-1", *SMALL, "-q", "-o", "r.h5")
+    with h5py.File("r.h5", "r+") as file:
+        file["provenance"].attrs["numpy"] = "0.9.8"
+    seal(Path("r.h5"), MARK)
+    assert call("report", "r.h5", "-o", "r.html", "-q") == 0
+    assert "0.9.8" in Path("r.html").read_text("utf-8")
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        ("sweep", "paper-1", "--elements", "24", "--vary", "law.friction_coefficient=0.1,0.2"),
+        ("verify", "westergaard", "--quick"),
+        ("stability", "paper-1", "--elements", "24", "--axis", "aspect-ratio"),
+        ("study", "paper-1", "--elements", "12", "--discretisation", "linear", "--meshes", "uniform", "--repeat", "1"),
+    ],
+    ids=lambda command: command[0],
+)
+def test_the_output_of_a_study_obeys_its_ending(command, capsys) -> None:
+    call(*command, "-q", "-o", "rows.csv")
+    lines = Path("rows.csv").read_text().splitlines()
+    assert len(lines) > 1
+    assert lines[0].count(",") == len(lines[0].split(",")) - 1 > 4
+    call(*command, "-q", "-o", "rows.jsonl")
+    assert Path("rows.jsonl").read_text().startswith('{"format": "bemkit-')
+    assert call(*command, "-q", "-o", "rows.xyz") == 2
+    assert "the ending '.xyz' names no format of tables" in capsys.readouterr().err
