@@ -66,8 +66,9 @@ from bemkit.operators.material import Plane as Plane
 from bemkit.operators.somigliana.fields import InteriorFields as InteriorFields
 from bemkit.operators.somigliana.stress import principal_stresses as principal_stresses
 from bemkit.operators.somigliana.stress import von_mises as von_mises
-from bemkit.operators.steklov_poincare.maps import CollocationMap as CollocationMap
-from bemkit.operators.steklov_poincare.maps import GalerkinMap as GalerkinMap
+from bemkit.operators.steklov_poincare.collocation import CollocationElasticity as CollocationElasticity
+from bemkit.operators.steklov_poincare.galerkin import GalerkinElasticity as GalerkinElasticity
+from bemkit.operators.steklov_poincare.operator import SteklovPoincareOperator as SteklovPoincareOperator
 from bemkit.pictures.files import save_pictures as save_pictures
 from bemkit.plan import make_plan as make_plan
 from bemkit.reference.shipped import find_reference as find_reference

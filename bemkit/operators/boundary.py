@@ -145,18 +145,6 @@ class PairOperator(BoundaryOperator):
         return assemble_block(self.form, rows, columns)
 
 
-class SingleLayer(PairOperator):
-    """V: traction -> displacement."""
-
-
-class DoubleLayer(PairOperator):
-    """K: displacement -> displacement, for continuous displacements."""
-
-
-class Hypersingular(PairOperator):
-    """W: displacement -> traction, for continuous displacements."""
-
-
 class Transposed(BoundaryOperator):
     """The transpose of another operator, on the same spaces the other way round."""
 
@@ -178,10 +166,6 @@ class Transposed(BoundaryOperator):
     _adjoint = _transpose
 
 
-class AdjointDoubleLayer(Transposed):
-    """K': traction -> traction, exactly the transpose of the double layer."""
-
-
 class Mass(BoundaryOperator):
     """The identity in weak form, <u, q>; its matrix is sparse."""
 
@@ -193,7 +177,7 @@ class Mass(BoundaryOperator):
         return mass_matrix(self.trial, self.test)
 
 
-def single_layer(trial: BoundarySpace, test: BoundarySpace, material: Material) -> SingleLayer:
+def single_layer(trial: BoundarySpace, test: BoundarySpace, material: Material) -> PairOperator:
     """Return V, the single layer operator: <V t, q> ([Paper], eq. 27).
 
     Parameters
@@ -204,7 +188,7 @@ def single_layer(trial: BoundarySpace, test: BoundarySpace, material: Material) 
 
     Returns
     -------
-    SingleLayer
+    PairOperator
         Matrix entries [m^2/Pa]: traction dofs [Pa] to tested displacements [m^2].
 
     Notes
@@ -212,10 +196,10 @@ def single_layer(trial: BoundarySpace, test: BoundarySpace, material: Material) 
     The logarithm is log(|r| / r0) with r0 the diameter of the mesh, which makes V positive definite at every size of
     the body. For tractions in equilibrium r0 changes V t by a translation only.
     """
-    return SingleLayer(SingleLayerForm(trial, test, material))
+    return PairOperator(SingleLayerForm(trial, test, material))
 
 
-def double_layer(trial: BoundarySpace, test: BoundarySpace, material: Material) -> DoubleLayer:
+def double_layer(trial: BoundarySpace, test: BoundarySpace, material: Material) -> PairOperator:
     """Return K, the double layer operator: <K u, q> ([Paper], eq. 27).
 
     Parameters
@@ -228,7 +212,7 @@ def double_layer(trial: BoundarySpace, test: BoundarySpace, material: Material) 
 
     Returns
     -------
-    DoubleLayer
+    PairOperator
         Matrix entries [m]: displacement dofs [m] to tested displacements [m^2].
 
     Raises
@@ -240,10 +224,10 @@ def double_layer(trial: BoundarySpace, test: BoundarySpace, material: Material) 
     -----
     On the boundary of a body (1/2 M + K) r = 0 for its rigid motions r, on that of an exterior (1/2 M + K) r = M r.
     """
-    return DoubleLayer(DoubleLayerForm(trial, test, material))
+    return PairOperator(DoubleLayerForm(trial, test, material))
 
 
-def adjoint_double_layer(trial: BoundarySpace, test: BoundarySpace, material: Material) -> AdjointDoubleLayer:
+def adjoint_double_layer(trial: BoundarySpace, test: BoundarySpace, material: Material) -> Transposed:
     """Return K', the adjoint double layer operator: <K' t, v> ([Paper], eq. 27).
 
     Parameters
@@ -256,7 +240,7 @@ def adjoint_double_layer(trial: BoundarySpace, test: BoundarySpace, material: Ma
 
     Returns
     -------
-    AdjointDoubleLayer
+    Transposed
         The transpose of ``double_layer(test, trial, material)``.
 
     Raises
@@ -264,10 +248,10 @@ def adjoint_double_layer(trial: BoundarySpace, test: BoundarySpace, material: Ma
     GeometryError
         If the test space is not continuous.
     """
-    return AdjointDoubleLayer(double_layer(test, trial, material))
+    return Transposed(double_layer(test, trial, material))
 
 
-def hypersingular(trial: BoundarySpace, test: BoundarySpace, material: Material) -> Hypersingular:
+def hypersingular(trial: BoundarySpace, test: BoundarySpace, material: Material) -> PairOperator:
     """Return W, the hypersingular operator: <W u, v> ([Paper], eq. 27), integrated by parts.
 
     Parameters
@@ -278,7 +262,7 @@ def hypersingular(trial: BoundarySpace, test: BoundarySpace, material: Material)
 
     Returns
     -------
-    Hypersingular
+    PairOperator
         Matrix entries [Pa]: displacement dofs [m] to nodal forces [N/m].
 
     Raises
@@ -286,7 +270,7 @@ def hypersingular(trial: BoundarySpace, test: BoundarySpace, material: Material)
     GeometryError
         If a space is not continuous.
     """
-    return Hypersingular(HypersingularForm(trial, test, material))
+    return PairOperator(HypersingularForm(trial, test, material))
 
 
 def mass(trial: BoundarySpace, test: BoundarySpace) -> Mass:

@@ -7,7 +7,7 @@ from scipy.sparse.linalg import LinearOperator
 
 from bemkit.arrays import FloatArray
 from bemkit.geometry.spaces import dof_points
-from bemkit.operators.boundary import BoundaryOperator, DoubleLayer, mass
+from bemkit.operators.boundary import BoundaryOperator, mass
 from bemkit.operators.pair_form import Tag
 from bemkit.operators.rigid_modes import rigid_motions
 from bemkit.testing.failure import demand
@@ -61,14 +61,15 @@ def check_operator(
         _small(other - matrix.T, matrix, rtol, f"{type(adjoint).__name__} is not the transpose of {name}: it differs")
 
 
-def check_double_layer(operator: DoubleLayer, *, rtol: float = 1e-11) -> None:
+def check_double_layer(operator: BoundaryOperator, *, rtol: float = 1e-11) -> None:
     """Check that a double layer turns rigid motions of the body into minus one half of themselves.
 
     Parameters
     ----------
-    operator : DoubleLayer
-        On the boundary of a bounded body; outside of a closed boundary the factor is plus one half. With curved
-        elements, on which a rotation is not a polynomial, only translations are tried.
+    operator : BoundaryOperator
+        Made by `bemkit.operators.boundary.double_layer`, on the boundary of a bounded body; outside of a closed
+        boundary the factor is plus one half. With curved elements, on which a rotation is not a polynomial, only
+        translations are tried.
     rtol : float
         Allowed error, relative to the largest entry of the matrix.
 

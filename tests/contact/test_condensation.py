@@ -20,13 +20,14 @@ from bemkit.operators.equilibrium import resultant_imbalance
 from bemkit.operators.linear.dense import SingularMatrixError
 from bemkit.operators.material import Material
 from bemkit.operators.steklov_poincare import CondensedMap, SteklovPoincare
-from bemkit.operators.steklov_poincare.maps import CollocationMap, GalerkinMap
-from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions, Support, supported
+from bemkit.operators.steklov_poincare.collocation import CollocationElasticity
+from bemkit.operators.steklov_poincare.galerkin import GalerkinElasticity
+from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions, Support, integrate_traction, supported
 from bemkit.solvers.base import Status, solve
 from bemkit.solvers.ssn import SemismoothNewton
 from tests.handmade import condense, contact_along_normals
 
-MAPS = [GalerkinMap, CollocationMap]
+MAPS = [GalerkinElasticity, CollocationElasticity]
 MATERIAL = Material(1.0, 0.3)
 
 
@@ -52,7 +53,9 @@ def pressed_block(kind: type, *rollers: str) -> tuple[DirectBody, ContactNodes, 
     """A 2 x 1 block with a unit pressure on top."""
     mesh = mesh_of(Rectangle(2.0, 1.0), 48, "bottom", "right", "top", "left")
     elastic: SteklovPoincare = kind(mesh, MATERIAL)
-    force = elastic.nodal_forces(mesh.part("top"), lambda x, _: np.broadcast_to([0.0, -1.0], x.shape))
+    force = integrate_traction(
+        elastic.displacement_space, mesh.part("top"), lambda x, _: np.broadcast_to([0.0, -1.0], x.shape)
+    )
     body = condense(elastic, [roller(mesh, part) for part in rollers], side_of(elastic, "bottom"), force)
     return body, body.nodes, elastic
 
@@ -63,7 +66,7 @@ def test_motions_that_only_contact_holds(kind: type, rollers: tuple[str, ...], n
     body, _, _ = pressed_block(kind, *rollers)
     motions = body.rigid_motions()
     assert motions.shape == (n_motions, body.n_contact, 2)
-    translations = motions if kind is GalerkinMap or n_motions == 1 else motions[:0]
+    translations = motions if kind is GalerkinElasticity or n_motions == 1 else motions[:0]
     size = np.abs(body.stiffness).max()
     is_unknown = np.stack([np.ones(body.n_contact, bool), ~body.tangent_follows], axis=1)
     for motion in translations:  # constant elements represent translations only
@@ -75,13 +78,13 @@ def test_uniform_pressure_between_rollers_is_carried_uniformly(kind: type) -> No
     body, nodes, elastic = pressed_block(kind, "left", "right")
     held = respond(body, stick(np.zeros(body.n_contact), np.zeros(body.n_contact)))
     # the linear field sigma_yy = -1 is exact for linear elements; constants err at the corners
-    tolerance = 1e-11 if kind is GalerkinMap else 0.1
+    tolerance = 1e-11 if kind is GalerkinElasticity else 0.1
     np.testing.assert_allclose(held.sigma_n, -1.0, atol=tolerance)
     assert -float(np.sum(nodes.weights * held.sigma_n)) == pytest.approx(2.0, rel=1e-12)  # equilibrium
     displacement, force = body.recover(held)
     assert np.abs(force.sum(axis=0)).max() < 1e-12
     assert body.imbalance(held).worst < 1e-12
-    if kind is GalerkinMap:
+    if kind is GalerkinElasticity:
         top = np.isclose(elastic.mesh.nodes[:, 1], 1.0)  # type: ignore[attr-defined]
         oedometric = 2.0 * MATERIAL.shear_modulus * (1 - 0.3) / (1 - 0.6)
         np.testing.assert_allclose(displacement[top, 1], -1.0 / oedometric, rtol=1e-11)
@@ -96,8 +99,10 @@ def test_recovered_fields_repeat_the_contact_state(kind: type) -> None:
     own = np.einsum("nkc,nc->nk", nodes.frame, displacement[nodes.nodes])
     np.testing.assert_allclose(own[:, 0], state.u_n, atol=1e-12)
     free = np.setdiff1d(np.arange(force.shape[0]), np.append(nodes.nodes, elastic_nodes_on_right(elastic)))
-    given = elastic.nodal_forces(
-        elastic.displacement_space.mesh.part("top"), lambda x, _: np.broadcast_to([0.0, -1.0], x.shape)
+    given = integrate_traction(
+        elastic.displacement_space,
+        elastic.displacement_space.mesh.part("top"),
+        lambda x, _: np.broadcast_to([0.0, -1.0], x.shape),
     )
     np.testing.assert_allclose(force[free], given[free], atol=1e-11)
     total = force[nodes.nodes] - given[nodes.nodes]
@@ -111,7 +116,7 @@ def elastic_nodes_on_right(elastic: SteklovPoincare) -> np.ndarray:  # type: ign
 
 
 def test_a_node_between_contact_and_roller_keeps_contact_and_rests() -> None:
-    body, nodes, _ = pressed_block(GalerkinMap, "right")
+    body, nodes, _ = pressed_block(GalerkinElasticity, "right")
     corner = int(np.argmin(np.hypot(*(nodes.points - [2.0, 0.0]).T)))
     open_state = body.respond(
         separated(body.n_contact).replaced(
@@ -127,8 +132,10 @@ def test_oblique_roller_at_the_end_of_the_contact_boundary() -> None:
     # a triangle sliding along a wall inclined by 60 degrees: the corner node moves along the wall only, and may touch
     triangle = Polygon(((0.0, 0.0), (2.0, 0.0), (1.0, np.sqrt(3.0))))
     mesh = mesh_of(triangle, 36, "side-1", "side-2", "side-3")
-    elastic = GalerkinMap(mesh, MATERIAL)
-    force = elastic.nodal_forces(mesh.part("side-3"), lambda x, _: np.broadcast_to([0.3, -1.0], x.shape))
+    elastic = GalerkinElasticity(mesh, MATERIAL)
+    force = integrate_traction(
+        elastic.displacement_space, mesh.part("side-3"), lambda x, _: np.broadcast_to([0.3, -1.0], x.shape)
+    )
     body = condense(elastic, [roller(mesh, "side-2")], side_of(elastic, "side-1"), force)
     nodes = body.nodes
     assert body.rigid_motions().shape[0] == 1  # along the wall
@@ -146,7 +153,7 @@ def test_oblique_roller_at_the_end_of_the_contact_boundary() -> None:
 
 def test_contact_nodes_fixed_along_their_normal_are_left_to_the_support() -> None:
     mesh = mesh_of(Rectangle(2.0, 1.0), 48, "bottom", "left")
-    elastic = GalerkinMap(mesh, MATERIAL)
+    elastic = GalerkinElasticity(mesh, MATERIAL)
     axes = np.broadcast_to(np.eye(2), (mesh.part("left").size, 2, 2))
     clamp = Support("left", mesh.part("left"), axes)
     nodes = condense(elastic, [clamp], side_of(elastic, "bottom"), np.zeros((mesh.n_nodes, 2))).nodes
@@ -156,7 +163,7 @@ def test_contact_nodes_fixed_along_their_normal_are_left_to_the_support() -> Non
 
 def test_a_body_that_tied_contact_cannot_hold_is_named() -> None:
     mesh = mesh_of(Rectangle(2.0, 1.0), 24, "bottom")
-    elastic = GalerkinMap(mesh, MATERIAL)
+    elastic = GalerkinElasticity(mesh, MATERIAL)
     with pytest.raises(SingularMatrixError, match="the body held by its supports and its contact boundary"):
         condense(elastic, [], side_of(elastic, "bottom").take(np.zeros(0, np.intp)), np.zeros((mesh.n_nodes, 2)))
 
@@ -196,7 +203,7 @@ class Heavy:
         def traction(points: FloatArray, normals: FloatArray) -> FloatArray:
             return (points[:, 1:] - 1.0) * normals * [nu / (1.0 - nu), 1.0]
 
-        return displacement, self.light.nodal_forces(np.arange(mesh.n_elements), traction)
+        return displacement, integrate_traction(self.light.displacement_space, np.arange(mesh.n_elements), traction)
 
     def condense(self, conditions: NodalConditions, force: FloatArray) -> CondensedMap:
         displacement, forces = self.particular()
@@ -221,7 +228,7 @@ class Heavy:
 
 def heavy_block(law: FrictionLaw) -> tuple[ContactProblem, DirectBody]:
     mesh = mesh_of(Rectangle(2.0, 1.0), 48, "bottom", "right", "left")
-    heavy = Heavy(GalerkinMap(mesh, MATERIAL, LinearSpace(mesh)))
+    heavy = Heavy(GalerkinElasticity(mesh, MATERIAL, LinearSpace(mesh)))
     space = heavy.displacement_space
     nodes = contact_along_normals(space, mesh.part("bottom"))
     body = condense(heavy, [roller(mesh, part) for part in ("left", "right")], nodes, np.zeros((space.n_dofs // 2, 2)))
@@ -243,7 +250,7 @@ def test_a_body_under_its_own_weight_is_certified(law: FrictionLaw) -> None:
 
 def test_a_body_that_touches_nothing_is_certified_under_its_own_weight() -> None:
     mesh = mesh_of(Rectangle(2.0, 1.0), 48, "bottom", "right", "left")
-    heavy = Heavy(GalerkinMap(mesh, MATERIAL, LinearSpace(mesh)))
+    heavy = Heavy(GalerkinElasticity(mesh, MATERIAL, LinearSpace(mesh)))
     space = heavy.displacement_space
     conditions = supported(space, [roller(mesh, part) for part in ("bottom", "left", "right")])
     nothing = np.zeros((space.n_dofs // 2, 2))
@@ -265,7 +272,7 @@ def test_forces_inside_a_body_have_a_moment() -> None:
 
 def test_contact_meets_a_support_that_moves_along_an_oblique_direction() -> None:
     mesh = mesh_of(Polygon(((0.0, 0.0), (2.0, 0.0), (1.0, 3.0**0.5))), 30, "side-1", "side-2")
-    elastic = GalerkinMap(mesh, MATERIAL, LinearSpace(mesh))
+    elastic = GalerkinElasticity(mesh, MATERIAL, LinearSpace(mesh))
     normal = mesh.normals[mesh.part("side-2")]
     wall = Support(
         "side-2", mesh.part("side-2"), normal[:, None, :], lambda points: np.tile(0.1 * normal[0], (len(points), 1))

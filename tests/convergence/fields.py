@@ -13,12 +13,14 @@ from bemkit.geometry.spaces import LinearSpace, QuadraticSpace, dof_points
 from bemkit.operators.material import Material
 from bemkit.operators.rigid_modes import traction_free_modes
 from bemkit.operators.steklov_poincare import SteklovPoincare
-from bemkit.operators.steklov_poincare.maps import CollocationMap, GalerkinMap
+from bemkit.operators.steklov_poincare.collocation import CollocationElasticity
+from bemkit.operators.steklov_poincare.galerkin import GalerkinElasticity
+from bemkit.operators.steklov_poincare.operator import SteklovPoincareOperator
 
 
-def quadratic_map(mesh: BoundaryMesh, material: Material) -> GalerkinMap:
+def quadratic_map(mesh: BoundaryMesh, material: Material) -> GalerkinElasticity:
     """Return the map with quadratic displacements and linear tractions that jump at corners."""
-    return GalerkinMap(mesh, material, QuadraticSpace(mesh), LinearSpace(mesh, corner_nodes(mesh)))
+    return GalerkinElasticity(mesh, material, QuadraticSpace(mesh), LinearSpace(mesh, corner_nodes(mesh)))
 
 
 def forces(elastic: SteklovPoincare, traction: Callable[[FloatArray, FloatArray], FloatArray]) -> FloatArray:
@@ -34,7 +36,7 @@ def forces(elastic: SteklovPoincare, traction: Callable[[FloatArray, FloatArray]
     return total
 
 
-def neumann(elastic: GalerkinMap | CollocationMap, force: FloatArray) -> FloatArray:
+def neumann(elastic: GalerkinElasticity | CollocationElasticity, force: FloatArray) -> FloatArray:
     """Return the (n_nodes, 2) displacements under nodal forces; the least of those that differ by rigid motions."""
     mesh = elastic.displacement_space.mesh
     held = traction_free_modes(mesh, dof_points(elastic.displacement_space))
@@ -42,7 +44,7 @@ def neumann(elastic: GalerkinMap | CollocationMap, force: FloatArray) -> FloatAr
         # the map leaves out the pressure that keeps the volume
         held = np.column_stack([held, forces(elastic, lambda _, normal: normal).ravel()])
     n, m = held.shape
-    bordered = np.block([[elastic.matrix(), held], [held.T, np.zeros((m, m))]])
+    bordered = np.block([[SteklovPoincareOperator(elastic).matrix(), held], [held.T, np.zeros((m, m))]])
     return np.linalg.solve(bordered, np.concatenate([force.ravel(), np.zeros(m)]))[:n].reshape(-1, 2)
 
 

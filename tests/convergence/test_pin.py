@@ -10,7 +10,8 @@ from bemkit.contact.obstacle import Circle
 from bemkit.contact.problem import ContactProblem
 from bemkit.geometry import Disk, ExteriorOf, discretise
 from bemkit.operators.material import Material
-from bemkit.operators.steklov_poincare.maps import CollocationMap, GalerkinMap
+from bemkit.operators.steklov_poincare.collocation import CollocationElasticity
+from bemkit.operators.steklov_poincare.galerkin import GalerkinElasticity
 from bemkit.solvers.base import solve
 from bemkit.solvers.ssn import SemismoothNewton
 from tests.handmade import condense, contact_along_normals
@@ -19,8 +20,8 @@ RADIUS = 0.7
 MATERIAL = Material(2.0, 0.3)
 
 
-@pytest.mark.parametrize(("kind", "tolerance"), [(GalerkinMap, 2e-3), (CollocationMap, 1.5e-2)])
-def test_shrink_fit(kind: type[GalerkinMap | CollocationMap], tolerance: float) -> None:
+@pytest.mark.parametrize(("kind", "tolerance"), [(GalerkinElasticity, 2e-3), (CollocationElasticity, 1.5e-2)])
+def test_shrink_fit(kind: type[GalerkinElasticity | CollocationElasticity], tolerance: float) -> None:
     # the hole widens by the interference d everywhere: p = 2 mu d / a
     interference = 1e-3
     mesh = discretise(ExteriorOf(Disk(RADIUS)).outline(), n_elements=64)
@@ -38,7 +39,7 @@ def test_shrink_fit(kind: type[GalerkinMap | CollocationMap], tolerance: float) 
 
 def test_a_pushed_pin_separates_from_the_other_side_and_the_plate_carries_it() -> None:
     mesh = discretise(ExteriorOf(Disk(RADIUS)).outline(), n_elements=64)
-    elastic = GalerkinMap(mesh, MATERIAL)
+    elastic = GalerkinElasticity(mesh, MATERIAL)
     body = condense(elastic, [], contact_along_normals(elastic.displacement_space, np.arange(64)), np.zeros((64, 2)))
     nodes = body.nodes
     gap = Circle((1e-3, 0.0), RADIUS).gap(nodes.points, nodes.directions)

@@ -12,7 +12,8 @@ from bemkit.arrays import FloatArray
 from bemkit.geometry import BoundaryMesh, Disk, Ring, discretise
 from bemkit.geometry.spaces import dof_points
 from bemkit.operators.material import Material, Plane
-from bemkit.operators.steklov_poincare.maps import CollocationMap, GalerkinMap
+from bemkit.operators.steklov_poincare.collocation import CollocationElasticity
+from bemkit.operators.steklov_poincare.galerkin import GalerkinElasticity
 from bemkit.operators.steklov_poincare.nodal_conditions import Support, supported
 from tests.convergence.fields import distance, forces, neumann, observed_order, quadratic_map
 from tests.slow import slow_except
@@ -20,7 +21,7 @@ from tests.slow import slow_except
 INNER, OUTER = 1.0, 2.0
 PRESSURE_INSIDE, PRESSURE_OUTSIDE = 1.3, 0.4
 
-Make = Callable[[BoundaryMesh, Material], GalerkinMap | CollocationMap]
+Make = Callable[[BoundaryMesh, Material], GalerkinElasticity | CollocationElasticity]
 
 
 def ring(n: int) -> BoundaryMesh:
@@ -51,10 +52,10 @@ def neumann_error(make: Make, n: int, material: Material) -> float:
     ("make", "nu", "order", "ceiling"),
     slow_except(
         [
-            (GalerkinMap, 0.3, 2.0, 3e-3),
+            (GalerkinElasticity, 0.3, 2.0, 3e-3),
             (quadratic_map, 0.3, 3.0, 1e-4),
             # what limits the order otherwise, the change of volume by interpolation, is ruled out here
-            (GalerkinMap, 0.5, 2.0, 1e-3),
+            (GalerkinElasticity, 0.5, 2.0, 1e-3),
             (quadratic_map, 0.5, 4.0, 1e-6),
         ],
         (quadratic_map, 0.3, 3.0, 1e-4),
@@ -68,7 +69,11 @@ def test_ring_under_pressures(make: Make, order: float, ceiling: float, nu: floa
 
 @pytest.mark.parametrize(
     ("make", "nu"),
-    slow_except(product((GalerkinMap, CollocationMap), (0.0, 0.3, 0.5)), (GalerkinMap, 0.5), (CollocationMap, 0.3)),
+    slow_except(
+        product((GalerkinElasticity, CollocationElasticity), (0.0, 0.3, 0.5)),
+        (GalerkinElasticity, 0.5),
+        (CollocationElasticity, 0.3),
+    ),
 )
 def test_ring_on_a_shaft(make: Make, nu: float) -> None:
     # the displacement of the inner rim is given, the pressure outside too
@@ -84,7 +89,7 @@ def test_ring_on_a_shaft(make: Make, nu: float) -> None:
         u, _ = elastic.condense(conditions, force).recover(np.zeros(0))
         errors.append(float(np.abs(u - lame(dof_points(space), material)).max()))
     size = np.abs(lame(np.array([[INNER, 0.0]]), material)).max()
-    if make is GalerkinMap:
+    if make is GalerkinElasticity:
         assert errors[-1] < 0.02 * size
         assert observed_order(errors) > 1.75
     else:  # uniform widening is held by slopes exactly, and the rest is too small to show an order here

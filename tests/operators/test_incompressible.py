@@ -14,6 +14,7 @@ from bemkit.geometry.spaces import dof_points
 from bemkit.operators.linear.dense import SingularMatrixError
 from bemkit.operators.steklov_poincare.galerkin import GalerkinElasticity
 from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions, Support, integrate_traction
+from bemkit.operators.steklov_poincare.operator import SteklovPoincareOperator
 from tests.handmade import condense, contact_along_normals
 
 RUBBER = bk.Material(3.0, 0.5)  # shear modulus 1
@@ -33,7 +34,7 @@ def roller(mesh: BoundaryMesh, part: str) -> Support:
     return Support(part, mesh.part(part), mesh.normals[mesh.part(part)][:, None, :])
 
 
-def bottom_of(elastic: bk.GalerkinMap, mesh: BoundaryMesh) -> ContactNodes:
+def bottom_of(elastic: bk.GalerkinElasticity, mesh: BoundaryMesh) -> ContactNodes:
     return contact_along_normals(elastic.displacement_space, mesh.part("bottom"))
 
 
@@ -41,23 +42,29 @@ def bottom_of(elastic: bk.GalerkinMap, mesh: BoundaryMesh) -> ContactNodes:
 def test_patch_of_a_field_that_keeps_the_volume(quadratic: bool) -> None:
     mesh = block()
     spaces = (bk.QuadraticSpace(mesh), bk.LinearSpace(mesh, bk.corner_nodes(mesh))) if quadratic else ()
-    elastic = bk.GalerkinMap(mesh, RUBBER, *spaces)
+    elastic = bk.GalerkinElasticity(mesh, RUBBER, *spaces)
     stress = PURE_SHEAR + PURE_SHEAR.T  # 2 mu strain; the pressure is free
     expected = np.zeros((elastic.displacement_space.n_dofs // 2, 2))
     for element in range(mesh.n_elements):
         traction = stress @ mesh.normals[element]
-        expected += elastic.nodal_forces(np.array([element]), lambda x, _, t=traction: np.broadcast_to(t, x.shape))
+        expected += integrate_traction(
+            elastic.displacement_space, np.array([element]), lambda x, _, t=traction: np.broadcast_to(t, x.shape)
+        )
     displacement = (dof_points(elastic.displacement_space) - mesh.centre) @ PURE_SHEAR.T
-    miss = expected.ravel() - elastic.matrix() @ displacement.ravel()
-    normals = elastic.nodal_forces(np.arange(mesh.n_elements), lambda _, normals: normals).ravel()
+    miss = expected.ravel() - SteklovPoincareOperator(elastic).matrix() @ displacement.ravel()
+    normals = integrate_traction(
+        elastic.displacement_space, np.arange(mesh.n_elements), lambda _, normals: normals
+    ).ravel()
     pressure = miss @ normals / (normals @ normals)
     assert np.abs(miss - pressure * normals).max() < 1e-12 * np.abs(expected).max()
 
 
 def test_a_pressed_block_bulges_without_changing_its_volume() -> None:
     mesh = block()
-    elastic = bk.GalerkinMap(mesh, RUBBER)
-    force = elastic.nodal_forces(mesh.part("top"), lambda x, _: np.broadcast_to([0.0, -1.0], x.shape))
+    elastic = bk.GalerkinElasticity(mesh, RUBBER)
+    force = integrate_traction(
+        elastic.displacement_space, mesh.part("top"), lambda x, _: np.broadcast_to([0.0, -1.0], x.shape)
+    )
     body = condense(elastic, [roller(mesh, "right")], bottom_of(elastic, mesh), force)
     nodes = body.nodes
     glide = np.zeros((body.n_contact, 2), bool)
@@ -85,11 +92,11 @@ def test_a_ring_under_inner_pressure_has_the_lame_solution() -> None:
     errors = []
     for n_elements in (32, 64, 128):
         mesh = annulus(n_elements)
-        elastic = bk.GalerkinMap(mesh, RUBBER)
+        elastic = bk.GalerkinElasticity(mesh, RUBBER)
         radius = np.hypot(*mesh.nodes.T)
         unit = mesh.nodes / radius[:, None]
         inside = np.flatnonzero(np.hypot(*mesh.centres.T) < 1.5)
-        force = elastic.nodal_forces(inside, lambda _, normals: -pressure * normals)
+        force = integrate_traction(elastic.displacement_space, inside, lambda _, normals: -pressure * normals)
         # three displacements hold the rigid motions, at points that symmetry keeps at rest
         fixed = np.zeros((mesh.n_nodes, 2), bool)
         fixed[np.argmin(np.hypot(*(mesh.nodes - [2.0, 0.0]).T)), 1] = True
@@ -126,7 +133,7 @@ def test_example_1_has_a_smooth_incompressible_limit(discretisation: object) -> 
 
 def test_a_body_without_room_to_yield_is_named() -> None:
     mesh = block(24)
-    elastic = bk.GalerkinMap(mesh, RUBBER)
+    elastic = bk.GalerkinElasticity(mesh, RUBBER)
     everywhere = np.broadcast_to(np.eye(2), (mesh.n_elements, 2, 2))
     # all sides but the bottom are clamped, and the bottom is the contact boundary
     clamped = np.setdiff1d(np.arange(mesh.n_elements), mesh.part("bottom"))
@@ -144,8 +151,11 @@ def test_a_body_without_room_to_yield_is_named() -> None:
 def test_collocation_refuses_tractions_under_given_displacements_alone() -> None:
     # a uniform pressure on the whole boundary belongs to no displacement
     with pytest.raises(SingularMatrixError, match="the single layer operator is singular"):
-        bk.CollocationMap(annulus(24), RUBBER).matrix()
-    assert bk.CollocationMap(annulus(24), bk.Material(3.0, 0.49)).matrix().shape == (48, 48)
+        SteklovPoincareOperator(bk.CollocationElasticity(annulus(24), RUBBER)).matrix()
+    assert SteklovPoincareOperator(bk.CollocationElasticity(annulus(24), bk.Material(3.0, 0.49))).matrix().shape == (
+        48,
+        48,
+    )
 
 
 HOLES = {

@@ -14,8 +14,9 @@ from bemkit.operators.collocation.reciprocity import Reciprocity
 from bemkit.operators.counts import Entries
 from bemkit.operators.material import Material
 from bemkit.operators.rigid_modes import traction_free_modes
-from bemkit.operators.steklov_poincare.maps import CollocationMap
+from bemkit.operators.steklov_poincare.collocation import CollocationElasticity
 from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions
+from bemkit.operators.steklov_poincare.operator import SteklovPoincareOperator
 from tests.operators.collocation_matrices import collocation_matrices
 from tests.operators.test_curved import composite
 
@@ -150,7 +151,7 @@ def test_columns_give_what_whole_matrices_give(make: type, seed: int) -> None:
     )
     force = np.einsum("nkc,nk->nc", conditions.frame, local)
     kept = rng.normal(size=int(conditions.is_retained.sum()))
-    u, f = CollocationMap(mesh, MATERIAL).condense(conditions, force).recover(kept)
+    u, f = CollocationElasticity(mesh, MATERIAL).condense(conditions, force).recover(kept)
     exact_u, exact_f = whole_equations(mesh, conditions, force, kept)
     # two different eliminations of one well-conditioned system
     np.testing.assert_allclose(u, exact_u, rtol=0.0, atol=1e-10 * np.abs(exact_u).max())
@@ -168,7 +169,7 @@ def test_supports_and_loads_in_patches_give_what_whole_matrices_give(loaded: lis
     force = at_rest.copy()
     force[loaded] = np.where(conditions.is_free[loaded], (0.3, -1.0), 0.0)
     opened = np.array([0.2, -0.1])
-    u, f = CollocationMap(mesh, MATERIAL).condense(conditions, force).recover(opened)
+    u, f = CollocationElasticity(mesh, MATERIAL).condense(conditions, force).recover(opened)
     exact_u, exact_f = whole_equations(mesh, conditions, force, opened)
     # as above
     np.testing.assert_allclose(u, exact_u, rtol=0.0, atol=1e-10 * np.abs(exact_u).max())
@@ -179,7 +180,7 @@ def test_stiffness_and_load_are_those_of_the_retained_directions() -> None:
     mesh = MESHES["square"]()
     conditions = any_conditions(mesh, 3)
     force = np.einsum("nkc,nk->nc", conditions.frame, np.where(conditions.is_free, 1.0, 0.0))
-    condensed = CollocationMap(mesh, MATERIAL).condense(conditions, force)
+    condensed = CollocationElasticity(mesh, MATERIAL).condense(conditions, force)
     kept = np.random.default_rng(3).normal(size=int(conditions.is_retained.sum()))
     _, f = condensed.recover(kept)
     local = np.einsum("nkc,nc->nk", conditions.frame, f)[conditions.is_retained]
@@ -196,7 +197,7 @@ def test_only_columns_that_something_multiplies_are_computed() -> None:
     conditions = NodalConditions(frame, is_fixed, np.zeros((24, 2)), is_retained)
     force = np.zeros((24, 2))
     force[mesh.normals[:, 1] > 0.5, 1] = -1.0
-    work = CollocationMap(mesh, MATERIAL).condense(conditions, force).work
+    work = CollocationElasticity(mesh, MATERIAL).condense(conditions, force).work
     # tractions of the bottom, the right side along x and the load; displacements but the right side's along x
     assert work.single_layer == Entries(computed=48 * (12 + 6 + 6), stored=48 * (12 + 6))
     assert work.double_layer == Entries(computed=48 * (48 - 6), stored=48 * (48 - 6))
@@ -213,7 +214,7 @@ def test_later_loads_are_swept_unless_they_are_multiples() -> None:
     none, displacement = np.zeros((36, 2)), np.where(conditions.is_fixed, rng.normal(size=(36, 2)), 0.0)
     force = np.einsum("nkc,nk->nc", conditions.frame, np.where(conditions.is_free, rng.normal(size=(36, 2)), 0.0))
     kept = rng.normal(size=int(conditions.is_retained.sum()))
-    first = CollocationMap(mesh, MATERIAL).condense(replace(conditions, displacement=none), none)
+    first = CollocationElasticity(mesh, MATERIAL).condense(replace(conditions, displacement=none), none)
     loaded = int(np.count_nonzero(conditions.is_free.any(axis=1)))
     # loads alone take their own columns, displacements all of them; multiples, zero among them, nothing at all
     steps = [
@@ -229,14 +230,14 @@ def test_later_loads_are_swept_unless_they_are_multiples() -> None:
         condensed = condensed.under(given, moved)
         assert condensed.work.element_pairs == n_pairs
         assert condensed.work.right_hand_sides == (n_pairs > 0)
-        fresh = CollocationMap(mesh, MATERIAL).condense(replace(conditions, displacement=moved), given)
+        fresh = CollocationElasticity(mesh, MATERIAL).condense(replace(conditions, displacement=moved), given)
         for one, other in zip(condensed.recover(kept), fresh.recover(kept), strict=True):
             np.testing.assert_allclose(one, other, rtol=0.0, atol=1e-11 * np.abs(other).max())
         np.testing.assert_allclose(condensed.load, fresh.load, rtol=0.0, atol=1e-11)
 
 
 def left_on_rotation(mesh: BoundaryMesh, slopes: bool) -> float:
-    matrix = CollocationMap(mesh, MATERIAL, slopes=slopes).matrix()
+    matrix = SteklovPoincareOperator(CollocationElasticity(mesh, MATERIAL, slopes=slopes)).matrix()
     left = np.abs(matrix @ traction_free_modes(mesh, mesh.centres)).max(axis=0) / np.abs(matrix).max()
     assert left[:2].max() < 1e-12  # translations are exact up to round-off in any case
     return float(left[2])
@@ -254,11 +255,11 @@ def test_slopes_raise_the_order_from_one_to_two() -> None:
         energies[slopes] = []
         for n in (24, 48, 96):
             mesh = discretise(Disk(1.0).outline(), n_elements=n)
-            elastic = CollocationMap(mesh, MATERIAL, slopes=slopes)
+            elastic = CollocationElasticity(mesh, MATERIAL, slopes=slopes)
             theta = np.arctan2(*mesh.centres.T[::-1])
             u = np.column_stack([np.cos(2 * theta), np.sin(2 * theta)]).ravel()
             exact = 2 * np.pi * 4 * MATERIAL.shear_modulus / MATERIAL.kappa
-            energies[slopes].append(abs(u @ elastic.matrix() @ u / exact - 1.0))
+            energies[slopes].append(abs(u @ SteklovPoincareOperator(elastic).matrix() @ u / exact - 1.0))
     for slopes, order in ((True, 2.0), (False, 1.0)):
         observed = np.log2(energies[slopes][-2] / energies[slopes][-1])
         assert abs(observed - order) < 0.25

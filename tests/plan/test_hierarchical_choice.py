@@ -74,7 +74,7 @@ def test_compressed_equations_of_galerkin_are_refused(degree: int) -> None:
     with pytest.raises(bk.errors.InputError, match="dense equations only"):
         bk.run(scene)
     with pytest.raises(ValueError, match="a map does not choose"):
-        bk.GalerkinMap(scene.build_mesh(), scene.material, linear_solver=ASKED)
+        bk.GalerkinElasticity(scene.build_mesh(), scene.material, linear_solver=ASKED)
 
 
 def test_automatic_keeps_galerkin_dense() -> None:

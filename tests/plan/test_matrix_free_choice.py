@@ -57,7 +57,7 @@ def test_galerkin_takes_what_automatic_takes() -> None:
     assert "not matrix-free, but" in choice.reason
     scene = scene_of(40, discretisation=bk.Galerkin(1))
     with pytest.raises(ValueError, match="a map does not choose"):
-        bk.GalerkinMap(scene.build_mesh(), scene.material, linear_solver=ASKED)
+        bk.GalerkinElasticity(scene.build_mesh(), scene.material, linear_solver=ASKED)
 
 
 def test_the_plan_says_what_is_used_and_that_it_takes_less_memory() -> None:

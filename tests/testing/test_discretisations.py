@@ -16,7 +16,8 @@ from bemkit.cli.main import main
 from bemkit.geometry.spaces import BoundarySpace
 from bemkit.operators.linear.solvers import LinearSolver
 from bemkit.operators.steklov_poincare import CondensedMap
-from bemkit.operators.steklov_poincare.maps import CollocationMap, GalerkinMap
+from bemkit.operators.steklov_poincare.collocation import CollocationElasticity
+from bemkit.operators.steklov_poincare.galerkin import GalerkinElasticity
 from bemkit.operators.steklov_poincare.needs import BodyCase, BodyNeeds
 from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions
 from bemkit.scene.discretisation import Discretisation, SymmetricGalerkin
@@ -132,8 +133,10 @@ class Vague(Own):
 
 @dataclass(frozen=True)
 class OtherSpace(Own):
-    def elastic_map(self, mesh: bk.BoundaryMesh, material: bk.Material, linear_solver: LinearSolver) -> GalerkinMap:
-        return GalerkinMap(mesh, material)
+    def elastic_map(
+        self, mesh: bk.BoundaryMesh, material: bk.Material, linear_solver: LinearSolver
+    ) -> GalerkinElasticity:
+        return GalerkinElasticity(mesh, material)
 
 
 @dataclass(frozen=True)
@@ -155,7 +158,7 @@ class NotSymmetric(bk.ConstantCollocation):
     is_symmetric = True
 
 
-class Distorted(CollocationMap):
+class Distorted(CollocationElasticity):
     """Adds springs to the stiffness."""
 
     def condense(self, conditions: NodalConditions, force: FloatArray) -> CondensedMap:
@@ -172,11 +175,13 @@ class Springs(bk.ConstantCollocation):
 
 @dataclass(frozen=True)
 class Softer(bk.ConstantCollocation):
-    def elastic_map(self, mesh: bk.BoundaryMesh, material: bk.Material, linear_solver: LinearSolver) -> CollocationMap:
-        return CollocationMap(mesh, bk.Material(0.8 * material.youngs_modulus, material.poisson_ratio))
+    def elastic_map(
+        self, mesh: bk.BoundaryMesh, material: bk.Material, linear_solver: LinearSolver
+    ) -> CollocationElasticity:
+        return CollocationElasticity(mesh, bk.Material(0.8 * material.youngs_modulus, material.poisson_ratio))
 
 
-class Weakened(CollocationMap):
+class Weakened(CollocationElasticity):
     """Halves the tractions of supports."""
 
     def element_tractions(self, displacement: FloatArray, force: FloatArray) -> FloatArray:

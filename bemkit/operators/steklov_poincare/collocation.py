@@ -16,6 +16,7 @@ from bemkit.operators.collocation.reciprocity import Reciprocity
 from bemkit.operators.counts import Entries, OperationCounts
 from bemkit.operators.linear.dense import DenseLU
 from bemkit.operators.material import Material
+from bemkit.operators.pair_form import Tag
 from bemkit.operators.rigid_modes import traction_free_modes
 from bemkit.operators.steklov_poincare.nodal_conditions import GivenData, NodalConditions, rotate_columns
 from bemkit.operators.steklov_poincare.protocol import CondensedMap
@@ -50,6 +51,22 @@ class CollocationElasticity:
         self.slopes = slopes
         self.displacement_space: BoundarySpace = ConstantSpace(mesh)
         self.traction_space: BoundarySpace = self.displacement_space
+
+    @property
+    def tags(self) -> frozenset[Tag]:
+        """Zero on rigid motions of a bounded body, with slopes; without them on translations only."""
+        if self.mesh.is_exterior:
+            return frozenset()
+        return frozenset({Tag.KILLS_RIGID_MOTIONS if self.slopes else Tag.KILLS_TRANSLATIONS})
+
+    def stiffness(self) -> FloatArray:
+        """Return S, (n_dofs, n_dofs) [Pa]: the stiffness when all displacements are retained."""
+        shape = self.mesh.n_elements, 2
+        frame = np.broadcast_to(np.eye(2), (*shape, 2))
+        retained = NodalConditions(frame, np.zeros(shape, bool), np.zeros(shape), np.ones(shape, bool))
+        name = "the single layer operator"
+        system = MixedSystem(self.mesh, self.material, retained, name, np.zeros(shape), slopes=self.slopes)
+        return system.condensed().stiffness
 
     def condense(self, conditions: NodalConditions, force: FloatArray) -> CondensedMap:
         """Exchange columns so that all unknowns but the retained displacements stand on the left, and solve once.

@@ -28,6 +28,7 @@ from bemkit.operators.linear.solvers import (
     MatrixFree,
 )
 from bemkit.operators.material import Material
+from bemkit.operators.pair_form import Tag
 from bemkit.operators.rigid_modes import traction_free_modes
 from bemkit.operators.steklov_poincare.layer_operators import assemble_layers, dilatation_of
 from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions, integrate_traction
@@ -112,6 +113,12 @@ class GalerkinElasticity:
             )
         self.linear_solver: LinearSolver = linear_solver
 
+    @property
+    def tags(self) -> frozenset[Tag]:
+        """Symmetric and semidefinite; the kernel are the rigid motions that the space holds, of a bounded body."""
+        tags = {Tag.SYMMETRIC, Tag.POSITIVE_SEMIDEFINITE}
+        return frozenset(tags if self.mesh.is_exterior else tags | {Tag.KILLS_RIGID_MOTIONS})
+
     @cached_property
     def factors(self) -> GalerkinFactors:
         """What the map is made of, computed on first use."""
@@ -178,6 +185,13 @@ class GalerkinElasticity:
         beta, dilatation = self.material.plane_compressibility, dilatation_of(self.displacement_space)[:, None]
         change = total - beta * multiply(self.factors.matrix, dilatation)
         return Volume(change, beta * float(np.vdot(dilatation, change)))
+
+    def stiffness(self) -> FloatArray:
+        """Return S, (n_dofs, n_dofs) [Pa]; of an incompressible body without the pressure that keeps the volume."""
+        if not self._volume.yields:
+            return self.factors.matrix
+        change = self._volume.change
+        return np.asarray(self.factors.matrix + change @ change.T / self._volume.yields)
 
     def condense(self, conditions: NodalConditions, force: FloatArray) -> CondensedMap:
         """Eliminate every direction that is not retained, by a Schur complement, with the linear solver of the map."""

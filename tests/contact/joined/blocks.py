@@ -17,7 +17,9 @@ from bemkit.geometry import Polygon, discretise
 from bemkit.geometry.spaces import dof_points
 from bemkit.operators.material import Material
 from bemkit.operators.rigid_modes import rigid_motions
-from bemkit.operators.steklov_poincare.maps import GalerkinMap
+from bemkit.operators.steklov_poincare.galerkin import GalerkinElasticity
+from bemkit.operators.steklov_poincare.nodal_conditions import integrate_traction
+from bemkit.operators.steklov_poincare.operator import SteklovPoincareOperator
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,7 +34,7 @@ class Block:
     @cached_property
     def elastic(self):
         mesh = discretise(Polygon(self.vertices).outline(), n_elements=self.n_elements)
-        return GalerkinMap(mesh, Material(self.youngs_modulus, self.poisson_ratio))
+        return GalerkinElasticity(mesh, Material(self.youngs_modulus, self.poisson_ratio))
 
     @cached_property
     def points(self):
@@ -40,7 +42,7 @@ class Block:
 
     @cached_property
     def stiffness(self):
-        return np.array(self.elastic.matrix())
+        return np.array(SteklovPoincareOperator(self.elastic).matrix())
 
     @cached_property
     def motions(self):
@@ -58,8 +60,10 @@ class Block:
             particular[:, k] = -(along**2 + ratio * across**2) / (2 * modulus)
             particular[:, 1 - k] = ratio * along * across / modulus
             everywhere = np.arange(self.elastic.displacement_space.mesh.n_elements)
-            forces = self.elastic.nodal_forces(
-                everywhere, lambda p, m, k=k: np.where(np.arange(2) == k, -p[..., [k]] * m[..., [k]], 0.0)
+            forces = integrate_traction(
+                self.elastic.displacement_space,
+                everywhere,
+                lambda p, m, k=k: np.where(np.arange(2) == k, -p[..., [k]] * m[..., [k]], 0.0),
             )
             loads.append(self.stiffness @ particular.ravel() - forces.ravel())
         return np.array(loads)
@@ -125,8 +129,10 @@ def row_of_blocks(moduli=(1.0, 1.0), *, m=4, width=1.0, press=0.3, lift=0.05, **
     for k, block in enumerate(blocks):
         mesh = block.elastic.displacement_space.mesh
         tops = np.flatnonzero(mesh.points(np.arange(mesh.n_elements), np.zeros(1))[:, 0, 1] > 1.0 - 1e-9)
-        load = block.elastic.nodal_forces(
-            tops, lambda x, _, k=k: np.stack([press * (x[..., 0] - 0.3 * k), -lift * (1.0 + x[..., 0])], axis=-1)
+        load = integrate_traction(
+            block.elastic.displacement_space,
+            tops,
+            lambda x, _, k=k: np.stack([press * (x[..., 0] - 0.3 * k), -lift * (1.0 + x[..., 0])], axis=-1),
         )
         members.append(block.member(load=load.ravel(), name=f"block {k + 1}"))
     pairs = []
@@ -165,7 +171,9 @@ def wall(courses, per_course, m=8, *, gravity=(0.0, -1.0), push=0.0, **options):
         first = courses_of[-1][0]
         mesh = placed[first][0].elastic.displacement_space.mesh
         left = np.flatnonzero(mesh.points(np.arange(mesh.n_elements), np.zeros(1))[:, 0, 0] < 1e-9)
-        force = placed[first][0].elastic.nodal_forces(left, lambda x, _: np.broadcast_to([push, 0.0], x.shape))
+        force = integrate_traction(
+            placed[first][0].elastic.displacement_space, left, lambda x, _: np.broadcast_to([push, 0.0], x.shape)
+        )
         members[first] = replace(members[first], load=members[first].load + force.ravel())
     pairs = []
     for k, course in enumerate(courses_of):
