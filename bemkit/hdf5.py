@@ -8,6 +8,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import UTC, datetime
+from functools import cache
 from importlib.metadata import version
 from io import BufferedRandom, BufferedReader
 from pathlib import Path
@@ -184,10 +185,16 @@ def provenance() -> dict[str, str]:
     return {
         "bemkit": __version__,
         "python": platform.python_version(),
-        **{name: version(name) for name in ("numpy", "scipy", "h5py")},
+        **_versions(),
         "platform": f"{platform.system()} {platform.machine()}",
         "created": datetime.now(UTC).isoformat(timespec="seconds"),
     }
+
+
+@cache
+def _versions() -> dict[str, str]:
+    """Return the versions of libraries, whose metadata take milliseconds to read."""
+    return {name: version(name) for name in ("numpy", "scipy", "h5py")}
 
 
 def _text_type(texts: Sequence[str]) -> np.dtype[Any]:

@@ -35,9 +35,8 @@ def schema() -> None:
 
 @click.command()
 @click.argument("subject", metavar="SCENE_OR_RESULT")
-@click.option("--bibtex", "is_bibtex", is_flag=True, help="Print the entries of a BibTeX file.")
-def cite(subject: str, is_bibtex: bool) -> None:
-    """Name the works to cite for SCENE_OR_RESULT: a scene, or a result file that ends in .h5 or .hdf5."""
+def cite(subject: str) -> None:
+    """Print what to cite for SCENE_OR_RESULT, a scene or a result file that ends in .h5 or .hdf5, as a BibTeX file."""
     with shown_progress(quiet=False):
         from bemkit.cli.sources import RESULT_ENDINGS
         from bemkit.results.citations import cite as works_behind
@@ -46,4 +45,4 @@ def cite(subject: str, is_bibtex: bool) -> None:
 
         is_result = Path(subject).suffix.lower() in RESULT_ENDINGS
         citations = works_behind(read_result(subject) if is_result else load_scene(subject))
-    print_data((citations.bibtex() if is_bibtex else str(citations)) + "\n")
+    print_data(f"{citations}\n")

@@ -1,8 +1,7 @@
-"""The works that bemkit builds on, as text and as BibTeX, and which of them stand behind a scene or a run of it."""
+"""The works to cite for the methods of a scene or of a run, as entries of a BibTeX file."""
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
@@ -19,7 +18,6 @@ from bemkit.scene.discretisation import ConstantCollocation, Discretisation, Gal
 from bemkit.scene.registry import LAWS, SOLVERS
 from bemkit.scene.scene import Scene
 from bemkit.solvers.fallbacks import drivers_at_work
-from bemkit.version import __version__
 
 PACKAGE = "bemkit"
 """The key of the package itself."""
@@ -42,83 +40,12 @@ LAW_WORKS: Mapping[str, tuple[str, ...]] = MappingProxyType(
 """The works behind friction laws that are no textbook matter, by their words in scene files."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class Work:
-    """A published work.
-
-    Parameters
-    ----------
-    key : str
-        Such as ``"AlartCurnier1991"``.
-    topic : str
-        The table of ``docs/references.md`` in which it stands.
-    type : str
-        Of the BibTeX entry: article, book, incollection or misc.
-    title : str
-    author : tuple of str
-        Empty where unknown; braces hold a name together that is no person's.
-    journal, volume, pages, publisher, booktitle, editor, edition, url, note : str
-        Empty where they do not apply.
-    year : int, optional
-    about : str
-        What it is cited for.
-    """
-
-    key: str
-    topic: str
-    type: str
-    title: str
-    author: tuple[str, ...] = ()
-    journal: str = ""
-    volume: str = ""
-    pages: str = ""
-    publisher: str = ""
-    booktitle: str = ""
-    editor: str = ""
-    edition: str = ""
-    url: str = ""
-    note: str = ""
-    year: int | None = None
-    about: str = ""
-
-    def text(self, emphasis: str = "") -> str:
-        """Return authors, title, source and year in one line; marks such as ``*`` go around what is set in italics."""
-        authors = ", ".join(name.strip("{}") for name in self.author).replace(", others", " and others")
-        title, where = self.title, ""
-        year = "" if self.year is None else str(self.year)
-        if self.journal:
-            where = f" {emphasis}{self.journal}{emphasis} {self.volume} ({year}) {self.pages}".rstrip()
-        else:
-            title = title if self.booktitle else f"{emphasis}{title}{emphasis}"
-            edition = f", {self.edition} edition" if self.edition else ""
-            booktitle = f"In {self.editor} (ed.): {emphasis}{self.booktitle}{emphasis}" if self.booktitle else ""
-            pieces = (booktitle, self.publisher, self.url, self.note, year)
-            where = f"{edition}. " + ", ".join(filter(None, pieces)) if any(pieces) else edition
-        return f"{authors}: {title}{'.' if self.journal else ''}{where}.".removeprefix(": ")
-
-    def bibtex(self) -> str:
-        """Return the entry for a BibTeX file in UTF-8."""
-        fields = {
-            "author": " and ".join(self.author),
-            "title": f"{{{self.title}}}",
-            "pages": self.pages.replace("-", "--"),
-            "year": "" if self.year is None else str(self.year),
-        }
-        for name in ("journal", "volume", "publisher", "booktitle", "editor", "edition", "url", "note"):
-            fields[name] = getattr(self, name)
-        lines = [f"  {name} = {{{value}}}," for name, value in fields.items() if value]
-        return "\n".join((f"@{self.type}{{{self.key},", *lines, "}"))
-
-
 @cache
-def works() -> Mapping[str, Work]:
-    """Return all works by their keys, that of the package with its version."""
-    tables = tomllib.loads((resources.files("bemkit") / "results" / "bibliography.toml").read_text("utf-8"))
-    tables[PACKAGE]["note"] = f"Version {__version__}"
-    found = {
-        key: Work(key=key, **(table | {"author": tuple(table.get("author", ()))})) for key, table in tables.items()
-    }
-    return MappingProxyType(found)
+def entries() -> Mapping[str, str]:
+    """Return the entries of ``references.bib`` by their keys, as the file has them."""
+    text = (resources.files("bemkit") / "results" / "references.bib").read_text("utf-8")
+    found = (f"@{entry.strip()}" for entry in text.split("\n@")[1:])
+    return MappingProxyType({entry[entry.index("{") + 1 : entry.index(",")]: entry for entry in found})
 
 
 @dataclass(frozen=True)
@@ -129,7 +56,7 @@ class Method:
     ----------
     name : str
     keys : tuple of str
-        In the bibliography; none of a method that bemkit does not come with.
+        In ``references.bib``; none for a method from elsewhere.
     """
 
     name: str
@@ -151,23 +78,18 @@ class Citations:
     reference: str = ""
 
     @property
-    def works(self) -> tuple[Work, ...]:
-        """The works of all methods, each once."""
-        return tuple(works()[key] for key in dict.fromkeys(key for method in self.methods for key in method.keys))
+    def keys(self) -> tuple[str, ...]:
+        """The keys of all works, each once."""
+        return tuple(dict.fromkeys(key for method in self.methods for key in method.keys))
 
     def __str__(self) -> str:
-        """Return the methods, each with its works, as text."""
-        lines = []
-        for method in self.methods:
-            lines.append(method.name)
-            lines += [f"    {works()[key].text()}" for key in method.keys] or ["    not part of bemkit: ask its author"]
+        """Return the methods with their keys as comments of a BibTeX file, then the entries."""
+        lines = [
+            f"% {each.name}: {', '.join(each.keys) or 'not part of bemkit, ask its author'}" for each in self.methods
+        ]
         if self.reference:
-            lines += ["the scene", f"    {' '.join(self.reference.split())}"]
-        return "\n".join(lines)
-
-    def bibtex(self) -> str:
-        """Return the works as entries of a BibTeX file."""
-        return "\n\n".join(work.bibtex() for work in self.works)
+            lines.append(f"% the scene: {' '.join(self.reference.split())}")
+        return "\n\n".join(["\n".join(lines), *(entries()[key] for key in self.keys)])
 
 
 def cite(subject: Scene | Assembly | Solution | AssemblySolution) -> Citations:
@@ -181,7 +103,7 @@ def cite(subject: Scene | Assembly | Solution | AssemblySolution) -> Citations:
     Returns
     -------
     Citations
-        ``print`` shows the methods with their works; `Citations.bibtex` has them for a BibTeX file.
+        ``print`` shows a BibTeX file: the methods as comments, then the entries of their works.
     """
     stated = subject if isinstance(subject, Scene | Assembly) else subject.stated
     messages = [] if isinstance(subject, Scene | Assembly) else [record.message for record in subject.history]

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 import bemkit
-from bemkit.results.citations import PACKAGE, works
+from bemkit.results.citations import PACKAGE, entries
 from tests.docs.pages import DOCS, read
 
 KEY = re.compile(r"\[([A-Z][A-Za-z]+(?:18|19|20)\d\d)\]")
@@ -17,7 +17,7 @@ CITED = {key for path in Path(bemkit.__file__).parent.rglob("*.py") for key in K
 
 @pytest.mark.parametrize("key", sorted(CITED))
 def test_what_is_cited_is_listed(key: str) -> None:
-    assert key in works()
+    assert key in entries()
 
 
 def test_the_page_shows_the_bibliography(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -26,7 +26,7 @@ def test_the_page_shows_the_bibliography(monkeypatch: pytest.MonkeyPatch) -> Non
 
     page = read("references.md")
     assert filled(page) == page, "run python docs/make_bibliography.py"
-    assert re.findall(r"^\| `\[(\w+)\]`", page, re.MULTILINE) == [key for key in works() if key != PACKAGE]
+    assert re.findall(r"^\| `\[(\w+)\]`", page, re.MULTILINE) == [key for key in entries() if key != PACKAGE]
 
 
 def test_something_is_cited() -> None:
