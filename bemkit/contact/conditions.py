@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
-from bemkit.arrays import BoolArray, FloatArray, IntArray
+from bemkit.arrays import BoolArray, FloatArray
 from bemkit.errors import InputError
+from bemkit.operators.linear.null_space import NULL_TOLERANCE, null_space
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
@@ -20,17 +21,6 @@ if TYPE_CHECKING:
     RigidMotions: TypeAlias = FloatArray | csr_array
 else:
     RigidMotions = "FloatArray | csr_array"
-
-
-FREE_MOTION_TOLERANCE = 1e-9
-"""A rigid motion of unit size is free if it changes no condition by more than this. The round-off of normals gives
-1e-16, a single held node out of a million 1e-3."""
-_NORMAL_EQUATIONS_TOLERANCE = 1e-7
-"""The same tolerance where normal equations are formed, which hold half of the digits."""
-_SHIFT = 1e-12
-"""Added to the diagonal of the singular normal equations: well above their round-off, far below any condition."""
-_MOST_DENSE_MOTIONS = 400
-"""Most coupled motions whose null space is found by a singular value decomposition; that of more is by iteration."""
 
 
 def as_rows(motions: RigidMotions) -> RigidMotions:
@@ -56,77 +46,6 @@ def largest_components(motions: RigidMotions) -> FloatArray:
 def orthonormal(motions: FloatArray) -> FloatArray:
     """Return orthonormal motions (n_motions, n_contact, 2) that span the same as independent ones."""
     return np.asarray(np.linalg.qr(motions.reshape(len(motions), 2 * motions.shape[1]).T)[0]).T.reshape(motions.shape)
-
-
-def null_space(matrix: csr_array) -> csr_array:
-    """Return an orthonormal basis of the null space of a sparse matrix.
-
-    Parameters
-    ----------
-    matrix : (n_rows, n) sparse array
-        Columns of size about one.
-
-    Returns
-    -------
-    (n_null, n) sparse array
-        One vector a row. Groups of columns that share no row are treated one by one, so vectors stay sparse.
-    """
-    from scipy.sparse import csgraph, csr_array
-
-    n = matrix.shape[1]
-    nonzero = matrix.copy()
-    nonzero.eliminate_zeros()
-    n_groups, group = csgraph.connected_components(abs(nonzero).T @ abs(nonzero), directed=False)
-    order = np.argsort(group, kind="stable")
-    groups = np.split(order, np.cumsum(np.bincount(group, minlength=n_groups))[:-1])
-    by_column = nonzero.tocsc()
-    n_entries = np.diff(by_column.indptr)
-    rows, columns, values, n_null = [], [], [], 0
-    for members in groups:
-        if members.size == 1 and n_entries[members[0]] == 0:
-            basis = np.ones((1, 1))
-        else:
-            part = by_column[:, members].tocsr()
-            part = part[np.diff(part.indptr) > 0]
-            basis = _null_space_of_group(part)
-        rows.append(np.repeat(np.arange(n_null, n_null + len(basis)), members.size))
-        columns.append(np.tile(members, len(basis)))
-        values.append(basis.ravel())
-        n_null += len(basis)
-    place: tuple[IntArray, IntArray] = (
-        np.concatenate([*rows, []]).astype(int),
-        np.concatenate([*columns, []]).astype(int),
-    )
-    return csr_array((np.concatenate([*values, []]), place), (n_null, n))
-
-
-def _null_space_of_group(part: csr_array) -> FloatArray:
-    """Return an orthonormal basis (n_null, n) of the null space of a matrix whose columns are coupled."""
-    if part.shape[1] <= _MOST_DENSE_MOTIONS:
-        _, singular, directions = np.linalg.svd(np.linalg.qr(part.toarray(), mode="r"))
-        return np.asarray(directions[np.count_nonzero(singular > FREE_MOTION_TOLERANCE) :])
-    from scipy.sparse import csc_array, eye_array
-    from scipy.sparse.linalg import splu
-
-    # inverse iteration on the normal equations, with more and more vectors until some lie outside of the null space
-    normal = csc_array(part.T @ part)
-    factors = splu(
-        normal + _SHIFT * eye_array(part.shape[1], format="csc"),
-        permc_spec="MMD_AT_PLUS_A",
-        diag_pivot_thresh=0.0,
-        options={"SymmetricMode": True},
-    )
-    random = np.random.default_rng(0)
-    n_tried = 8
-    while True:
-        vectors = np.linalg.qr(random.normal(size=(part.shape[1], min(n_tried, part.shape[1]))))[0]
-        for _ in range(3):
-            vectors = np.linalg.qr(factors.solve(vectors))[0]
-        _, singular, directions = np.linalg.svd(part @ vectors, full_matrices=False)
-        is_null = singular <= _NORMAL_EQUATIONS_TOLERANCE
-        if not is_null.all() or n_tried >= part.shape[1]:
-            return np.asarray(directions[is_null] @ vectors.T)
-        n_tried *= 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -226,14 +145,12 @@ class LinearConditions:
 
     def hold(self, basis: FloatArray) -> bool:
         """Whether every combination of orthonormal motions (n_motions, n_contact, 2) changes some condition."""
-        return not len(basis) or bool(
-            (np.linalg.svd(self._changes(basis), compute_uv=False) > FREE_MOTION_TOLERANCE).all()
-        )
+        return not len(basis) or bool((np.linalg.svd(self._changes(basis), compute_uv=False) > NULL_TOLERANCE).all())
 
     def _free_combinations(self, basis: FloatArray) -> FloatArray:
         """Return the combinations (n_free, n_motions) of orthonormal motions that change no condition."""
         _, singular, directions = np.linalg.svd(np.linalg.qr(self._changes(basis), mode="r"))
-        return np.asarray(directions[np.count_nonzero(singular > FREE_MOTION_TOLERANCE) :])
+        return np.asarray(directions[np.count_nonzero(singular > NULL_TOLERANCE) :])
 
     def _changes(self, basis: FloatArray) -> FloatArray:
         """Return the changes (2 n_contact, n_motions) of the scaled conditions by orthonormal motions."""

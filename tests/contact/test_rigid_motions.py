@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 from scipy import sparse
 
-from bemkit.contact.conditions import null_space, orthonormal, separated, slip, stick
+from bemkit.contact.conditions import orthonormal, separated, slip, stick
 from bemkit.contact.joined.member import diagonal_blocks
+from bemkit.operators.linear.null_space import null_space
 from tests.slow import slow_except
 
 

@@ -12,9 +12,9 @@ from scipy import sparse
 from bemkit.arrays import BoolArray, FloatArray, IntArray
 from bemkit.contact.body import ContactState
 from bemkit.contact.condensation.held_friction import HeldFriction
-from bemkit.contact.conditions import null_space
 from bemkit.contact.joined.member import Member, Shape, blocks_of_members, deformation, shapes_of
 from bemkit.errors import InputError
+from bemkit.operators.linear.null_space import null_space
 
 _ROUNDS = 2
 """Times that rigid motions are fitted: normal equations hold half of the digits, which is too few for stiff bodies."""

@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from bemkit.arrays import FloatArray
+from bemkit.arrays import FloatArray, IntArray
 from bemkit.contact.body import ContactState, LinearBody, SingularResponse
 from bemkit.contact.condensation.dense_body import DenseBody
 from bemkit.contact.condensation.node_coupling import NodeCoupling
@@ -169,38 +169,53 @@ class JoinedBodies(CoupledMembers, LinearBody):
         """
         if self._is_direct:
             return self._dense.imbalance(state)
-        contact = self.contact_forces(state)
         displacement, missed = self.recover(state)
-        # of forces before they cancel: contact may press a rigid body from all sides, without a resultant
-        nodal = np.abs(self.weights[:, None] * state.traction).ravel()
-        sizes, eps = abs(self.relative).T @ nodal + np.abs(self.load), float(np.finfo(float).eps)
-        first = np.cumsum([0, *(member.n_components for member in self.members)])[:-1]
-        largest, total = np.maximum.reduceat(sizes, first), np.add.reduceat(sizes, first)
-        # the terms whose differences the forces and the relative displacements are
-        terms = np.empty_like(sizes)
-        for shape in self.shapes:
-            terms[shape.rows] = shape.column_sizes * np.abs(displacement)[shape.rows]
-        reach = abs(self.relative) @ np.abs(displacement) + np.abs(self.offset) + np.abs(state.displacement.ravel())
-        per_length = self.moduli * np.repeat(self.weights / np.median(self.weights), 2)
-        if not np.abs(self.load).sum() > 0.0 and total.sum() <= NOISE_FACTOR * eps * terms.sum():
-            # nothing but motions: forces are round-off, and no measure
-            largest, total = np.maximum.reduceat(terms, first), np.add.reduceat(terms, first)
+        terms = self._terms(displacement)
+        largest, total = self._force_scales(state, terms)
         if not (largest.max() > 0.0 and np.isfinite(largest).all()):
             return Imbalance(0.0, 0.0) if not missed.any() else Imbalance(float("inf"), 0.0)
         largest = np.maximum(largest, LIGHTEST * largest.max())
         total = np.maximum(total, LIGHTEST * total.max())
 
-        at_contact = self.least_of_partners(largest)
-        missing = np.abs(missed) * per_length / at_contact
+        # what is missed at a node, as the force that it would take
+        force_by_displacement = self.moduli * np.repeat(self.weights / np.median(self.weights), 2)
+        force_by_displacement /= self.least_of_partners(largest)
+        missing = np.abs(missed) * force_by_displacement
+        # what all forces on a member do on its rigid motions
         motions, owner = self.motions, self.motion_owner
         size = abs(motions).max(axis=0).toarray().ravel() if len(owner) else np.zeros(0)
-        work = np.abs(motions.T @ (contact + self.load)) / size / total[owner]
-        of_sums = eps * np.add.reduceat(terms, first) / total
-        return Imbalance(
-            float(missing.max()),
-            float(np.max(work, initial=0.0)),
-            float(max((eps * reach * per_length / at_contact).max(), of_sums.max())),
-        )
+        work = np.abs(motions.T @ (self.contact_forces(state) + self.load)) / size / total[owner]
+        # what round-off may leave of both
+        eps = float(np.finfo(float).eps)
+        sizes = abs(self.relative) @ np.abs(displacement) + np.abs(self.offset) + np.abs(state.displacement.ravel())
+        of_sums = eps * np.add.reduceat(terms, self._first_components) / total
+        round_off = max((eps * sizes * force_by_displacement).max(), of_sums.max())
+        return Imbalance(float(missing.max()), float(np.max(work, initial=0.0)), float(round_off))
+
+    @property
+    def _first_components(self) -> IntArray:
+        """(n_members,) array: the first displacement component of each member."""
+        return np.cumsum([0, *(member.n_components for member in self.members)])[:-1]
+
+    def _terms(self, displacement: FloatArray) -> FloatArray:
+        """Return the terms (n,) [N/m] whose differences the forces on the members are."""
+        terms = np.empty_like(displacement)
+        for shape in self.shapes:
+            terms[shape.rows] = shape.column_sizes * np.abs(displacement)[shape.rows]
+        return terms
+
+    def _force_scales(self, state: ContactState, terms: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return the largest force and the sum of all forces (n_members,) [N/m] on each member.
+
+        Forces count before they cancel: contact may press a rigid body from all sides, without a resultant. Where
+        nothing is loaded and all forces are round-off, so that members have only moved, the terms take their place.
+        """
+        nodal = np.abs(self.weights[:, None] * state.traction).ravel()
+        sizes, first = abs(self.relative).T @ nodal + np.abs(self.load), self._first_components
+        noise = NOISE_FACTOR * float(np.finfo(float).eps) * terms.sum()
+        if not np.abs(self.load).sum() > 0.0 and sizes.sum() <= noise:
+            sizes = terms
+        return np.maximum.reduceat(sizes, first), np.add.reduceat(sizes, first)
 
     def member_displacements(self, state: ContactState) -> tuple[FloatArray, ...]:
         """Return the displacements (n,) [m] of each member that go with a state."""

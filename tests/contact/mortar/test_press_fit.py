@@ -1,0 +1,54 @@
+"""A disc pressed into a ring: uniform pressure on any meshes, also on symmetry lines."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import bemkit as bk
+
+DISC, RING = (tuple(f"{side}-{k}" for k in range(1, 5)) for side in ("arc", "inner"))
+
+
+def press_fit(n_elements: int, symmetry: bk.Symmetry | None) -> bk.Assembly:
+    """Return a quarter, or all, of a disc that is 1e-3 larger than the hole of a ring."""
+    material = bk.Material(1.0, 0.3)
+    disc, ring = (
+        bk.Body(name=name, shape=shape, material=material, parts=(bk.Part("fit", bk.Free(), sides=sides),))
+        for name, shape, sides in (("disc", bk.Disk(1.0005), DISC), ("ring", bk.Ring(0.9995, 2.0), RING))
+    )
+    fit = bk.ContactPair(
+        ("disc.fit", "ring.fit"), law=bk.Coulomb(0.3), interference=1.5e-3, multipliers_on="ring.fit", reach=0.1
+    )
+    return bk.Assembly(
+        title="press fit",
+        bodies=(disc, ring),
+        contacts=(fit,),
+        symmetry=symmetry,
+        discretisation=bk.Galerkin(1),
+        mesh=bk.MeshOptions(elements=n_elements),
+    )
+
+
+@pytest.mark.parametrize("n_elements", [80, 160, 320])
+def test_the_pressure_of_a_press_fit_is_uniform(n_elements: int) -> None:
+    solution = bk.run(press_fit(n_elements, bk.Symmetry(x=0.0, y=0.0)))
+    table = solution.contact
+    mean = np.average(table.sigma_n, weights=table.weight)
+    # equal numbers of elements on unequal perimeters: lengths of 1 to 3, with multipliers on the coarser side
+    assert np.abs(table.sigma_n / mean - 1.0).max() < 2e-3
+    # Lame: the ring in plane strain under an internal pressure, the disc under that pressure all around
+    radius, modulus, nu = 1.0, 1.0, 0.3
+    of_ring = (1.0 + nu) / modulus * radius * ((1.0 - 2.0 * nu) + 4.0) / 3.0  # (b^2 = 4) / (b^2 - a^2 = 3)
+    of_disc = (1.0 + nu) * (1.0 - 2.0 * nu) / modulus * radius
+    assert -mean == pytest.approx(1e-3 / (of_ring + of_disc), rel=20.0 / n_elements**1.5)
+
+
+def test_nodes_on_symmetry_lines_stick_like_their_neighbours() -> None:
+    solution = bk.run(press_fit(160, bk.Symmetry(x=0.0, y=0.0)))
+    assert set(solution.contact.status_words()) == {"stick"}
+    assert not solution.transitions
+    assert solution.friction_bound.min() > 0.99 * solution.friction_bound.max()
+    ends = [0, -1]
+    assert not solution.contact.sigma_t[ends].any()
+    assert not solution.contact.u_t[ends].any()
