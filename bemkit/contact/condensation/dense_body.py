@@ -272,30 +272,34 @@ class DenseBody(LinearBody):
         # before any matrix, whose rows may hold nothing but what round-off leaves of rigid motions
         if not conditions.hold(self._rigid_basis):
             raise SingularResponse("the contact conditions leave a rigid motion free")
-        wanted = np.flatnonzero(~is_given)
-        node, component = np.divmod(self.unknown_dofs[wanted], 2)
-        number = np.full((self.n_contact, 2), -1)  # of each displacement among the unknowns
-        number.flat[self.unknown_dofs] = np.arange(self.n_unknowns)
-        position = np.cumsum(~is_given) - 1  # of each unknown among the wanted ones
+        # one equation, the condition of the same index, for each displacement that is sought
+        sought = np.flatnonzero(~is_given)
+        node, component = np.divmod(self.unknown_dofs[sought], 2)
+        unknown_of = np.full((self.n_contact, 2), -1)  # index among the unknowns of each displacement
+        unknown_of.flat[self.unknown_dofs] = np.arange(self.n_unknowns)
+        column_of = np.cumsum(~is_given) - 1  # index among those sought of each unknown
+        # displacements and nodal forces where all that is sought vanishes
         given = np.where(is_given, unknowns, 0.0)
         forces = self.stiffness @ given - self.load
         right_side = conditions.value[node, component]
-        matrix = np.zeros((wanted.size, wanted.size))
-        for of in (component, 1 - component):
-            on_displacement = conditions.on_displacement[node, component, of]
-            on_traction = conditions.on_traction[node, component, of]
-            row = np.flatnonzero((number[node, of] >= 0) & ((on_displacement != 0.0) | (on_traction != 0.0)))
-            column, factor = number[node[row], of[row]], (on_traction / self.weights[node])[row]
-            matrix[row] += factor[:, None] * self.stiffness[np.ix_(column, wanted)]
-            inside = np.flatnonzero(~is_given[column])
-            matrix[row[inside], position[column[inside]]] += on_displacement[row[inside]]
-            right_side[row] -= factor * forces[column] + on_displacement[row] * given[column]
+        matrix = np.zeros((sought.size, sought.size))
+        for other in (component, 1 - component):  # a condition may couple both components of its node
+            on_displacement = conditions.on_displacement[node, component, other]
+            on_traction = conditions.on_traction[node, component, other]
+            row = np.flatnonzero((unknown_of[node, other] >= 0) & ((on_displacement != 0.0) | (on_traction != 0.0)))
+            unknown, factor = unknown_of[node[row], other[row]], (on_traction / self.weights[node])[row]
+            # A_t t, the traction by the stiffness, and A_u u, the displacement itself if it is sought
+            matrix[row] += factor[:, None] * self.stiffness[np.ix_(unknown, sought)]
+            is_sought = np.flatnonzero(~is_given[unknown])
+            matrix[row[is_sought], column_of[unknown[is_sought]]] += on_displacement[row[is_sought]]
+            right_side[row] -= factor * forces[unknown] + on_displacement[row] * given[unknown]
+        # rows of size one, so that pivots compare whatever the units of the conditions
         sizes = np.abs(matrix)
         row_size = sizes.max(axis=1)
         if not row_size.all():
             raise SingularResponse("a condition at a contact node involves neither displacement nor stiffness")
         matrix /= row_size[:, None]
-        right_sides = np.stack([right_side / row_size, self._probe[wanted]], axis=1)
+        right_sides = np.stack([right_side / row_size, self._probe[sought]], axis=1)
         try:
             solution, probed = np.linalg.solve(matrix, right_sides).T
         except np.linalg.LinAlgError as error:
