@@ -73,6 +73,12 @@ class Placement:
         x, y = self.forward(np.array(first.shift)).tolist()
         return Placement((x, y), self.turn + first.turn)
 
+    @property
+    def inverse(self) -> Placement:
+        """The motion back to the coordinates of the shape."""
+        x, y = self.turned_back(-np.array(self.shift)).tolist()
+        return Placement((x, y), -self.turn)
+
     def mesh(self, mesh: BoundaryMesh) -> BoundaryMesh:
         """Return the mesh of the placed body, without checking it again.
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
@@ -22,6 +22,7 @@ from bemkit.results.solution import Solution
 from bemkit.runs.run import LoadHistoryError, run
 from bemkit.runs.steps import UnsolvableSceneError
 from bemkit.scene.assembly import Assembly
+from bemkit.scene.load_history import load_steps
 from bemkit.scene.scene import NoContactError, Scene
 from bemkit.scene.steps import check_stated
 from bemkit.solvers.active_sets import NodeStatus
@@ -141,27 +142,27 @@ def _coefficients(
 def _solved(scene: Scene | Assembly) -> tuple[ContactProblem, np.ndarray[tuple[int], np.dtype[np.intp]]]:
     """Return the contact problem of a scene, on the mesh that its accuracy needs, and the statuses of its nodes."""
     check_stated(scene)
-    if len(scene.load_factors) > 1:
-        raise LoadHistoryError(
-            f"a load history of {len(scene.load_factors)} steps has no single state: give one load factor"
-        )
+    if scene.n_steps > 1:
+        raise LoadHistoryError(f"a load history of {scene.n_steps} steps has no single state: give one load")
     if isinstance(scene, Scene) and not scene.contact_parts:
         raise NoContactError("no part is in contact: nothing slides")
-    found: Solution | AssemblySolution | None = run(scene) if scene.mesh.accuracy is not None else None
-    if isinstance(scene, Assembly):
-        meshes = (
-            {name: body.mesh for name, body in found.bodies.items()} if isinstance(found, AssemblySolution) else None
-        )
-        (prepared,) = prepare_assembly_steps([scene], meshes)
+    stated: Any = scene
+    (step,) = load_steps(stated)
+    found: Solution | AssemblySolution | None = run(step) if step.mesh.accuracy is not None else None
+    if isinstance(step, Assembly):
+        meshes = None
+        if isinstance(found, AssemblySolution):  # its meshes are in place, with the discretisations that they need
+            back = {body.name: body.placement.inverse for body in step.placed_bodies}
+            step, meshes = found.assembly, {name: back[name].mesh(body.mesh) for name, body in found.bodies.items()}
+        (prepared,) = prepare_assembly_steps([step], meshes)
         if not prepared.n_contact:
             raise NoContactError("no two bodies are in contact: nothing slides")
-        problem, driver = build_assembled_model(prepared).problem, scene.solver
+        problem = build_assembled_model(prepared).problem
+    elif isinstance(found, Solution):
+        problem = build_model(prepare(found.scene, found.mesh)).problem
     else:
-        mesh = found.mesh if isinstance(found, Solution) else scene.build_mesh()
-        discretisation = found.scene.discretisation if isinstance(found, Solution) else scene.discretisation
-        model = build_model(prepare(replace(scene, discretisation=discretisation), mesh))
-        problem, driver = model.problem, scene.solver
-    result = solve(problem, driver, throw=False)
+        problem = build_model(prepare(step, step.build_mesh())).problem
+    result = solve(problem, scene.solver, throw=False)
     if not result.is_converged:
         raise NoSlidingStateError(f"the scene has no solution to begin with: {result.message}")
     return problem, result.node_status

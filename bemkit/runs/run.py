@@ -168,7 +168,7 @@ def run_probe(scene: Scene, *, n_starts: int = 8, mesh: BoundaryMesh | None = No
     Parameters
     ----------
     scene : Scene
-        With a single load factor.
+        With a single load; with an accuracy, it is probed on the mesh that reaches it.
     n_starts : int
         Starts: all nodes sticking, open, slipping forward, slipping backward, then random choices (always the same).
     mesh : BoundaryMesh, optional
@@ -191,6 +191,9 @@ def run_probe(scene: Scene, *, n_starts: int = 8, mesh: BoundaryMesh | None = No
         raise LoadHistoryError(f"a load history of {scene.n_steps} steps cannot be probed: give one load")
     from bemkit.solvers.multistart import probe
 
+    if mesh is None and scene.mesh.accuracy is not None:
+        found = run(scene)
+        scene, mesh = found.scene, found.mesh
     (prepared,), plan, clock = ONE_BODY.planned(load_steps(scene), mesh)
     with blas_threads_for(prepared.largest_matrix):
         model, clock = ONE_BODY.built(prepared, clock)

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+import bemkit as bk
 from bemkit.contact.further_laws import PiecewiseLaw
 from bemkit.contact.laws import Coulomb, LawOfCoefficients
 from bemkit.model.assembled.contact_tractions import ContactSpread
@@ -46,3 +47,15 @@ def test_forces_of_contacts_are_spread_alike_in_all_steps_of_a_history() -> None
         sums[number] += np.einsum("e,elc->c", lengths, values) / values.shape[1]  # of linear elements: constants
     on_floor = np.array([name.endswith(".floor") for name in following.names])
     np.testing.assert_allclose(sums.sum(axis=0), forces[on_floor].sum(axis=0), atol=1e-12)
+
+
+def test_a_law_that_a_later_step_changes_reaches_contacts_found_by_touching() -> None:
+    steps = (bk.Step(1.0), bk.Step(2.0, {"law.friction_coefficient": 0.6}))
+    first, last = prepare_assembly_steps(load_steps(replace(bk.load_scene("masonry-arch"), steps=steps)))
+    assert first.law == bk.Coulomb(0.7)
+    assert last.law == bk.Coulomb(0.6)
+    own = (bk.Step(1.0), bk.Step(2.0, {"touching.law": {"kind": "coulomb", "friction_coefficient": 0.6}}))
+    _, last = prepare_assembly_steps(load_steps(replace(bk.load_scene("masonry-arch"), steps=own)))
+    between = [rows.law for rows in last.rows if rows.other >= 0]
+    assert between == [bk.Coulomb(0.6)] * len(between)
+    assert between

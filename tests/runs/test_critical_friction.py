@@ -14,6 +14,7 @@ from bemkit.cli.main import main
 from bemkit.runs.critical_friction import NoSlidingStateError
 from bemkit.runs.run import LoadHistoryError, run_probe
 from bemkit.runs.steps import UnsolvableSceneError
+from bemkit.scene.load_history import with_scaled_loads
 from bemkit.scene.scene import NoContactError
 
 LEG = bk.load_scene("wedged-leg")
@@ -132,6 +133,38 @@ def floating(law: bk.FrictionLaw) -> bk.Scene:
 def test_scenes_without_such_a_coefficient_are_named(scene: bk.Scene, error: type[Exception], message: str) -> None:
     with pytest.raises(error, match=message):
         bk.critical_friction(scene)
+
+
+def test_steps_and_load_factors_count() -> None:
+    with pytest.raises(LoadHistoryError, match="a load history of 32 steps has no single state"):
+        bk.critical_friction(bk.load_scene("friction-loop"))
+    rough = bk.critical_friction(replace(LEG, law=bk.Coulomb(1.5)))
+    step = bk.Step(1.0, {"law.friction_coefficient": 1.5})
+    assert bk.critical_friction(replace(LEG, steps=(step,))).n_slipping == rough.n_slipping
+    assert rough.n_slipping != bk.critical_friction(LEG).n_slipping
+    pulled = bk.critical_friction(replace(LEG, load_factors=(-1.0,)))
+    assert pulled == bk.critical_friction(with_scaled_loads(LEG, -1.0))
+    assert pulled != bk.critical_friction(LEG)
+
+
+def test_bodies_that_follow_an_accuracy_are_placed_once() -> None:
+    plate = bk.Body(
+        name="plate",
+        shape=bk.Rectangle(1.0, 0.5),
+        material=bk.Material(1.0, 0.3),
+        parts=(bk.Part("base", bk.Clamped(), ("bottom",)),),
+    )
+    punch = bk.Body(
+        name="punch",
+        shape=bk.Rectangle(0.4, 0.4),
+        material=bk.Material(1.0, 0.3),
+        parts=(bk.Part("push", bk.PrescribedDisplacement(0.0, -1e-3), ("top",)),),
+        placement=bk.Placement((0.3, 0.5)),
+    )
+    contact = bk.ContactPair(("punch.bottom", "plate.top"))
+    options = bk.MeshOptions(accuracy=0.2)
+    assembly = bk.Assembly(title="punch", bodies=(plate, punch), contacts=(contact,), law=bk.Coulomb(0.3), mesh=options)
+    assert bk.critical_friction(assembly).n_contact > 4
 
 
 def test_bodies_that_do_not_touch_are_named() -> None:

@@ -49,6 +49,12 @@ def test_a_leg_with_high_friction_has_two_answers() -> None:
         np.testing.assert_array_equal(again.contact.status, solution.contact.status)
 
 
+def test_a_probe_takes_the_mesh_that_an_accuracy_needs() -> None:
+    scene = dataclasses.replace(leg(0.3), mesh=bk.MeshOptions(accuracy=0.1))
+    (found,) = run_probe(scene)
+    assert found.mesh.n_elements == bk.run(scene).mesh.n_elements
+
+
 def test_refusals() -> None:
     with pytest.raises(ValueError, match="a load history of 2 steps cannot be probed"):
         run_probe(dataclasses.replace(leg(1.0), load_factors=(0.5, 1.0)))

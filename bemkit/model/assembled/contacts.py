@@ -121,11 +121,13 @@ def listed_contacts(assembly: Assembly, bodies: Sequence[PlacedBody]) -> tuple[C
     if assembly.symmetry is not None:
         _check_images(sides, names, assembly.symmetry, assembly.touching.within)
     known = {frozenset(pair.sides) for pair in assembly.contacts}
-    law = assembly.law_of(assembly.touching)
     found = []
     for first, second in find_facing(sides, assembly.touching.within, owners=owners):
         pair = ContactPair(
-            (names[first], names[second]), law, multipliers_on=names[first], reach=assembly.touching.reach
+            (names[first], names[second]),
+            assembly.touching.law,
+            multipliers_on=names[first],
+            reach=assembly.touching.reach,
         )
         if frozenset(pair.sides) not in known:
             found.append(pair)

@@ -27,7 +27,7 @@ from bemkit.operators.linear.solvers import ChosenLinearSolver
 from bemkit.operators.steklov_poincare.forces_inside import ForcesInside
 from bemkit.operators.steklov_poincare.needs import BodyCase
 from bemkit.operators.steklov_poincare.nodal_conditions import GivenData, NodalConditions, supported
-from bemkit.scene.assembly import Assembly
+from bemkit.scene.assembly import Assembly, ContactPair
 from bemkit.scene.body_forces import BodyForce, seen_from
 from bemkit.scene.plane_motion import RigidBody
 
@@ -206,12 +206,21 @@ def prepare_assembly_steps(
     """
     bodies = place(assemblies[0], meshes)
     contacts = listed_contacts(assemblies[0], bodies)
-    steps = [step.with_contacts(contacts) if step.touching else step for step in assemblies]
+    found = contacts[len(assemblies[0].contacts) :] if assemblies[0].touching else ()
+    steps = [_with_found(step, found) for step in assemblies]
     for step in steps[1:]:
         _check_rigid(steps[0], step)
     units = max((find_common_units(step, _under(step, bodies)) for step in steps), key=lambda units: units.stress)
     first = _prepared(steps[0], _under(steps[0], bodies), units)
     return (first, *(first.under(step) for step in steps[1:]))
+
+
+def _with_found(assembly: Assembly, found: Sequence[ContactPair]) -> Assembly:
+    """Return an assembly that lists the contacts found in the first step, under its own law for touching bodies."""
+    if assembly.touching is None:
+        return assembly
+    pairs = (replace(pair, law=assembly.touching.law) for pair in found)
+    return assembly.with_contacts((*assembly.contacts, *pairs))
 
 
 def find_common_units(assembly: Assembly, bodies: Sequence[PlacedBody]) -> Units:
