@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Callable
 from functools import lru_cache
 
 import numpy as np
@@ -516,6 +517,63 @@ def test_copies_have_one_mesh_as_fine_as_the_worst_needs() -> None:
     assert one.energy != pytest.approx(two.energy, rel=1e-6)
     quadratic = bk.run(dataclasses.replace(feet, discretisation=bk.Galerkin(2)))
     assert solution.energy == pytest.approx(quadratic.energy, rel=2e-4)  # the square of both accuracies
+
+
+def filled_hole(accuracy: float) -> bk.Assembly:
+    """A quarter of a plate under pressure whose hole is filled by a disc of its material: uniform stress."""
+    material = bk.Material(youngs_modulus=1.0, poisson_ratio=0.3)
+    sides = ("bottom", "right", "top", "left")
+    hole = bk.Part("hole", bk.Free(), ("hole-1", "hole-2", "hole-3", "hole-4"))
+    rim = bk.Part("rim", bk.Free(), ("arc-1", "arc-2", "arc-3", "arc-4"))
+    plate = bk.Body(
+        name="plate",
+        shape=bk.PlateWithHole(4.0, 4.0, 1.0, corner=(-2.0, -2.0)),
+        material=material,
+        parts=(hole, bk.Part("load", bk.Pressure(1.0), sides)),
+    )
+    return bk.Assembly(
+        title="filled hole",
+        bodies=(plate, bk.Body(name="disc", shape=bk.Disk(1.0), material=material, parts=(rim,))),
+        contacts=(bk.ContactPair(("disc.rim", "plate.hole")),),
+        law=bk.Coulomb(0.3),
+        symmetry=bk.Symmetry(x=0.0, y=0.0),
+        mesh=bk.MeshOptions(accuracy=accuracy, rising_degrees=True),
+    )
+
+
+def press_fit(accuracy: float) -> bk.Assembly:
+    """Two whole rings of different materials, one 1e-3 too large for the other; the outer one is held on its rim."""
+    held = bk.PrescribedDisplacement(bk.Expression("3e-4 * x"), bk.Expression("3e-4 * y"))
+    inner = bk.Body(name="inner", shape=bk.Ring(0.5, 1.0), material=bk.Material(1.0, 0.3))
+    outer = bk.Body(name="outer", shape=bk.Ring(1.0, 2.0), material=bk.Material(0.5, 0.2))
+    out = bk.Part("fit", bk.Free(), ("outer-1", "outer-2", "outer-3", "outer-4"))
+    rim = bk.Part("rim", held, ("outer-1", "outer-2", "outer-3", "outer-4"))
+    inside = bk.Part("fit", bk.Free(), ("inner-1", "inner-2", "inner-3", "inner-4"))
+    return bk.Assembly(
+        title="press fit",
+        bodies=(dataclasses.replace(inner, parts=(out,)), dataclasses.replace(outer, parts=(inside, rim))),
+        contacts=(bk.ContactPair(("inner.fit", "outer.fit"), gap=-1e-3),),
+        law=bk.Coulomb(0.2),
+        mesh=bk.MeshOptions(accuracy=accuracy, rising_degrees=True),
+    )
+
+
+@pytest.mark.parametrize("accuracy", slow_except([1e-2, 1e-3, 1e-4, 1e-5], 1e-3))
+@pytest.mark.parametrize("scene", [filled_hole, press_fit])
+def test_uniform_pressures_between_bodies_are_as_accurate_as_asked(
+    scene: Callable[[float], bk.Assembly], accuracy: float
+) -> None:
+    """The first look has no estimate of traction errors: a missing one is never small."""
+    solution = bk.run(scene(accuracy))
+    assert solution.is_converged, solution.message
+    assert solution.estimated_traction_error is not None
+    assert solution.estimated_traction_error <= accuracy
+    table = solution.contact
+    pressure = -float(table.weight @ table.sigma_n / table.weight.sum())
+    miss = (table.sigma_n + pressure) ** 2 + table.sigma_t**2
+    assert np.sqrt(table.weight @ miss / table.weight.sum()) <= accuracy * pressure
+    if scene is filled_hole:
+        assert pressure == pytest.approx(1.0, rel=accuracy)
 
 
 def test_degrees_of_bodies_do_not_rise_in_histories() -> None:
