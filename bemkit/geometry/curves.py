@@ -18,6 +18,8 @@ from bemkit.geometry.vectors import norms
 if TYPE_CHECKING:
     from bemkit.geometry.arclength import ArcLength
 
+CURVE_MEMBERS = ("is_straight", "is_analytic", "magnitude", "point", "derivative")
+"""What every curve has; see `Curve`."""
 _SAMPLES = np.linspace(0.0, 1.0, 17)
 _N_CHECK_INTERVALS = 8
 _N_CHECK_POINTS = 8
@@ -27,15 +29,28 @@ _DERIVATIVE_TOLERANCE = 1e-2  # catches a wrong sign, factor or component; forgi
 class Curve(Protocol):
     """A smooth piece of boundary, traversed with the body on its left at constant speed.
 
-    A curve of one's own needs only these three members. Its parameter must be proportional to the arc length, because
-    functions on curved elements are polynomials of the arc length; `ParametricCurve(curve.point, curve.derivative)`
-    makes such a curve of any other.
+    A curve of one's own that derives from this class writes `is_straight`, `point` and `derivative`. Its parameter must
+    be proportional to the arc length, because functions on curved elements are polynomials of the arc length;
+    `ParametricCurve(curve.point, curve.derivative)` makes such a curve of any other.
     """
 
     @property
     def is_straight(self) -> bool:
         """Whether the curve is a straight segment, so that its elements are their chords."""
         ...
+
+    @property
+    def is_analytic(self) -> bool:
+        """Whether the curve is smooth to all orders, so that elements can follow it to round-off; true by default."""
+        return True
+
+    @property
+    def magnitude(self) -> float:
+        """Largest length [m] met when the curve is evaluated: its points are known to eps times that.
+
+        By default its largest coordinate.
+        """
+        return largest_coordinate(self)
 
     def point(self, s: FloatArray) -> FloatArray:
         """Evaluate the curve.
@@ -79,6 +94,7 @@ class Segment:
     """
 
     is_straight: ClassVar[bool] = True
+    is_analytic: ClassVar[bool] = True
 
     start: tuple[float, float]
     end: tuple[float, float]
@@ -97,6 +113,11 @@ class Segment:
         start, end = np.array(self.start), np.array(self.end)
         # a coordinate that does not change keeps its last digit, so a side along an axis is straight at any distance
         return np.where(start == end, start, (1.0 - s) * start + s * end)
+
+    @property
+    def magnitude(self) -> float:
+        """Its largest coordinate [m]."""
+        return largest_coordinate(self)
 
     def derivative(self, s: FloatArray) -> FloatArray:
         """Return the constant vector from start to end."""
@@ -118,6 +139,7 @@ class Arc:
     """
 
     is_straight: ClassVar[bool] = False
+    is_analytic: ClassVar[bool] = True
 
     centre: tuple[float, float]
     radius: float
@@ -147,7 +169,7 @@ class Arc:
 
     @property
     def magnitude(self) -> float:
-        """Largest length that its evaluation meets [m]; see `magnitude`."""
+        """Largest length that its evaluation meets [m]."""
         return float(np.abs(self.centre).max()) + self.radius
 
     def _angle(self, s: FloatArray) -> FloatArray:
@@ -209,6 +231,11 @@ class ParametricCurve:
                 "give the derivative of function with respect to s"
             )
 
+    @property
+    def magnitude(self) -> float:
+        """Its largest coordinate [m]."""
+        return largest_coordinate(self)
+
     @cached_property
     def _arc_length(self) -> ArcLength:
         from bemkit.geometry.arclength import ArcLength
@@ -233,15 +260,22 @@ class ParametricCurve:
 
 
 @dataclass(frozen=True, eq=False)
-class MovedCurve:
-    """The curve (x - shift) * factor, from start to end or, if reversed, from end to start.
+class TransformedCurve:
+    """The curve matrix (x - origin) + shift, from start to end or, if reversed, from end to start.
 
-    Components may have factors of their own as long as these differ by a sign alone, which reflects the curve.
+    Parameters
+    ----------
+    curve : Curve
+    origin, shift : (float, float) [m]
+    matrix : ((float, float), (float, float))
+        A rotation or reflection times a factor, so that the parameter stays proportional to the arc length.
+    is_reversed : bool
     """
 
     curve: Curve
+    origin: tuple[float, float] = (0.0, 0.0)
+    matrix: tuple[tuple[float, float], tuple[float, float]] = ((1.0, 0.0), (0.0, 1.0))
     shift: tuple[float, float] = (0.0, 0.0)
-    factor: float | tuple[float, float] = 1.0
     is_reversed: bool = False
 
     @property
@@ -249,41 +283,42 @@ class MovedCurve:
         """Whether the original is straight."""
         return self.curve.is_straight
 
-    def point(self, s: FloatArray) -> FloatArray:
-        """Evaluate the curve."""
-        points: FloatArray = (self.curve.point(self._parameter(s)) - np.array(self.shift)) * np.array(self.factor)
-        return points
-
-    def derivative(self, s: FloatArray) -> FloatArray:
-        """Differentiate the curve with respect to s."""
-        derivative: FloatArray = self.curve.derivative(self._parameter(s)) * np.array(self.factor)
-        return -derivative if self.is_reversed else derivative
+    @property
+    def is_analytic(self) -> bool:
+        """Whether the original is smooth to all orders."""
+        return self.curve.is_analytic
 
     @property
     def magnitude(self) -> float:
-        """Largest length that its evaluation meets [m]; see `magnitude`."""
-        before = magnitude(self.curve) + float(np.abs(self.shift).max())
-        return before * float(np.abs(self.factor).max())
+        """Largest length that its evaluation meets [m]: it keeps the round-off of where the original lies."""
+        factor = float(np.hypot(*self.matrix[0]))
+        before = self.curve.magnitude + float(np.abs(self.origin).max())
+        return factor * before + float(np.abs(self.shift).max())
+
+    def point(self, s: FloatArray) -> FloatArray:
+        """Evaluate the curve."""
+        arms = self.curve.point(self._parameter(s)) - np.array(self.origin)
+        return np.asarray(arms @ np.array(self.matrix).T + np.array(self.shift))
+
+    def derivative(self, s: FloatArray) -> FloatArray:
+        """Differentiate the curve with respect to s."""
+        derivative: FloatArray = self.curve.derivative(self._parameter(s)) @ np.array(self.matrix).T
+        return -derivative if self.is_reversed else derivative
 
     def _parameter(self, s: FloatArray) -> FloatArray:
         return 1.0 - s if self.is_reversed else s
 
 
-def is_analytic(curve: Curve) -> bool:
-    """Tell whether a curve, moved or not, is smooth to all orders; see `ParametricCurve`."""
-    while (original := getattr(curve, "curve", None)) is not None:
-        curve = original
-    return bool(getattr(curve, "is_analytic", True))
+def scaled_curve(
+    curve: Curve, origin: tuple[float, float], factors: tuple[float, float], *, is_reversed: bool = False
+) -> TransformedCurve:
+    """Return the curve (x - origin) * factors; these differ by a sign only, which reflects the curve."""
+    return TransformedCurve(curve, origin, ((factors[0], 0.0), (0.0, factors[1])), is_reversed=is_reversed)
 
 
-def magnitude(curve: Curve) -> float:
-    """Return the largest length [m] met when a curve is evaluated: its points are known to eps times that.
-
-    A curve that has been moved keeps the round-off of where it was. Such curves say so by a property of this name; of
-    others, which need none, points tell.
-    """
-    stated = getattr(curve, "magnitude", None)
-    return float(np.abs(curve.point(_SAMPLES)).max() if stated is None else stated)
+def largest_coordinate(curve: Curve) -> float:
+    """Return the largest coordinate [m] of points along a curve."""
+    return float(np.abs(curve.point(_SAMPLES)).max())
 
 
 def reverse_curve(curve: Curve) -> Curve:
@@ -294,7 +329,7 @@ def reverse_curve(curve: Curve) -> Curve:
         case Arc(centre, radius, start_angle, end_angle):
             return Arc(centre, radius, end_angle, start_angle)
         case _:
-            return MovedCurve(curve, is_reversed=True)
+            return TransformedCurve(curve, is_reversed=True)
 
 
 def as_point(value: tuple[float, float], name: str) -> tuple[float, float]:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray, IntArray, read_only
-from bemkit.geometry.curves import Curve, MovedCurve, as_point, require_positive
+from bemkit.geometry.curves import Curve, as_point, require_positive, scaled_curve
 from bemkit.geometry.elements import Elements, bisected
 from bemkit.geometry.errors import GeometryError, UnknownPartError
 from bemkit.geometry.loops import (
@@ -332,7 +332,7 @@ class BoundaryMesh:
         if symmetry is not None:
             symmetry = symmetry.transformed(shift, factor)
             nodes = symmetry.snapped(nodes)
-        curves = tuple(MovedCurve(curve, shift, factor) for curve in self.curves)
+        curves = tuple(scaled_curve(curve, shift, (factor, factor)) for curve in self.curves)
         content = self._content._replace(nodes=read_only(nodes), curves=curves)
         return (*content, self.is_exterior, symmetry, self.surface)
 

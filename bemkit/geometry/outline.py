@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray
-from bemkit.geometry.curves import Curve
+from bemkit.geometry.curves import CURVE_MEMBERS, Curve
 from bemkit.geometry.errors import GeometryError, format_point
 from bemkit.geometry.loops import check_loops
 from bemkit.geometry.pieces import RESOLUTION, make_pieces, resolution
@@ -46,6 +46,12 @@ class Side:
     def __post_init__(self) -> None:
         if not (isinstance(self.name, str) and self.name):
             raise GeometryError(f"Side: name is {self.name!r}: give a non-empty string")
+        missing = [name for name in CURVE_MEMBERS if not hasattr(type(self.curve), name)]
+        if missing:
+            raise GeometryError(
+                f"Side: the curve of {self.name!r}, a {type(self.curve).__name__}, has no {', '.join(missing)}: "
+                "derive its class from bemkit.geometry.curves.Curve"
+            )
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ import numpy as np
 
 from bemkit.arrays import FloatArray
 from bemkit.errors import InputError
-from bemkit.geometry.curves import Curve, as_point, magnitude
+from bemkit.geometry.curves import TransformedCurve, as_point
 from bemkit.geometry.mesh import BoundaryMesh
 
 
@@ -89,31 +89,6 @@ class Placement:
         """
         if self == Placement():
             return mesh
-        curves = tuple(PlacedCurve(curve, self) for curve in mesh.curves)
+        (a, b), (c, d) = self.rotation.tolist()
+        curves = tuple(TransformedCurve(curve, matrix=((a, b), (c, d)), shift=self.shift) for curve in mesh.curves)
         return mesh.unchecked_copy(self.forward(mesh.nodes), curves)
-
-
-@dataclass(frozen=True, eq=False)
-class PlacedCurve:
-    """A curve that has been turned and shifted."""
-
-    curve: Curve
-    placement: Placement
-
-    @property
-    def is_straight(self) -> bool:
-        """Whether the original is straight."""
-        return self.curve.is_straight
-
-    def point(self, s: FloatArray) -> FloatArray:
-        """Evaluate the curve."""
-        return self.placement.forward(self.curve.point(s))
-
-    def derivative(self, s: FloatArray) -> FloatArray:
-        """Differentiate the curve with respect to s."""
-        return self.placement.turned(self.curve.derivative(s))
-
-    @property
-    def magnitude(self) -> float:
-        """Largest coordinate in its evaluation [m]; see `bemkit.geometry.curves.magnitude`."""
-        return magnitude(self.curve) + float(np.abs(self.placement.shift).max())

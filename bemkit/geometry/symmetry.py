@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray, IntArray
-from bemkit.geometry.curves import Curve, MovedCurve
+from bemkit.geometry.curves import Curve, TransformedCurve, scaled_curve
 from bemkit.geometry.elements import Elements
 from bemkit.geometry.errors import GeometryError
 from bemkit.geometry.pieces import RESOLUTION
@@ -115,7 +115,7 @@ class Symmetry:
         return Symmetry(*moved)
 
 
-def reflected_curve(curve: Curve, symmetry: Symmetry, image: FloatArray) -> MovedCurve:
+def reflected_curve(curve: Curve, symmetry: Symmetry, image: FloatArray) -> TransformedCurve:
     """Return the image of a curve; a single reflection is traversed from the end of the curve to its start.
 
     Parameters
@@ -129,7 +129,8 @@ def reflected_curve(curve: Curve, symmetry: Symmetry, image: FloatArray) -> Move
         2.0 * place if sign < 0.0 and place is not None else 0.0
         for place, sign in zip((symmetry.x, symmetry.y), image, strict=True)
     )
-    return MovedCurve(curve, (x, y), (float(image[0]), float(image[1])), is_reversed=is_reversing(image))
+    factors = float(image[0]), float(image[1])
+    return scaled_curve(curve, (x, y), factors, is_reversed=is_reversing(image))
 
 
 def is_reversing(image: FloatArray) -> bool:

@@ -12,7 +12,7 @@ from bemkit.arrays import BoolArray, FloatArray
 from bemkit.contact.laws import FrictionLaw, RescaledLaw
 from bemkit.contact.obstacle import Obstacle, measure_contact
 from bemkit.formulas import ScalarField, evaluate_field
-from bemkit.geometry.curves import Curve, MovedCurve, ParametricCurve, Segment
+from bemkit.geometry.curves import Curve, ParametricCurve, Segment, scaled_curve
 from bemkit.geometry.outline import Outline, Side
 from bemkit.geometry.shapes import CheckedShape, Shape
 from bemkit.geometry.symmetry import Symmetry
@@ -285,7 +285,7 @@ def _transformed_curve(curve: Curve, affine: AffineMap) -> Curve:
         return Segment(tuple(start), tuple(end))
     factor = affine.factor[0]
     if affine.is_uniform:
-        return MovedCurve(curve, (-affine.shift[0] / factor, -affine.shift[1] / factor), factor)
+        return scaled_curve(curve, (-affine.shift[0] / factor, -affine.shift[1] / factor), (factor, factor))
     return ParametricCurve(
         lambda s: affine.forward(curve.point(s)), lambda s: curve.derivative(s) * np.array(affine.factor)
     )

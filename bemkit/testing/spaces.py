@@ -31,7 +31,12 @@ def check_curve(curve: Curve, *, seed: int = 0) -> None:
     name = type(curve).__name__
     s = np.sort(np.concatenate([[0.0, 1.0], np.random.default_rng(seed).uniform(0.0, 1.0, 40)]))
     demand(isinstance(curve.is_straight, bool), f"{name}.is_straight is {curve.is_straight!r}, not a bool")
+    demand(isinstance(curve.is_analytic, bool), f"{name}.is_analytic is {curve.is_analytic!r}, not a bool")
     points, derivatives = (_evaluated(method, name, s) for method in (curve.point, curve.derivative))
+    demand(
+        isinstance(curve.magnitude, float) and curve.magnitude >= 0.5 * float(np.abs(points).max()),
+        f"{name}.magnitude is {curve.magnitude!r}, not a number of the size of the largest coordinate",
+    )
     speed = norms(derivatives)
     slowest = int(np.argmin(speed))
     demand(speed[slowest] > 0.0, f"{name}.derivative vanishes at s = {s[slowest]:.6g}")

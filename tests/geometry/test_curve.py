@@ -3,8 +3,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bemkit.geometry.curves import Arc, Curve, MovedCurve, ParametricCurve, Segment, reverse_curve
+from bemkit.geometry.curves import Arc, Curve, ParametricCurve, Segment, TransformedCurve, reverse_curve, scaled_curve
 from bemkit.geometry.errors import GeometryError
+from bemkit.testing import check_curve
 
 
 def ellipse(a: float = 2.0, b: float = 1.0) -> ParametricCurve:
@@ -18,7 +19,7 @@ CURVES = {
     "segment": Segment((0.25, -1.0), (3.0, 2.0)),
     "arc": Arc((1.0, 2.0), 3.0, 0.3, -1.2),
     "ellipse": ellipse(),
-    "moved": MovedCurve(ellipse(), (1.0, -2.0), 0.25, is_reversed=True),
+    "moved": scaled_curve(ellipse(), (1.0, -2.0), (0.25, 0.25), is_reversed=True),
 }
 
 
@@ -58,9 +59,34 @@ def test_arc_is_anticlockwise_if_the_angle_grows(radius: float, start: float, sw
 
 
 def test_moved_curve_is_shifted_then_scaled() -> None:
-    moved = MovedCurve(Segment((1.0, 1.0), (2.0, 1.0)), (1.0, 0.5), 10.0)
+    moved = scaled_curve(Segment((1.0, 1.0), (2.0, 1.0)), (1.0, 0.5), (10.0, 10.0))
     assert moved.point(np.array([0.0, 1.0])).tolist() == [[0.0, 5.0], [10.0, 5.0]]
     assert moved.is_straight
+
+
+def test_a_transformed_curve_keeps_what_is_known_of_the_original() -> None:
+    turned = TransformedCurve(ellipse(), (1e3, 0.0), ((0.0, -2.0), (2.0, 0.0)), (0.0, 50.0))
+    assert turned.point(np.array([0.0])).tolist() == [[0.0, 2.0 * (2.0 - 1e3) + 50.0]]
+    assert turned.magnitude == pytest.approx(2.0 * (2.0 + 1e3) + 50.0)
+    smooth = ellipse()
+    rough = ParametricCurve(smooth.function, smooth.derivative_function, is_analytic=False)
+    assert turned.is_analytic
+    assert not scaled_curve(reverse_curve(rough), (0.0, 0.0), (1.0, 1.0)).is_analytic
+
+
+def test_a_curve_of_ones_own_inherits_what_it_does_not_state() -> None:
+    class Own(Curve):
+        is_straight = True
+
+        def point(self, s):
+            return np.column_stack([3.0 * s, 0.0 * s])
+
+        def derivative(self, s):
+            return np.column_stack([3.0 + 0.0 * s, 0.0 * s])
+
+    assert Own().is_analytic
+    assert Own().magnitude == 3.0
+    check_curve(Own())
 
 
 def line(s):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from bemkit.geometry.curves import Arc, Curve, is_analytic, reverse_curve
+from bemkit.geometry.curves import Arc, Curve, reverse_curve
 from bemkit.geometry.drawn import ArcTo, DrawnSide, LineTo, Loop, NurbsTo, OutlineShape, SplineTo
 from bemkit.geometry.errors import GeometryError
 from bemkit.geometry.meshing.discretise import discretise
@@ -54,7 +54,7 @@ def test_bezier_curve_follows_its_polynomial() -> None:
         (1 - t) ** 3 * points[0] + 3 * t * (1 - t) ** 2 * points[1] + 3 * t**2 * (1 - t) * points[2] + t**3 * points[3]
     )
     assert np.abs(curve.point(S) - exact).max() < 1e-15
-    assert is_analytic(curve.curve())
+    assert curve.curve().is_analytic
     check_curve(curve.curve())
 
 
@@ -69,7 +69,7 @@ def test_spline_passes_through_its_points_and_is_not_analytic() -> None:
     angles = np.linspace(0.0, np.pi, 33)
     points = [(float(x), float(y)) for x, y in zip(np.cos(angles), np.sin(angles), strict=True)]
     curve = SplineTo(points[-1], tuple(points[1:-1])).curve(points[0])
-    assert not is_analytic(reverse_curve(curve))
+    assert not reverse_curve(curve).is_analytic
     # the error of a cubic spline: (pi / 32)^4 / 384 of the fourth derivative, and more at its ends
     assert np.abs(np.hypot(*curve.point(S).T) - 1.0).max() < 3e-6
     assert np.abs(curve.point(S[::4]) - [points[0], points[16], points[-1]]).max() < 1e-12

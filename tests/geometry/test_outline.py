@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from bemkit.geometry.curves import Arc, MovedCurve, ParametricCurve, Segment, reverse_curve
+from bemkit.geometry.curves import Arc, Curve, ParametricCurve, Segment, reverse_curve, scaled_curve
 from bemkit.geometry.errors import GeometryError
 from bemkit.geometry.meshing.discretise import discretise
 from bemkit.geometry.outline import Outline, Side
@@ -86,7 +86,7 @@ def _waves(low: float, high: float, distance: float) -> tuple[Side, ...]:
     """Return a strip between two waves: they cross if `distance` is less than half the difference in height."""
     top, bottom = wavy(high, 12), wavy(low, 12)
     y_top, y_bottom = high + distance, low
-    shifted = MovedCurve(top, (0.0, -distance))
+    shifted = scaled_curve(top, (0.0, -distance), (1.0, 1.0))
     back = reverse_curve(bottom)
     return (
         Side("bottom", back),
@@ -232,11 +232,15 @@ REFUSED = {
         r"side 'bad' has an end that is not finite: correct",
     ),
     "no name": (lambda: Side("", Segment((0, 0), (1, 0))), r"Side: name is '': give a non-empty string"),
+    "no curve": (
+        lambda: Side("odd", object()),
+        r"the curve of 'odd', a object, has no is_straight, .*derivative: derive its class from bemkit",
+    ),
 }
 TURN = np.array([[np.cos(0.7), np.sin(0.7)], [-np.sin(0.7), np.cos(0.7)]])
 
 
-class NotFinite:
+class NotFinite(Curve):
     """A curve that is nowhere."""
 
     is_straight = True

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from bemkit.geometry import Arc, Disk, ParametricCurve, PlateWithHole, Polygon, Segment, curves, discretise, spaces
-from bemkit.geometry.curves import MovedCurve
+from bemkit.geometry.curves import TransformedCurve
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.neighbours import corner_nodes
 from bemkit.geometry.spaces import ConstantSpace, ElementwiseSpace, LagrangeSpace, LinearSpace, QuadraticSpace
@@ -25,7 +25,7 @@ CURVES = [
     Segment((0.0, 1.0), (2.0, 1e3)),
     Arc((3.0, 1.0), 2.0, 1.0, -2.0),
     ParametricCurve(lambda s: np.column_stack([s, np.exp(s)]), lambda s: np.column_stack([np.ones_like(s), np.exp(s)])),
-    MovedCurve(Segment((0.0, 0.0), (1.0, 2.0)), (3.0, 3.0), 2.0, is_reversed=True),
+    TransformedCurve(Segment((0.0, 0.0), (1.0, 2.0)), (3.0, 3.0), ((2.0, 0.0), (0.0, 2.0)), is_reversed=True),
 ]
 
 

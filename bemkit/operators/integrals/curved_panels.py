@@ -23,7 +23,7 @@ from numpy.polynomial import chebyshev
 from numpy.typing import NDArray
 
 from bemkit.arrays import BoolArray, ComplexArray, FloatArray, IntArray
-from bemkit.geometry.curves import Curve, is_analytic, magnitude
+from bemkit.geometry.curves import Curve
 from bemkit.geometry.errors import GeometryError
 from bemkit.geometry.mesh import BoundaryMesh
 
@@ -75,10 +75,10 @@ def fit(mesh: BoundaryMesh, tangent: ComplexArray, half: FloatArray, centre: Com
     local = ((places @ np.array([1.0, 1j])) - centre[curved, None]) * (tangent[curved].conj() / half[curved])[:, None]
     series = local @ to_series.T
     # a short element is known to the round-off of its coordinates where they were evaluated: what is below is noise
-    noise = ROUND_OFF * (1.0 + _of_curves(mesh, magnitude)[curved] / half[curved])
+    noise = ROUND_OFF * (1.0 + _of_curves(mesh, lambda curve: curve.magnitude)[curved] / half[curved])
     is_noise = np.logical_and.accumulate((np.abs(series) <= noise[:, None])[:, ::-1], axis=1)[:, ::-1]
     degree = np.clip(series.shape[1] - 1 - is_noise.sum(axis=1), 1, MAX_DEGREE)
-    allowed = np.where(_of_curves(mesh, is_analytic)[curved], UNRESOLVED * noise, FOLLOWED)
+    allowed = np.where(_of_curves(mesh, lambda curve: curve.is_analytic)[curved], UNRESOLVED * noise, FOLLOWED)
     is_unresolved = (np.abs(series[:, MAX_DEGREE + 1 :]) > allowed[:, None]).any(axis=1)
     series[np.arange(series.shape[1]) > degree[:, None]] = 0.0
     # what is left of a series meets the nodes again: between tiny elements a gap of the noise would be a crack

@@ -21,7 +21,7 @@ import numpy as np
 
 from bemkit.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from bemkit.errors import InputError
-from bemkit.geometry.curves import MovedCurve
+from bemkit.geometry.curves import scaled_curve
 from bemkit.geometry.errors import GeometryError
 from bemkit.geometry.local_values import values_on_elements
 from bemkit.geometry.mesh import BoundaryMesh
@@ -127,7 +127,7 @@ class InteriorFields:
         self._locator = Locator(mesh)
         self._curved = self._locator.curved
         centre = (float(mesh.centre[0]), float(mesh.centre[1]))
-        curves = tuple(MovedCurve(curve, centre, 1.0) for curve in mesh.curves)
+        curves = tuple(scaled_curve(curve, centre, (1.0, 1.0)) for curve in mesh.curves)
         self._panels = Panels(mesh.unchecked_copy(mesh.nodes - mesh.centre, curves))
 
     def is_inside(self, points: FloatArray) -> BoolArray:
