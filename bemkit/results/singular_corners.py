@@ -1,7 +1,7 @@
 """Corners at which contact tractions grow without bound, so that no element there has a small error of them.
 
 A block that slides on its whole side is the simplest case: towards its corners the pressure grows like a power of the
-distance that depends on the friction. The exponents are those of `bemkit.operators.wedge`.
+distance that depends on the friction. The exponents are those of `bemkit.results.wedge`.
 """
 
 from __future__ import annotations
@@ -18,9 +18,9 @@ from bemkit.contact.body import SlipHistory
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.neighbours import break_nodes
 from bemkit.geometry.vectors import angles_between, norms
-from bemkit.operators.wedge import FREE, HELD, ROLLER, WedgeSide, leading_exponent
 from bemkit.results.contact_table import ContactTable
 from bemkit.results.solved_body import SolvedBody
+from bemkit.results.wedge import FREE, HELD, ROLLER, WedgeSide, leading_exponent
 from bemkit.results.zone_ends import NEIGHBOURHOOD
 from bemkit.scene.conditions import Clamped, Contact, PrescribedDisplacement, Roller
 from bemkit.solvers.active_sets import NodeStatus
@@ -41,7 +41,7 @@ class SingularCorner:
     ----------
     x, y : float [m]
     exponent : float
-        Tractions behave like ``r**(exponent - 1)``; see `bemkit.operators.wedge.leading_exponent`.
+        Tractions behave like ``r**(exponent - 1)``; see `bemkit.results.wedge.leading_exponent`.
     before, after : tuple of int
         The elements in contact within `NEIGHBOURHOOD`, at least one, from the corner on: back along the boundary and
         on along it. None where that side is not in contact.

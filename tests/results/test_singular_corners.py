@@ -10,9 +10,9 @@ import pytest
 
 import bemkit as bk
 from bemkit.arrays import FloatArray
-from bemkit.operators.wedge import FREE, HELD, ROLLER, WedgeSide, leading_exponent
 from bemkit.reference import answer_of
 from bemkit.reference.compare import Places
+from bemkit.results.wedge import FREE, HELD, ROLLER, WedgeSide, leading_exponent
 from bemkit.solvers.active_sets import NodeStatus
 from tests.scenes import paper
 from tests.slow import slow_except

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bemkit.operators.wedge import FREE, HELD, ROLLER, WedgeSide, leading_exponent
+from bemkit.results.wedge import FREE, HELD, ROLLER, WedgeSide, leading_exponent
 
 RIGHT, STRAIGHT = 0.5 * math.pi, math.pi
 TANGENT_HELD = WedgeSide(holds_tangent=True)
