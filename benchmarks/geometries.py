@@ -23,7 +23,7 @@ from bemkit.contact.condensation.hierarchical_body import hierarchical_body
 from bemkit.contact.conditions import stick
 from bemkit.geometry.outline import Outline
 from bemkit.model.prepared import prepare
-from bemkit.operators.hierarchy import compiled
+from bemkit.operators.collocation import compiled
 from bemkit.operators.linear.threads import blas_threads_for
 from bemkit.operators.steklov_poincare.hierarchical import HierarchicalCollocation
 from tests.scenes import Perforated
@@ -141,7 +141,7 @@ def row_of(scene: bk.Scene, n_elements: int) -> Row:
 
 def table_of(rows: list[Row]) -> Table:
     """Return what was measured."""
-    table = Table(title=f"kernels in {'numpy' if compiled.functions() is None else 'numba'}; CPU seconds")
+    table = Table(title=f"kernels in {'numba' if compiled.is_installed() else 'numpy'}; CPU seconds")
     for column in ("body", "N", "build", "factor", "GB", "rank", "residual", "result", "steps", "worst"):
         table.add_column(column, justify="left" if column in ("body", "result") else "right")
     for row in rows:
@@ -158,7 +158,7 @@ def main() -> None:
     parser.add_argument("names", nargs="*", metavar="NAME", help=", ".join(SCENES))
     parser.add_argument("--elements", type=int, default=4000)
     options = parser.parse_args()
-    compiled.functions()  # compiles now, not within a measurement
+    compiled.loaded()  # compiles now, not within a measurement
     console, rows = Console(width=140), []
     for name in options.names or SCENES:
         rows.append(row_of(SCENES[name], max(options.elements, LEAST.get(name, 0))))

@@ -28,7 +28,7 @@ from rich.table import Table
 
 import bemkit as bk
 from bemkit.contact.condensation.hierarchical_body import HierarchicalBody
-from bemkit.operators.hierarchy import compiled
+from bemkit.operators.collocation import compiled
 from bemkit.operators.hierarchy.compression import Compression
 from bemkit.operators.hierarchy.factor import HierarchicalFactor
 from bemkit.runs.history import run_on_mesh
@@ -135,7 +135,7 @@ def beside_dense(row: Row, solution: bk.Solution) -> Row:
 
 def table_of(rows: list[Row]) -> Table:
     """Return what was measured."""
-    table = Table(title=f"Example 1, kernels in {'numpy' if compiled.functions() is None else 'numba'}; CPU seconds")
+    table = Table(title=f"Example 1, kernels in {'numba' if compiled.is_installed() else 'numpy'}; CPU seconds")
     for column in (
         *(
             "N",
@@ -184,8 +184,8 @@ def main() -> None:
     parser.add_argument("--without-numba", action="store_true")
     options = parser.parse_args()
     if options.without_numba:
-        compiled.functions = lambda: None  # type: ignore[assignment]
-    compiled.functions()  # compiles now, not within a measurement
+        compiled.is_installed = lambda: False
+    compiled.loaded()  # compiles now, not within a measurement
     console, rows, parts = Console(width=160), [], Parts()
     parts.listen()
     solutions = []

@@ -25,7 +25,7 @@ from rich.console import Console
 from rich.table import Table
 
 import bemkit as bk
-from bemkit.operators.hierarchy import compiled
+from bemkit.operators.collocation import compiled
 from bemkit.operators.hierarchy.fast_multipole import FastMultipole
 from bemkit.operators.hierarchy.matrix_free import MatrixFreeSystem
 from bemkit.operators.hierarchy.straight_elements import StraightElements
@@ -45,7 +45,7 @@ def measured(n_elements: int, name: str) -> dict[str, Any]:
         systems[:] = [make(self, *arguments)]
         return systems[0]
 
-    compiled.functions()
+    compiled.loaded()
     scene = bk.load_scene("paper-1")
     small = replace(scene, mesh=replace(scene.mesh, elements=400), linear_solver=SOLVERS[name])
     bk.run(small)  # whatever is loaded and compiled on first use

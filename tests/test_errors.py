@@ -21,7 +21,7 @@ MISTAKES_OF_THE_CALLER = {"TypeError", "AttributeError", "AssertionError"}
 """Built-in errors that tell a programmer of a wrong call; no input of the command line leads to them."""
 
 
-COMPILED = "bemkit.operators.hierarchy.compiled_"
+COMPILED = "bemkit.operators.collocation.compiled_"
 
 
 def all_modules() -> list[str]:

@@ -12,7 +12,7 @@ import pytest
 
 import bemkit as bk
 from bemkit.model.prepared import prepare
-from bemkit.operators.hierarchy import compiled
+from bemkit.operators.collocation import compiled
 from bemkit.operators.linear.solvers import ChosenLinearSolver, DenseCholesky
 from bemkit.plan import check_elements
 from bemkit.plan import plan as plan_module

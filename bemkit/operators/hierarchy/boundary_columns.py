@@ -8,16 +8,18 @@ element; its entries are the displacement that a unit of it causes. Displacement
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TypeAlias
 
 import numpy as np
+from scipy.sparse import csr_array
 
 from bemkit.arrays import ComplexArray, FloatArray, IntArray
 from bemkit.geometry.mesh import BoundaryMesh
+from bemkit.operators.collocation.compiled import layer_for
 from bemkit.operators.collocation.gradient_reconstruction import GradientReconstruction
-from bemkit.operators.hierarchy import compiled
+from bemkit.operators.collocation.layers import Constants, Layer, sums
 from bemkit.operators.hierarchy.curved_elements import CurvedElements
-from bemkit.operators.hierarchy.element_fields import Constants, element_fields
 from bemkit.operators.integrals.panels import Panels
 from bemkit.operators.material import Material
 
@@ -25,7 +27,6 @@ _PAIRS = 16384
 """Pairs of points and elements that are evaluated at a time, so that they stay in the cache."""
 NOWHERE = -1
 """Element of a point that is the middle of none."""
-_NOTHING = np.zeros((0, 0), complex)
 Densities: TypeAlias = tuple[ComplexArray, ComplexArray, ComplexArray]
 
 
@@ -44,8 +45,10 @@ class BoundaryColumns:
         Places of the element before, of the element itself and of the one after it along the boundary.
     slopes, means : (3, n_elements) complex arrays or None
         Weights of the displacements of these three in the slope and in the mean of each element.
+    layer : Layer
+        What evaluates both layers of straight elements.
     curved : CurvedElements or None
-        What evaluates the fields where elements are curved; closed forms do if all are straight.
+        What evaluates them where elements are curved; closed forms do if all are straight.
     """
 
     constants: Constants
@@ -57,6 +60,7 @@ class BoundaryColumns:
     neighbours: IntArray
     slopes: ComplexArray | None
     means: ComplexArray | None
+    layer: Layer
     curved: CurvedElements | None = None
 
     @classmethod
@@ -103,6 +107,7 @@ class BoundaryColumns:
             neighbours,
             slopes,
             means,
+            layer_for(mesh.n_elements),
             None if panels.curved is None else CurvedElements.of(panels, material, order, log_length),
         )
 
@@ -136,16 +141,20 @@ class BoundaryColumns:
         columns : (n_columns,) array
             Those of an element that follow each other are evaluated at once.
         """
-        if self.curved is None and (fast := compiled.functions()) is not None:
-            slopes, means = (_NOTHING if of is None else of for of in (self.slopes, self.means))
-            about = self.constants.numbers, x, places, self.start, self.end, self.neighbours, slopes, means
-            values: FloatArray = fast.columns(*about, columns)
-            return values.T
         result = np.empty((columns.size, x.size), complex)
-        step = max(1, 4 * _PAIRS // max(columns.size, 1))  # about four columns an element
-        for begin in range(0, x.size, step):
-            some = slice(begin, begin + step)
-            result[:, some] = self._some_fields(x[some], places[some], columns).T
+        for is_double in (False, True):
+            chosen = np.flatnonzero((columns // 2) % 2 == is_double)
+            if not chosen.size:
+                continue
+            touched, weights = self._weights(columns[chosen], is_double)
+            step = max(1, _PAIRS // touched.size)
+            for begin in range(0, x.size, step):
+                some = slice(begin, begin + step)
+                factors = self._layer(is_double, x[some], places[some], touched)
+                result[chosen, some] = weights @ factors.reshape(weights.shape[1], -1)
+            if is_double:
+                column, point = np.nonzero(columns[chosen, None] // 4 == places)
+                result[chosen[column], point] += np.where(columns[chosen[column]] % 2 == 0, 0.5, 0.5j)
         return result.view(float).T
 
     def of_forces(self, felt: FloatArray, places: IntArray, forces: ComplexArray) -> FloatArray:
@@ -171,14 +180,11 @@ class BoundaryColumns:
             By place.
         """
         x, densities = self.centre[places], self.densities(traction, displacement)
-        if self.curved is None and (fast := compiled.functions()) is not None:
-            result: ComplexArray = fast.applied(self.constants.numbers, x, places, self.start, self.end, *densities)
-        else:
-            result = np.zeros(x.size, complex)
-            every, step = np.arange(self.start.size), max(1, _PAIRS // max(places.size, 1))
-            for elements in (every[begin : begin + step] for begin in range(0, every.size, step)):
-                fields = self._element_fields(x, places, elements)
-                result += caused(fields, *(each[elements] for each in densities))
+        result = np.zeros(x.size, complex)
+        every, step = np.arange(self.start.size), max(1, _PAIRS // max(places.size, 1))
+        for elements in (every[begin : begin + step] for begin in range(0, every.size, step)):
+            layers = (self._layer(is_double, x, places, elements) for is_double in (False, True))
+            result += sums(*layers, *(each[elements] for each in densities))
         return np.stack([result.real, result.imag], axis=1) + 0.5 * displacement[places]
 
     def densities(self, traction: FloatArray, displacement: FloatArray) -> Densities:
@@ -192,58 +198,49 @@ class BoundaryColumns:
             slope += self.slopes[k] * u[places]
         return t, mean, slope
 
-    def _some_fields(self, x: ComplexArray, places: IntArray, columns: IntArray) -> ComplexArray:
-        """Return complex displacements (n_points, n_columns)."""
-        elements, number = np.unique(columns // 4, return_inverse=True)
-        touched = elements if self.slopes is None else np.unique(self.neighbours[:, elements])
-        fields = self._element_fields(x, places, touched)
-        own, about = np.searchsorted(touched, elements), (elements, touched)
-        kind, is_along_x = (columns // 2) % 2, columns % 2 == 0
-        result = np.empty((x.size, columns.size), complex)
-        for of_kind in (0, 1):
-            if not np.any(kind == of_kind):
-                continue
-            if of_kind == 0:
-                on, on_conjugate = -fields[0][:, own], -fields[1][:, own]
-            else:
-                on = self.of_displacements(*about, fields[2], fields[4], is_conjugate=False)
-                on += 0.5 * (places[:, None] == elements)
-                on_conjugate = self.of_displacements(*about, fields[3], fields[5], is_conjugate=True)
-            for along_x, field in ((True, on + on_conjugate), (False, 1j * (on - on_conjugate))):
-                chosen = (kind == of_kind) & (is_along_x == along_x)
-                result[:, chosen] = field[:, number[chosen]]
-        return result
-
-    def _element_fields(self, x: ComplexArray, places: IntArray, elements: IntArray) -> ComplexArray:
-        """Return what some elements, ascending, cause; see `element_fields.element_fields`."""
+    def _layer(self, is_double: bool, x: ComplexArray, places: IntArray, elements: IntArray) -> ComplexArray:
+        """Return the factors of the densities on some elements, ascending; see `layers.straight_layer`."""
         if self.curved is not None:
-            return self.curved.fields(x, places, elements)
-        return element_fields(self.constants, x, counted(places, elements), self.start[elements], self.end[elements])
+            return self.curved.layer(is_double, x, places, elements)
+        return self.layer(
+            self.constants, is_double, x, counted(places, elements), self.start[elements], self.end[elements]
+        )
 
-    def of_displacements(
-        self, elements: IntArray, touched: IntArray, on: ComplexArray, on_slope: ComplexArray, *, is_conjugate: bool
-    ) -> ComplexArray:
-        """Return the factors (..., n) of the displacements of elements, or of their conjugates, with slopes.
+    @property
+    def acted_on(self) -> IntArray:
+        """(k, n) places on which the displacement of each element acts: itself, and with slopes its neighbours."""
+        return self.neighbours[1:2] if self.slopes is None else self.neighbours
 
-        From those of the constant parts and slopes, (..., m), on all elements on which these act, `touched`, ascending.
-        """
-        total: ComplexArray = on[..., np.searchsorted(touched, elements)]
+    @cached_property
+    def reconstruction(self) -> tuple[ComplexArray, ComplexArray]:
+        """(k, n) constant parts, and slopes, that a unit displacement of each element makes on those it acts on."""
         if self.slopes is None or self.means is None:
-            return total
+            return np.ones((1, self.order.size), complex), np.zeros((1, self.order.size), complex)
         # an element is the one after its predecessor, itself, and the one before its successor
-        for k, acted_on in zip((2, 1, 0), self.neighbours[:, elements], strict=True):
-            at, slopes, means = np.searchsorted(touched, acted_on), self.slopes[k, acted_on], self.means[k, acted_on]
-            if is_conjugate:
-                slopes, means = slopes.conj(), means.conj()
-            total += on_slope[..., at] * slopes + on[..., at] * means
-        return total
+        roles = np.array([[2], [1], [0]])
+        means, slopes = self.means[roles, self.neighbours], self.slopes[roles, self.neighbours]
+        means[1] += 1.0
+        return means, slopes
 
+    def _weights(self, columns: IntArray, is_double: bool) -> tuple[IntArray, csr_array]:
+        """Return the elements that some columns of one kind act on, and the weights of their factors in each column.
 
-def caused(fields: ComplexArray, t: ComplexArray, u: ComplexArray, s: ComplexArray) -> ComplexArray:
-    """Return T (u + s t) - U t, complex (n_points,), from the fields (6, n_points, n_elements) of `element_fields`."""
-    return np.asarray(
-        sum(field @ of for field, of in zip(fields, (-t, -t.conj(), u, u.conj(), s, s.conj()), strict=True))
-    )
+        The weights are (n_columns, n_touched n_factors), the factors of an element side by side. A unit along y is the
+        number i: i times the factor of a density, and -i times that of its conjugate.
+        """
+        elements, turn = columns // 4, np.where(columns % 2 == 0, 1.0, 1j)
+        if is_double:
+            acted_on = self.acted_on[:, elements]
+            values = np.stack([of[:, elements] * turn for of in self.reconstruction])
+        else:
+            acted_on, values = elements[None], -turn[None, None]
+        _, k, n = values.shape
+        values = np.concatenate([values, values.conj()])
+        touched, at = np.unique(acted_on, return_inverse=True)
+        indices = len(values) * at.reshape(k, n) + np.arange(len(values))[:, None, None]
+        by_column = values.transpose(2, 0, 1).ravel(), indices.transpose(2, 0, 1).ravel()
+        starts = np.arange(0, values.size + 1, len(values) * k)
+        return touched, csr_array((*by_column, starts), shape=(n, len(values) * touched.size))
 
 
 def counted(places: IntArray, elements: IntArray) -> IntArray:

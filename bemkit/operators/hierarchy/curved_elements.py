@@ -20,8 +20,7 @@ import numpy as np
 from bemkit.arrays import ComplexArray, FloatArray, IntArray
 from bemkit.geometry.quadrature import gauss_legendre
 from bemkit.operators.collocation.collocation_points import CURVED_DISTANCE, CURVED_POINTS, CollocationPoints
-from bemkit.operators.hierarchy import compiled
-from bemkit.operators.hierarchy.element_fields import Constants
+from bemkit.operators.collocation.layers import Constants
 from bemkit.operators.integrals import curved_panels
 from bemkit.operators.integrals.panels import Panels
 from bemkit.operators.material import Material
@@ -71,11 +70,12 @@ class CurvedElements:
         rules = (_rule(panels, order, n_points) for n_points in (CURVED_POINTS, _FEW_POINTS))
         return cls(constants, points, order, near, far, *rules)
 
-    def fields(self, x: ComplexArray, places: IntArray, elements: IntArray) -> ComplexArray:
-        """Return the factors (6, n_points, n) of p, conj(p) in U p, and of v, conj(v), s, conj(s) in T (v + s p(t)).
+    def layer(self, is_double: bool, x: ComplexArray, places: IntArray, elements: IntArray) -> ComplexArray:
+        """Return the factors (n, 2 or 4, n_points) of the densities on some elements; see `layers.straight_layer`.
 
         Parameters
         ----------
+        is_double : bool
         x : (n_points,) complex array
         places : (n_points,) array
             The element in whose middle the point is, or another number; there T is a principal value.
@@ -83,23 +83,17 @@ class CurvedElements:
             By place.
         """
         panels, numbers = self.points.panels, self.order[elements]
-        rules = [_Rule(*(of[elements] for of in rule)) for rule in (self.rule, self.small_rule)]
-        centre, near = panels.centre[numbers], self.near[elements]
-        if compiled.functions() is not None:
-            from bemkit.operators.hierarchy import compiled_curved
-
-            of, arc = self.constants, rules[0]
-            about = of.single, of.double, of.poisson_ratio, of.log_length
-            result: ComplexArray = compiled_curved.gauss_fields(
-                *about, x, centre, near, self.far[elements], *arc, *rules[1]
-            )
-        else:
+        distance = np.abs(x - panels.centre[numbers][:, None])
+        is_far = distance.min(axis=1, initial=np.inf) > self.far[elements]
+        result = np.empty((elements.size, 4 if is_double else 2, x.size), complex)
+        for some, rule in ((np.flatnonzero(~is_far), self.rule), (np.flatnonzero(is_far), self.small_rule)):
             with np.errstate(all="ignore"):  # close pairs may overflow here; they are replaced
-                result = _gauss_fields(self.constants, x, rules[0])
-        row, column = np.nonzero(np.abs(x[:, None] - centre) < near)
-        if row.size:
-            exact = self.points.at(x[row], numbers[column], places[row] == elements[column])
-            result[:, row, column] = exact.stacked
+                arcs = _Rule(*(of[elements[some]] for of in rule))
+                result[some] = _gauss_layer(self.constants, is_double, x, arcs)
+        element, point = np.nonzero(distance < self.near[elements][:, None])
+        if element.size:
+            exact = self.points.at(x[point], numbers[element], places[point] == elements[element]).stacked
+            result[element, :, point] = (exact[[2, 4, 3, 5]] if is_double else exact[:2]).T
         return result
 
 
@@ -116,20 +110,24 @@ def _rule(panels: Panels, order: IntArray, n_points: int) -> _Rule:
     return _Rule(y, dy, p)
 
 
-def _gauss_fields(constants: Constants, x: ComplexArray, rule: _Rule) -> ComplexArray:
-    """Return the factors by a Gauss rule; what `compiled_curved.gauss_fields` does for distant pairs."""
+def _gauss_layer(constants: Constants, is_double: bool, x: ComplexArray, rule: _Rule) -> ComplexArray:
+    """Return the factors of the densities by a Gauss rule."""
     nu = constants.poisson_ratio
-    result = np.zeros((6, x.size, len(rule.y)), complex)
-    for y, dy, p in zip(rule.y.T, rule.dy.T, rule.p.T, strict=True):
-        rho = x[:, None] - y
+    result = np.zeros((len(rule.y), 4 if is_double else 2, x.size), complex)
+    for y, dy, p in zip(rule.y.T[:, :, None], rule.dy.T[:, :, None], rule.p.T[:, :, None], strict=True):
+        rho = x - y
         squared = np.square(rho.real) + np.square(rho.imag)
-        rate, turn, ds = dy * rho.conj() / squared, rho * rho / squared, constants.single * np.abs(dy)
-        result[0] += ds * (0.5 - (1.5 - 2.0 * nu) * np.log(squared / constants.log_length**2))
-        result[1] += (0.5 * ds) * turn
+        turn = rho * rho / squared
+        if not is_double:
+            ds = constants.single * np.abs(dy)
+            result[:, 0] += ds * (0.5 - (1.5 - 2.0 * nu) * np.log(squared / constants.log_length**2))
+            result[:, 1] += (0.5 * ds) * turn
+            continue
+        rate = dy * rho.conj() / squared
         of_density = constants.double * ((2.0 - 2.0 * nu) * rate.imag - 1j * (1.0 - 2.0 * nu) * rate.real)
         of_conjugate = constants.double * turn * rate.imag
-        result[2] += of_density
-        result[3] += of_conjugate
-        result[4] += p * of_density
-        result[5] += p.conj() * of_conjugate
+        result[:, 0] += of_density
+        result[:, 1] += p * of_density
+        result[:, 2] += of_conjugate
+        result[:, 3] += p.conj() * of_conjugate
     return result

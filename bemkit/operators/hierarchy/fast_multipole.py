@@ -16,10 +16,10 @@ from scipy.sparse.linalg import LinearOperator
 
 from bemkit.arrays import ComplexArray, FloatArray, IntArray
 from bemkit.geometry.quadrature import gauss_legendre
-from bemkit.operators.hierarchy import compiled
-from bemkit.operators.hierarchy.boundary_columns import Densities, caused, counted
+from bemkit.operators.collocation.compiled import layer_for
+from bemkit.operators.collocation.layers import displaced
+from bemkit.operators.hierarchy.boundary_columns import Densities, counted
 from bemkit.operators.hierarchy.clusters import Clusters, Discs
-from bemkit.operators.hierarchy.element_fields import element_fields
 from bemkit.operators.hierarchy.expansions import Expansions, Sources
 from bemkit.operators.hierarchy.source_series import SEPARATION, SourceSeries, order_for
 from bemkit.operators.hierarchy.straight_elements import StraightElements
@@ -117,22 +117,16 @@ class FastMultipole(_LinearOperator):
     def _add_nearby(self, densities: Densities, result: ComplexArray) -> None:
         """Add what the elements of the leaves that are not far from each one cause there."""
         elements, tree, near, first = self.elements, self.tree, self._near.source, self._near.first
-        is_compiled, constants = compiled.functions() is not None, elements.constants
+        layer = layer_for(elements.mesh.n_elements)
 
         def add_to_leaves(some: slice) -> None:
-            if is_compiled:
-                from bemkit.operators.hierarchy.compiled_products import add_nearby
-
-                geometry = elements.nodes, elements.mesh.elements, tree.order, tree.bounds
-                add_nearby(constants.numbers, *geometry, *densities, first, near, some.start, some.stop, result)
-                return
             for leaf in range(some.start, some.stop):
                 own = tree.order[tree.places(0, leaf)]
-                for number in near[first[leaf] : first[leaf + 1]].tolist():
-                    sources = tree.order[tree.places(0, number)]
-                    at, ends = counted(own, sources), elements.ends(sources)
-                    fields = element_fields(constants, elements.centres(own), at, *ends)
-                    result[own] += caused(fields, *(each[sources] for each in densities))
+                leaves = near[first[leaf] : first[leaf + 1]].tolist()
+                sources = np.sort(np.concatenate([tree.order[tree.places(0, number)] for number in leaves]))
+                at = elements.centres(own), counted(own, sources)
+                some_densities = densities[0][sources], densities[1][sources], densities[2][sources]
+                result[own] += displaced(layer, elements.constants, at, elements.ends(sources), some_densities)
 
         chunks = [slice(i, min(i + _FEW, tree.n_leaves)) for i in range(0, tree.n_leaves, _FEW)]
         for_each_chunk(add_to_leaves, chunks, n_integrals=near.size * LEAF_SIZE**2)

@@ -11,7 +11,6 @@ from __future__ import annotations
 import numpy as np
 
 from bemkit.arrays import ComplexArray, FloatArray, IntArray
-from bemkit.operators.hierarchy import compiled
 from bemkit.operators.hierarchy.boundary_columns import BoundaryColumns
 from bemkit.operators.hierarchy.clusters import Discs
 from bemkit.operators.hierarchy.tree import ClusterTree
@@ -69,9 +68,6 @@ def point_forces(x: ComplexArray, sources: ComplexArray, poisson_ratio: float, l
         By 2 * source + component of the force and 2 * point + component of the displacement.
     """
     kappa = 3.0 - 4.0 * poisson_ratio
-    if (fast := compiled.functions()) is not None:
-        values: FloatArray = fast.point_forces(kappa, log_length, x, sources)
-        return values
     arm = x - sources[:, None]
     squared = np.square(arm.real) + np.square(arm.imag)
     log = (-0.5 * kappa) * np.log(squared / log_length**2)

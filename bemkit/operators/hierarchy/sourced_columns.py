@@ -65,7 +65,7 @@ class SourcedColumns(BoundaryColumns):
         neighbours = np.tile(np.arange(order.size), (3, 1))
         neighbours[:, is_element] = place_of[inner.neighbours]
         return cls(
-            inner.constants, order, start, end, centre, lengths, neighbours, inner.slopes, inner.means,
+            inner.constants, order, start, end, centre, lengths, neighbours, inner.slopes, inner.means, inner.layer,
             inner=inner, inner_place=inner_place, sources=sources, material=material,
             arcs=Arcs.of(mesh).take(inner.order),
         )  # fmt: skip
@@ -120,11 +120,14 @@ class SourcedColumns(BoundaryColumns):
         """Return the work (n_columns,) of the tractions and displacements of elements on the field of a source."""
         inner = self.inner
         elements, number = np.unique(columns // 4, return_inverse=True)
-        touched = np.unique(inner.reach[:, elements])
+        acted_on = inner.acted_on[:, elements]
+        touched, at = np.unique(acted_on, return_inverse=True)
+        at = at.reshape(acted_on.shape)
         arcs = self.arcs.take(touched)
         traction, displacement, gradient = self.sources[place].work(arcs, self.material)
         on_slope = gradient / (0.5 * inner.lengths * _tangents(inner))[touched]
-        on_displacement = inner.of_displacements(elements, touched, displacement, on_slope, is_conjugate=False)
+        means, slopes = (of[:, elements] for of in inner.reconstruction)
+        on_displacement = np.sum(means * displacement[at] + slopes * on_slope[at], axis=0)
         own = np.searchsorted(touched, elements)
         # Re(factor v) of v = 1 and v = i
         factor = np.where((columns // 2) % 2 == 0, traction[own][number], -on_displacement[number])

@@ -12,7 +12,7 @@ from bemkit.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.neighbours import corner_nodes
 from bemkit.operators.collocation.gradient_reconstruction import CORNER_ANGLE, GradientReconstruction
-from bemkit.operators.hierarchy.element_fields import Constants
+from bemkit.operators.collocation.layers import Constants
 from bemkit.operators.material import Material
 
 _CHUNK = 2048

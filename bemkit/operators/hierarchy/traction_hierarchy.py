@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray, IntArray
-from bemkit.operators.hierarchy.element_fields import Constants
+from bemkit.operators.collocation.layers import Constants
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_matrix

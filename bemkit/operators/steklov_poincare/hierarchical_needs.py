@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from bemkit.operators.hierarchy import compiled
+from bemkit.operators.collocation import compiled
 from bemkit.operators.linear.solvers import (
     Automatic,
     ChosenLinearSolver,
@@ -175,7 +175,7 @@ def hierarchical_needs(case: BodyCase, *, takes_slopes: bool) -> BodyNeeds:
 
 def _tree_items(case: BodyCase, options: Hierarchical) -> tuple[PlanItem, PlanItem, PlanItem]:
     """Say how the tree is solved, which kernels are used, and what the others would cost."""
-    is_compiled, why = compiled.expected()
+    is_compiled, why = compiled.expected(case.mesh.n_elements)
     here, there = (_needs(case, options, is_compiled=each).seconds for each in (is_compiled, not is_compiled))
     others = f"{'numpy' if is_compiled else 'compiled ones'} would take about {there:.3g} s instead of {here:.3g} s"
     return (
@@ -190,7 +190,7 @@ def _needs(case: BodyCase, options: Hierarchical, *, is_compiled: bool | None = 
     n, digits = case.mesh.n_elements, -math.log10(options.tolerance) / _DIGITS
     n_both = int(np.count_nonzero(case.conditions.is_retained.any(axis=1)))
     if is_compiled is None:
-        is_compiled = compiled.is_installed()  # whether it works takes a while to find out
+        is_compiled, _ = compiled.expected(n)
     of_integrals = 0.0 if is_compiled else min(costs.in_numpy * n, _MOST_IN_NUMPY)
     memory = int(digits * (costs.of_top + of_integrals + costs.n_bytes * n + costs.of_contact * n_both))
     evaluations = digits * n * (costs.compiled if is_compiled else costs.evaluations)

@@ -6,7 +6,7 @@ estimated here).
 
 from __future__ import annotations
 
-from bemkit.operators.hierarchy import compiled
+from bemkit.operators.collocation import compiled
 from bemkit.operators.linear.solvers import MatrixFree
 from bemkit.operators.steklov_poincare.needs import BodyCase, BodyNeeds, PlanItem
 
@@ -44,7 +44,7 @@ def matrix_free_needs(case: BodyCase, options: MatrixFree, *, takes_slopes: bool
     """Return what equations take that are not stored; how many steps an iteration takes is not foreseen."""
     n = case.mesh.n_elements
     memory = int(_BYTES * n + _BYTES_OF_GROUPS)
-    is_compiled = compiled.is_installed()
+    is_compiled, _ = compiled.expected(n)
     of_product = n * (_EVALUATIONS_COMPILED if is_compiled else _EVALUATIONS)
     slopes = "rotations then cause no tractions" if takes_slopes else "the method of the source paper"
     items = (
@@ -54,7 +54,7 @@ def matrix_free_needs(case: BodyCase, options: MatrixFree, *, takes_slopes: bool
         PlanItem(
             "linear solver of the body", True, f"GMRES to {options.tolerance:g}, about {_STEPS:.0f} steps from cold"
         ),
-        PlanItem("compiled kernels (numba)", *compiled.expected()),
+        PlanItem("compiled kernels (numba)", *compiled.expected(n)),
         PlanItem("algebraic multigrid (pyamg)", True, "its hierarchy inverts the single layer between elements"),
     )
     evaluations = of_product * _STEPS * _RESPONSES * len(case.loads)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from bemkit.geometry import BoundaryMesh, Polygon, Rectangle, discretise
-from bemkit.operators.hierarchy import compiled
+from bemkit.operators.collocation import compiled
 from bemkit.operators.hierarchy.boundary_columns import BoundaryColumns
 from bemkit.operators.hierarchy.compression import Compression
 from bemkit.operators.hierarchy.proxies import PROXY_RATIO, discs_of, extents, n_proxies, near_clusters, proxy_points
@@ -47,8 +47,7 @@ def test_blocks_between_leaves_follow_from_their_skeletons(
 def test_columns_of_one_kind_are_compressed_alone(monkeypatch: pytest.MonkeyPatch, is_compiled: bool) -> None:
     if is_compiled:
         pytest.importorskip("numba")
-    else:
-        monkeypatch.setattr(compiled, "functions", lambda: None)
+        monkeypatch.setattr(compiled, "MANY_ELEMENTS", 0)
     mesh = discretise(L_SHAPE.outline(), n_elements=240).unit
     tree = ClusterTree.of(mesh.centres, 24)
     columns = BoundaryColumns.of(mesh, Material(1.0, 0.3), tree.order, takes_slopes=True)

@@ -11,10 +11,10 @@ import bemkit as bk
 from bemkit.arrays import FloatArray
 from bemkit.geometry import BoundaryMesh
 from bemkit.model.prepared import prepare
+from bemkit.operators.collocation.layers import Constants
 from bemkit.operators.hierarchy.boundary_columns import BoundaryColumns
 from bemkit.operators.hierarchy.coarse_equations import ElementGroups
 from bemkit.operators.hierarchy.collocation_system import boundary_border
-from bemkit.operators.hierarchy.element_fields import Constants
 from bemkit.operators.hierarchy.matrix_free import MatrixFreeSystem, NotConvergedError, WholeBoundary
 from bemkit.operators.hierarchy.preconditioner import Preconditioner
 from bemkit.operators.hierarchy.straight_elements import StraightElements, pairs

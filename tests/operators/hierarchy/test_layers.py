@@ -1,4 +1,4 @@
-"""Closed forms of element fields: the matrices of collocation, quadrature, and the same numbers from both back ends."""
+"""Closed forms of both layers: the matrices of collocation, quadrature, and the same numbers from both back ends."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ import pytest
 
 from bemkit.arrays import ComplexArray, IntArray
 from bemkit.geometry import BoundaryMesh, PlateWithHole, Rectangle, Symmetry, discretise
-from bemkit.operators.hierarchy import compiled
+from bemkit.operators.collocation import compiled
+from bemkit.operators.collocation.layers import Constants, straight_layer
 from bemkit.operators.hierarchy.boundary_columns import NOWHERE, BoundaryColumns
 from bemkit.operators.hierarchy.curved_elements import CurvedElements
-from bemkit.operators.hierarchy.element_fields import Constants, element_fields
 from bemkit.operators.hierarchy.folded_columns import boundary_columns
 from bemkit.operators.hierarchy.proxies import point_forces
 from bemkit.operators.integrals.panels import Panels
@@ -28,37 +28,30 @@ MATERIAL = Material(2.0, 0.3)
 def backend(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> str:
     if request.param == "numba":
         pytest.importorskip("numba")
-        assert compiled.functions() is not None
-    else:
-        monkeypatch.setattr(compiled, "functions", lambda: None)
+        monkeypatch.setattr(compiled, "MANY_ELEMENTS", 0)
+        assert compiled.layer_for(1) is not straight_layer
     return str(request.param)
 
 
 def fields_of(
     backend: str, constants: Constants, x: ComplexArray, places: IntArray, start: ComplexArray, end: ComplexArray
 ) -> ComplexArray:
-    """Return what `element_fields` returns, from the compiled tables if these are asked for."""
-    if backend == "numpy":
-        return element_fields(constants, x, places, start, end)
-    from bemkit.operators.hierarchy import compiled_tables as tables
+    """Return the factors (6, n_points, n_elements) of p, conj(p), v, conj(v), s, conj(s)."""
+    layer = straight_layer if backend == "numpy" else compiled.loaded()[0]
+    single, double = (layer(constants, is_double, x, places, start, end) for is_double in (False, True))
+    return stacked(single, double)
 
-    result = np.empty((6, x.size, start.size), complex)
-    single, double = np.empty((tables.N_SINGLE, x.size)), np.empty((tables.N_DOUBLE, x.size))
-    for j, ends in enumerate(zip(start, end, strict=True)):
-        about = constants.numbers, x.real.copy(), x.imag.copy(), places, j, *ends
-        tables.tabulate_single(*about, single)
-        tables.tabulate_double(*about, double)
-        result[0, :, j], result[1, :, j] = single[tables.U], single[tables.UC] + 1j * single[tables.UC + 1]
-        result[2:, :, j] = double[::2] + 1j * double[1::2]
-    return result
+
+def stacked(single: ComplexArray, double: ComplexArray) -> ComplexArray:
+    return np.concatenate([single, double[:, [0, 2, 1, 3]]], axis=1).transpose(1, 2, 0)
 
 
 @pytest.fixture
 def unloaded() -> Iterator[None]:
     """Let numba be looked for again, and once more when everything is as it was."""
-    compiled._loaded.cache_clear()
+    compiled.loaded.cache_clear()
     yield
-    compiled._loaded.cache_clear()
+    compiled.loaded.cache_clear()
 
 
 def straight(shape: Rectangle | PlateWithHole, n_elements: int) -> BoundaryMesh:
@@ -146,7 +139,8 @@ def test_quadrature_gives_the_closed_forms_where_elements_are_straight(backend: 
     x = np.append(centre[0] + np.array([1e-3, 0.03j, 0.06, 0.07j, 0.3 + 0.2j, 2.0]), centre[2])
     places = np.append(np.full(6, NOWHERE), 47)
     expected = fields_of(backend, constants, x, np.where(places == 47, 2, NOWHERE), start, end)
-    np.testing.assert_allclose(elements.fields(x, places, chosen), expected, atol=1e-14)
+    layers = (elements.layer(is_double, x, places, chosen) for is_double in (False, True))
+    np.testing.assert_allclose(stacked(*layers), expected, atol=1e-14)
 
 
 def test_points_on_the_line_of_an_element_and_close_to_it_keep_their_digits(backend: str) -> None:
@@ -176,8 +170,10 @@ def test_points_of_no_element_see_no_jump() -> None:
 @pytest.mark.usefixtures("unloaded")
 def test_without_numba_the_plan_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(compiled, "is_installed", lambda: False)
-    assert compiled.functions() is None
-    assert "pip install 'bemkit[fast]'" in compiled.why()
+    assert compiled.loaded()[0] is straight_layer
+    assert "pip install 'bemkit[fast]'" in compiled.loaded()[1]
+    assert compiled.expected(2000) == (False, compiled.loaded()[1])
+    assert "takes longer" in compiled.expected(999)[1]
 
 
 @pytest.mark.usefixtures("unloaded")
@@ -190,16 +186,17 @@ def test_a_broken_numba_is_replaced_by_numpy_and_named_in_one_line(
             raise fault
         return np.array([fault])
 
-    module = types.ModuleType("compiled_fields")
-    module.applied = broken  # type: ignore[attr-defined]
-    module.__file__ = "compiled_fields.py"
-    name = "bemkit.operators.hierarchy.compiled_fields"
+    module = types.ModuleType("compiled_layer")
+    module.compiled_layer = broken  # type: ignore[attr-defined]
+    name = "bemkit.operators.collocation.compiled_layer"
     monkeypatch.setitem(sys.modules, name, module)
-    monkeypatch.setattr(sys.modules["bemkit.operators.hierarchy"], "compiled_fields", module, raising=False)
+    monkeypatch.setattr(sys.modules["bemkit.operators.collocation"], "compiled_layer", module, raising=False)
     monkeypatch.setattr(compiled, "is_installed", lambda: True)
-    assert compiled.functions() is None
-    assert words in compiled.why()
-    assert "\n" not in compiled.why()
+    monkeypatch.setattr(compiled, "MANY_ELEMENTS", 0)
+    layer, why = compiled.loaded()
+    assert layer is straight_layer
+    assert words in why
+    assert "\n" not in why
     columns = BoundaryColumns.of(straight(Rectangle(1.0, 1.0), 8), MATERIAL, np.arange(8), takes_slopes=True)
     assert np.isfinite(columns.fields(columns.centre, np.arange(8), np.arange(32))).all()
 
