@@ -25,8 +25,6 @@ from bemkit.version import __version__
 if TYPE_CHECKING:
     import h5py
 
-_OVERHEAD = 65536
-"""More than what a file holds besides its arrays."""
 _MAX_TEXT = 10_000
 _MAX_ENTRIES_PER_GROUP = 1000
 _HDF5 = b"\x89HDF"

@@ -91,8 +91,6 @@ def read_history(reader: Reader, last: Solution | AssemblySolution) -> LoadHisto
     """
     if not reader.has("steps"):
         return None
-    if not reader.has("steps/bodies"):
-        raise InputError("its steps are of an older bemkit, which did not keep their fields: run its scene again")
     scene = scene_from_toml(reader.text("asked", MAX_BYTES), name="scene inside")
     rows = rows_of(reader.table("steps", floats=(*_FLOATS, "time_step"), integers=_COUNTS))
     columns = {name: reader.floats(f"steps/contact/{name}") for name in _CONTACT}
@@ -216,7 +214,7 @@ def _read_transitions(reader: Reader, n_steps: int) -> list[tuple[Transition, ..
 
 def _read_body(reader: Reader, place: str, body: SolvedBody, n_steps: int) -> list[tuple[BoundaryFields, float]]:
     energies = reader.floats(f"{place}/energy")
-    columns = {name: reader.floats(f"{place}/{name}") for name in _FIELDS if reader.has(f"{place}/{name}")}
+    columns = {name: reader.floats(f"{place}/{name}") for name in _FIELDS}
     if any(len(column) != n_steps for column in (energies, *columns.values())):
         raise InputError(f"the fields of {n_steps} steps differ in number")
     shaped = {name: column.reshape(n_steps, *getattr(body.boundary, name).shape) for name, column in columns.items()}

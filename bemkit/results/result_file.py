@@ -1,7 +1,7 @@
 """Result files: HDF5 with a versioned layout, written atomically, safe to read.
 
 A result file holds plain arrays, texts and numbers only, so any HDF5 program can read it, and reading one from a
-stranger runs no code. The layout, version 2:
+stranger runs no code. The layout, version 3 (files of other versions are refused):
 
     /                attributes format = "bemkit-result" and schema_version
     /scene           text, the scene as TOML
@@ -73,12 +73,12 @@ if TYPE_CHECKING:
 _MAX_PLAN = 1_000_000
 _COUNTS = ("linear_solves", "outer_steps")
 _NUMBERS = ("x", "y", "s", "u_n", "u_t", "sigma_n", "sigma_t", "gap", "clearance", "weight")
-_BOUNDARY = ("points", "displacement", "centres", "traction", "traction_dofs")
+_BOUNDARY = ("points", "displacement", "centres", "traction", "traction_dofs", "reaction")
 
 
 __all__ = ["OutputFileError", "ResultFileError", "check_result_target", "read_result", "write_result"]
 
-FORMAT = FileFormat("bemkit-result", 2, "bemkit result", "bemkit run -o")
+FORMAT = FileFormat("bemkit-result", 3, "bemkit result", "bemkit run -o")
 _FORCES = ("force_normal", "force_tangential", "energy")
 _CONTACT_NUMBERS = tuple(entry.name for entry in fields(ContactForce) if entry.name != "name")
 _RIGID_NUMBERS = tuple(entry.name for entry in fields(RigidResult) if entry.name != "name")
@@ -268,7 +268,7 @@ def _write_forces(file: h5py.File, name: str, forces: Sequence[PartForce]) -> No
 def _write_fields(group: h5py.Group, mesh: BoundaryMesh, boundary: BoundaryFields) -> None:
     """Write the mesh of a body, and displacement and traction on it, into a group."""
     _write_mesh(group.create_group("mesh"), mesh)
-    for name in (*_BOUNDARY, "reaction"):
+    for name in _BOUNDARY:
         group.create_dataset(f"boundary/{name}", data=getattr(boundary, name))
 
 
@@ -277,8 +277,7 @@ def _read_fields(
 ) -> tuple[BoundaryMesh, BoundaryFields]:
     """Read the mesh of a body and its fields; `curves` gives the curves that the file names by their numbers."""
     mesh = _read_mesh(reader, f"{prefix}mesh", curves)
-    names = [*_BOUNDARY, *(["reaction"] if reader.has(f"{prefix}boundary/reaction") else [])]  # none in older files
-    boundary = BoundaryFields(**{name: reader.floats(f"{prefix}boundary/{name}") for name in names})
+    boundary = BoundaryFields(**{name: reader.floats(f"{prefix}boundary/{name}") for name in _BOUNDARY})
     if len(boundary.centres) != mesh.n_elements:
         raise InputError(f"{len(boundary.centres)} tractions for {mesh.n_elements} elements")
     return mesh, boundary

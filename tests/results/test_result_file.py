@@ -90,7 +90,7 @@ def test_a_failed_solution_comes_back_as_failed(tmp_path: Path, solution: Soluti
 def test_provenance_names_versions_but_neither_people_nor_places(file: Path) -> None:
     with h5py.File(file) as stored:
         provenance = dict(stored["provenance"].attrs)
-        assert stored.attrs["schema_version"] == 2
+        assert stored.attrs["schema_version"] == 3
     assert set(provenance) == {"bemkit", "python", "numpy", "scipy", "h5py", "platform", "created"}
     text = " ".join(map(str, provenance.values()))
     assert str(Path.home()) not in text
@@ -265,7 +265,7 @@ def test_a_damaged_list_of_contents_is_named() -> None:
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        (attribute("/", "schema_version", 1), "has layout version 1, this bemkit .* reads version 2: use the bemkit"),
+        (attribute("/", "schema_version", 2), "has layout version 2, this bemkit .* reads version 3: use the bemkit"),
         (attribute("/", "format", "other"), "not a bemkit result"),
         (attribute("summary", "status", "GREAT"), "inconsistent content .*GREAT"),
         (attribute("summary", "energy", "much"), "inconsistent content"),
