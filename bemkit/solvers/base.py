@@ -288,16 +288,15 @@ class _Run:
             if may_travel and (travel := find_long_travel(self.problem)) is not None:
                 status, words = Status.TOO_FAR, f"the travel is {travel:.1e} times the deformation"
                 iterate = replace(iterate, message=f"{words}; {iterate.message}".rstrip("; "))
+            certificate = history[-1].certificate
+            # choose among the positions that contact leaves open, unless another contact forbids it
             if status is Status.CONVERGED and sets.is_closed.any():
-                iterate = self._with_least_slip(iterate, sets)
-        return self._solution(iterate, status, sets, history)
-
-    def _with_least_slip(self, iterate: Iterate, sets: ActiveSets) -> Iterate:
-        """Choose among the positions that contact leaves open, unless another contact forbids it."""
-        state = with_least_slip(self.problem, iterate.state, sets)
-        if state is iterate.state or not certify(self.problem, state).is_below(self.tolerance):
-            return iterate
-        return replace(iterate, state=state)
+                state = with_least_slip(self.problem, iterate.state, sets)
+                moved = certificate if state is iterate.state else certify(self.problem, state)
+                if moved.is_below(self.tolerance):
+                    iterate, certificate = replace(iterate, state=state), moved
+                    sets = contact_sets(self.problem, state)
+        return self._solution(iterate, status, sets, certificate, history)
 
     def _untouched(self) -> FloatingResponse | None:
         """Return the response without any contact, if there is one; it does not depend on the law."""
@@ -356,15 +355,20 @@ class _Run:
         return Status.MAX_STEPS if history[-1].step >= self.max_steps else None
 
     def _solution(
-        self, iterate: Iterate, status: Status, sets: ActiveSets, history: list[StepRecord]
+        self,
+        iterate: Iterate,
+        status: Status,
+        sets: ActiveSets,
+        certificate: Certificate,
+        history: list[StepRecord],
     ) -> ContactSolution:
         last = history[-1]
-        worst = f"worst certificate entry {last.certificate.worst:.1e} after {last.step} steps"
+        worst = f"worst certificate entry {certificate.worst:.1e} after {last.step} steps"
         remark = f" ({iterate.message})" if iterate.message else ""
         return ContactSolution(
             state=iterate.state,
             status=status,
-            certificate=last.certificate,
+            certificate=certificate,
             node_status=sets.node_status,
             steps=last.step,
             linear_solves=iterate.linear_solves,

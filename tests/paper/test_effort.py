@@ -15,7 +15,7 @@ DISCRETISATIONS = {"constant": bk.ConstantCollocation(), "linear": bk.Galerkin(1
 
 def solved(example: int, discretisation: str, friction: float, solver: bk.ContactSolver | None = None) -> bk.Solution:
     scene = bk.load_scene(f"paper-{example}")
-    solver = bk.SemismoothNewton() if solver is None else solver
+    solver = bk.Fallbacks() if solver is None else solver
     law = bk.Coulomb(friction)
     return bk.run(dataclasses.replace(scene, law=law, discretisation=DISCRETISATIONS[discretisation], solver=solver))
 

@@ -10,8 +10,9 @@ from tests.slow import slow_except
 
 ELEMENTS = [bk.ConstantCollocation(), bk.Galerkin(1), bk.Galerkin(2)]
 MOST_SOLVES, MOST_ON_FINE_MESHES = 150, 250
-"""The path from all nodes sticking takes 110 to 250 on Example 1, and 740 on the bonded punch. On fine meshes that from
-a quarter of the friction takes up to 229."""
+"""The path from all nodes sticking takes 110 to 250 on Example 1."""
+MOST_ON_WHOLE_PATHS = 6
+"""Linear solves for each contact node; the whole path of the bonded punch has 2.4 segments a node."""
 
 
 def bonded_punch(discretisation, friction_coefficient):
@@ -50,10 +51,11 @@ def test_example_1_is_solved_at_any_friction(discretisation):
         assert solved(replace(scene, law=bk.Coulomb(friction_coefficient))).linear_solves <= MOST_SOLVES
 
 
-def test_a_bonded_punch_is_solved_by_way_of_weaker_friction():
+def test_a_bonded_punch_is_solved_by_the_whole_path():
+    """Newton's method wanders and the path from its statuses ends on a ray; two linear solves a segment remain."""
     solution = solved(bonded_punch(bk.ConstantCollocation(), 10.0))
-    assert solution.linear_solves <= MOST_SOLVES
-    assert "of the friction" in solution.history[-1].message
+    assert solution.linear_solves <= MOST_ON_WHOLE_PATHS * solution.contact.n_contact
+    assert solution.history[-1].message.startswith("path of")
 
 
 @pytest.mark.slow
@@ -64,4 +66,5 @@ def test_high_friction_on_fine_meshes(discretisation):
     for friction_coefficient in (0.5, 1.0, 2.0, 5.0, 10.0, 100.0, 1000.0):
         law = bk.Coulomb(friction_coefficient)
         assert solved(replace(example, law=law)).linear_solves <= MOST_ON_FINE_MESHES
-        assert solved(bonded_punch(discretisation, friction_coefficient)).linear_solves <= MOST_ON_FINE_MESHES
+        punch = solved(bonded_punch(discretisation, friction_coefficient))
+        assert punch.linear_solves <= MOST_ON_WHOLE_PATHS * punch.contact.n_contact

@@ -106,6 +106,18 @@ def test_a_free_direction_without_load_is_left_where_it_is(driver):
     assert np.abs(solution.state.u_t).max() < 1.0
 
 
+def test_certificate_and_statuses_are_those_of_the_state_with_the_least_slip():
+    """A block without friction may be anywhere; which way its nodes slip is that of the position chosen."""
+    problem = block_problem(Frictionless(), is_held_sideways=False, push=0.0)
+    far = problem.sticking_state
+    far = ContactState(far.displacement + np.array([0.0, 3.0]), far.traction)
+    solution = solve(problem, SemismoothNewton(), start=far)
+    assert solution.certificate == certify(problem, solution.state)
+    assert np.array_equal(solution.node_status, contact_sets(problem, solution.state).node_status)
+    assert {NodeStatus.SLIP_FORWARD, NodeStatus.SLIP_BACKWARD} <= set(solution.node_status)
+    assert solution.history[-1].certificate != solution.certificate  # it was moved after the last step
+
+
 @pytest.mark.parametrize(
     "law",
     [Rubber(), CohesiveCoulomb(0.5, 0.02, 0.2), CohesiveCoulomb(0.5, 0.0, 0.1)],
