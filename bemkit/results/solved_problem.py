@@ -24,6 +24,7 @@ from bemkit.results.solved_body import SolvedBody
 from bemkit.results.when_asked import WhenAsked
 from bemkit.scene.unit_names import UnitNames
 from bemkit.solvers.base import Status, StepRecord
+from bemkit.solvers.records import continued
 
 if TYPE_CHECKING:
     from typing import Self
@@ -282,17 +283,13 @@ def with_totals(result: AnySolution, solutions: Sequence[AnySolution], names: Se
 
     `names`, such as "load step 1 of 3", are put before the messages of the steps of each.
     """
-    records: list[StepRecord] = []
+    records: tuple[StepRecord, ...] = ()
     for name, solution in zip(names, solutions, strict=True):
-        first, solves_before = (records[-1].step + 1, records[-1].linear_solves) if records else (0, 0)
-        for record in solution.history:
-            message = "; ".join(filter(None, (name, record.message)))
-            total = solves_before + record.linear_solves
-            records.append(replace(record, step=first + record.step, linear_solves=total, message=message))
+        records = continued(records, solution.history, name)
     return replace(
         with_times(result, solutions),
         warnings=result.unasked_warnings,
-        history=tuple(records),
+        history=records,
         linear_solves=sum(solution.linear_solves for solution in solutions),
         outer_steps=sum(solution.outer_steps for solution in solutions),
     )

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from itertools import pairwise
 from typing import Protocol
 
@@ -14,9 +14,12 @@ from bemkit.arrays import FloatArray
 from bemkit.contact.body import ContactState, SlipHistory
 from bemkit.contact.problem import ContactProblem
 from bemkit.model.units import Units
+from bemkit.operators.stopwatch import announce
 from bemkit.results.load_history import StepWork
 from bemkit.solvers.active_sets import NodeStatus
 from bemkit.solvers.base import ContactSolution, ContactSolver, Status, StepRecord, solve
+from bemkit.solvers.fallbacks import Fallbacks
+from bemkit.solvers.records import continued
 
 MOST_HALVINGS = 6
 """How often an increment is halved before a step is given up."""
@@ -24,6 +27,9 @@ MOST_LAWS = 60
 """Solves of one increment under a law that depends on its slip."""
 _SETTLED = 1e-10
 """Change of such a law, relative to the largest bound, up to which it has converged."""
+
+_FAST, _SLOW = 10, 20
+"""Steps of the solver in one increment up to which the next is twice as large, and above which it is half as large."""
 
 _HOPELESS = (Status.UNSOLVABLE_LOAD, Status.TOO_FAR, Status.TOO_COSTLY)
 """Failures that smaller increments do not change."""
@@ -67,30 +73,35 @@ class Standing:
     motion : SlipHistory
     gap : (n_contact,) array
         Dimensionless.
-    acts : callable
-        () -> the forces and displacements of `StepModel.acting` there; a single zero each at rest.
+    loads : tuple of (float, StepModel)
+        The models whose loads act there, each with its share; none at rest.
     """
 
     state: ContactState
     motion: SlipHistory
     gap: FloatArray
-    acts: Callable[[], tuple[FloatArray, FloatArray]]
+    loads: tuple[tuple[float, StepModel], ...] = ()
 
     @cached_property
     def acting(self) -> tuple[FloatArray, FloatArray]:
         """(n,) arrays [N/m], [m]: the forces of loads and supports, and the displacements on which they work."""
-        return self.acts()
+        forces, displacements = np.zeros(1), np.zeros(1)
+        for share, model in self.loads:  # both are affine in the loads
+            of_model = model.acting(self.state)
+            forces, displacements = forces + share * of_model[0], displacements + share * of_model[1]
+        return forces, displacements
 
     @classmethod
     def at_rest(cls, model: StepModel) -> Standing:
         """Return the state before any load, with obstacles that overlap with the body still at its surface."""
         n = model.problem.n_contact
-        return cls(_no_state(n), SlipHistory.at_rest(n), np.maximum(model.problem.gap, 0.0), _nothing)
+        rest = ContactState(np.zeros((n, 2)), np.zeros((n, 2)))
+        return cls(rest, SlipHistory.at_rest(n), np.maximum(model.problem.gap, 0.0))
 
     @classmethod
     def under(cls, model: StepModel, state: ContactState, motion: SlipHistory) -> Standing:
         """Return the end of a step of a model."""
-        return cls(state, motion, model.problem.gap, partial(model.acting, state))
+        return cls(state, motion, model.problem.gap, ((1.0, model),))
 
     def work_from(self, before: Standing, model: StepModel) -> StepWork:
         """Return the work from the end of the increment before to this one, by the trapezoidal rule."""
@@ -162,8 +173,10 @@ class Path:
         At the end of the step.
     before : StepModel, optional
         Of the step before; without one there is a single increment.
-    between : callable, optional
+    between : callable
         Share of the way -> the problem there.
+    factors : (float, float), optional
+        Load factors before and at the end of the step [-], where the scene states some.
     """
 
     model: StepModel
@@ -171,16 +184,25 @@ class Path:
     time: float
     before: StepModel | None
     between: Callable[[float], ContactProblem]
+    factors: tuple[float, float] | None = None
 
     def time_at(self, share: float) -> float:
-        """Return the time at a share of the way."""
+        """Return the time at a share of the way [s]."""
         begin = self.start.motion.time
         return self.time if share == 1.0 else begin + share * (self.time - begin)
 
+    def name_of(self, share: float) -> str:
+        """Return the load factor at a share of the way in words, or the time where there is none."""
+        if self.factors is None:
+            return f"t = {self.time_at(share):.6g}"
+        first, last = self.factors
+        return f"load factor {first + share * (last - first):.6g}"
+
     def standing(self, problem: ContactProblem, share: float, state: ContactState, motion: SlipHistory) -> Standing:
         """Return the end of an increment."""
-        before = self.before if share < 1.0 else None
-        return Standing(state, motion, problem.gap, partial(_acting, self.model, before, share, state))
+        if self.before is None or share == 1.0:
+            return Standing(state, motion, problem.gap, ((1.0, self.model),))
+        return Standing(state, motion, problem.gap, ((1.0 - share, self.before), (share, self.model)))
 
 
 def reach(path: Path, guess: ContactState | None = None, callback: Callback = None) -> ReachedStep:
@@ -196,48 +218,53 @@ def reach(path: Path, guess: ContactState | None = None, callback: Callback = No
     Returns
     -------
     ReachedStep
-        Converged under the load of the step, or with the failure of the last and smallest increment. An increment that
-        fails is halved; after one that converges the next is twice as large.
+        Converged under the load of the step, or with the failure of the last and smallest increment.
 
     Notes
     -----
+    An increment that fails is halved. After one that converges the next is twice as large if the solver took few steps,
+    and half as large if it took many. Only the jump to the whole load may follow the whole path of solutions; drivers
+    that begin anew, instead of where the last increment has ended, take part in the smallest increment only.
+
     Loads that nothing can balance are found by a linear programme before any step, see `bemkit.contact.solvability`,
     and are not approached. Loads that contact can balance make a convex set, so that without friction there is no
     collapse between two of them: an increment that fails has stalled. With Coulomb friction, whose slip does not
     dilate, the programme gives an upper bound: bodies may give way below it, and this function does not decide which of
     the two has happened.
     """
+    is_first, smallest = path.before is None, 0.5**MOST_HALVINGS
+    increments = _Increments(path, callback)
     reached, increment, end = 0.0, 1.0, path.start
     ends: tuple[Standing, ...] = ()
-    records: tuple[StepRecord, ...] = ()
-    is_first = path.before is None
     while True:
         target = min(reached + increment, 1.0)
-        problem = path.between(target)
-        if not is_first:
-            problem = replace(problem, reference_slip=end.state.u_t)
-        words = "" if target == 1.0 and not records else f"increment to {target:.4g} of the step"
-        recorder = _Recorder(records, words, callback)
-        attempt = _attempt(path, problem, end, path.time_at(target), guess if is_first else end.state, recorder)
-        records, result = attempt.result.history, attempt.result
+        attempt = increments.attempt(
+            target, end, guess if is_first else end.state, is_last=is_first or increment <= smallest
+        )
+        result = attempt.result
         if result.is_converged:
-            end = path.standing(problem, target, result.state, attempt.motion)
-            reached, ends, increment = target, (*ends, end), 2.0 * increment
+            end = path.standing(attempt.problem, target, result.state, attempt.motion)
+            reached, ends = target, (*ends, end)
             if reached == 1.0:
                 break
+            increment *= 2.0 if attempt.n_steps <= _FAST else 0.5 if attempt.n_steps > _SLOW else 1.0
+            increment = max(increment, smallest)
             _ = end.acting  # now, while a compressed body still holds this response
-        elif is_first or result.status in _HOPELESS or target - reached <= 0.5**MOST_HALVINGS:
+            announce(f"{path.name_of(reached)} reached")
+        elif is_first or result.status in _HOPELESS or target - reached <= smallest:
             break
         else:
             increment = 0.5 * (target - reached)
+            announce(f"{path.name_of(target)} failed, {path.name_of(reached + increment)} is next")
     words = result.message
     if result.is_converged and len(ends) > 1:
         words += f" The jump to this load stalled; {len(ends)} increments in its place led there."
     elif not is_first and result.status in _UNDECIDED:
-        bound = "" if problem.law.is_frictionless else ", but friction may give way before that does"
+        bound = "" if attempt.problem.law.is_frictionless else ", but friction may give way before that does"
         words = (
-            f"{Status.LOAD_NOT_REACHED.value} Increments down to {target - reached:.2g} of the step led to "
-            f"{reached:.3g} of it. The static programme finds no collapse under this load{bound}. The last increment "
+            f"{Status.LOAD_NOT_REACHED.value} Increments led to {path.name_of(reached)}, "
+            f"not to {path.name_of(target)}. "
+            f"The static programme finds no collapse under this load{bound}. The last increment "
             f"ended {result.status.name.lower().replace('_', ' ')}: {words}"
         )
         result = replace(result, status=Status.LOAD_NOT_REACHED)
@@ -246,92 +273,78 @@ def reach(path: Path, guess: ContactState | None = None, callback: Callback = No
 
 @dataclass(frozen=True, eq=False)
 class _Attempt:
+    """One increment: the problem, its result with the records of all increments so far, and the steps it took."""
+
     problem: ContactProblem
     result: ContactSolution
     motion: SlipHistory
+    n_steps: int
 
 
-def _attempt(
-    path: Path,
-    problem: ContactProblem,
-    end: Standing,
-    time: float,
-    start: ContactState | None,
-    recorder: _Recorder,
-) -> _Attempt:
-    """Solve one increment; under a law that depends on its slip, until slip and law agree."""
-    law, unit = problem.law, path.model.units.displacement
-    motion = end.motion.followed(time, np.zeros(problem.n_contact), np.zeros(problem.n_contact, bool))
-    for _ in range(MOST_LAWS):
-        present = replace(problem, law=law.at_slip(motion)) if law.needs_history else problem
-        result = recorder.solved(present, path.model.solver, start)
-        if not result.is_converged:
-            return _Attempt(present, result, motion)
-        slip = (result.state.u_t - problem.slip_origin) * unit
-        motion = end.motion.followed(time, slip, result.node_status != NodeStatus.SEPARATED)
-        if not law.needs_history:
-            return _Attempt(present, result, motion)
-        sigma_n = np.minimum(result.state.sigma_n, 0.0)
-        bounds = [of_slip.bound(sigma_n) for of_slip in (present.law, law.at_slip(motion))]
-        if np.abs(bounds[1] - bounds[0]).max(initial=0.0) <= _SETTLED * np.abs(bounds[0]).max(initial=0.0):
-            return _Attempt(present, result, motion)
-        start = result.state
-        recorder = recorder.after(result)
-    words = f"{Status.STALLED.value} [the friction law and the slip on which it depends do not come to agree]"
-    return _Attempt(present, replace(result, status=Status.STALLED, message=words), motion)
+@dataclass(eq=False)
+class _Increments:
+    """Solves increments of one load step, and keeps the records of all of them."""
 
-
-@dataclass(frozen=True)
-class _Recorder:
-    """Numbers the records and linear solves of a solve after those of the solves before."""
-
-    records: tuple[StepRecord, ...]
-    words: str
+    path: Path
     callback: Callback
+    records: tuple[StepRecord, ...] = field(default=(), init=False)
 
-    def after(self, result: ContactSolution) -> _Recorder:
-        return replace(self, records=result.history)
+    def attempt(self, target: float, end: Standing, start: ContactState | None, *, is_last: bool) -> _Attempt:
+        """Solve the increment to a share of the way; under a law that depends on its slip until slip and law agree."""
+        path, n_before = self.path, len(self.records)
+        problem, time = path.between(target), path.time_at(target)
+        if path.before is not None:
+            problem = replace(problem, reference_slip=end.state.u_t)
+        words = "" if target == 1.0 and not n_before else f"increment to {path.name_of(target)}"
+        law, unit = problem.law, path.model.units.displacement
+        motion = end.motion.followed(time, np.zeros(problem.n_contact), np.zeros(problem.n_contact, bool))
+        for _ in range(MOST_LAWS):
+            present = problem.with_law(law.at_slip(motion)) if law.needs_history else problem
+            result = self._solved(present, start, words, is_last=is_last)
+            n_steps = len(self.records) - n_before - 1
+            if not result.is_converged:
+                return _Attempt(present, result, motion, n_steps)
+            slip = (result.state.u_t - problem.slip_origin) * unit
+            motion = end.motion.followed(time, slip, result.node_status != NodeStatus.SEPARATED)
+            if not law.needs_history or _agree(present.law.bound, law.at_slip(motion).bound, result.state):
+                return _Attempt(present, result, motion, n_steps)
+            start = result.state
+        words = f"{Status.STALLED.value} [the friction law and the slip on which it depends do not come to agree]"
+        return _Attempt(present, replace(result, status=Status.STALLED, message=words), motion, n_steps)
 
-    def solved(self, problem: ContactProblem, solver: ContactSolver, start: ContactState | None) -> ContactSolution:
-        records = self.records
-        first, solves_before = (records[-1].step + 1, records[-1].linear_solves) if records else (0, 0)
-
-        def renumbered(record: StepRecord) -> StepRecord:
-            if not records and not self.words:
-                return record
-            message = "; ".join(filter(None, (self.words, record.message)))
-            total = solves_before + record.linear_solves
-            return replace(record, step=first + record.step, linear_solves=total, message=message)
+    def _solved(
+        self, problem: ContactProblem, start: ContactState | None, words: str, *, is_last: bool
+    ) -> ContactSolution:
+        """Solve a problem; return its result with the records and linear solves of all solves so far."""
+        records, callback = self.records, self.callback
 
         def report(record: StepRecord) -> None:
-            if self.callback is not None:
-                self.callback(renumbered(record))
+            if callback is not None:
+                callback(continued(records, (record,), words)[-1])
 
         if problem.n_contact:
+            solver = _for_increments(self.path.model.solver, is_last=is_last) if records else self.path.model.solver
             result = solve(problem, solver, start=start, throw=False, callback=report)
         else:
             from bemkit.model.untouched_body import certified
 
             result = certified(problem.body, report)
-        history = (*records, *(renumbered(record) for record in result.history))
-        steps = history[-1].step if history else 0
-        return replace(result, history=history, steps=steps, linear_solves=solves_before + result.linear_solves)
+        self.records = continued(records, result.history, words)
+        steps, solves = (self.records[-1].step, self.records[-1].linear_solves) if self.records else (0, 0)
+        return replace(result, history=self.records, steps=steps, linear_solves=solves)
 
 
-def _acting(
-    model: StepModel, before: StepModel | None, share: float, state: ContactState
-) -> tuple[FloatArray, FloatArray]:
-    """Return `StepModel.acting` at a share of the way from the loads of the step before, in which it is affine."""
-    forces, displacements = model.acting(state)
-    if before is None:
-        return forces, displacements
-    of_before = before.acting(state)
-    return (1.0 - share) * of_before[0] + share * forces, (1.0 - share) * of_before[1] + share * displacements
+def _for_increments(solver: ContactSolver, *, is_last: bool) -> ContactSolver:
+    """Return the drivers of an increment that follows a jump: those that go on from its start, at last springs, too."""
+    if not isinstance(solver, Fallbacks):
+        return solver
+    return solver.without_whole_path() if is_last else solver.without_new_starts()
 
 
-def _nothing() -> tuple[FloatArray, FloatArray]:
-    return np.zeros(1), np.zeros(1)
-
-
-def _no_state(n_contact: int) -> ContactState:
-    return ContactState(np.zeros((n_contact, 2)), np.zeros((n_contact, 2)))
+def _agree(
+    bound: Callable[[FloatArray], FloatArray], following: Callable[[FloatArray], FloatArray], state: ContactState
+) -> bool:
+    """Whether the friction bound under which a state was found is that of its slip."""
+    sigma_n = np.minimum(state.sigma_n, 0.0)
+    before, after = bound(sigma_n), following(sigma_n)
+    return bool(np.abs(after - before).max(initial=0.0) <= _SETTLED * np.abs(before).max(initial=0.0))

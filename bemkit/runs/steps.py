@@ -13,7 +13,7 @@ from bemkit.contact.problem import ContactProblem
 from bemkit.contact.solvability import UnsolvableLoad, find_unsolvable_load
 from bemkit.errors import InputError
 from bemkit.operators.linear.threads import blas_threads_for
-from bemkit.operators.stopwatch import Stage, StageClock, assembly_time
+from bemkit.operators.stopwatch import Stage, StageClock, announce, assembly_time
 from bemkit.plan import Plan, announce_plan, check_memory
 from bemkit.results.load_history import LoadHistory, LoadStep
 from bemkit.results.solved_problem import following
@@ -214,7 +214,7 @@ def solve_steps(
             end = Standing.under(model, done.steps[-1].state, done.motion) if number == n_done - 1 else end
             continue
         clock = clock.closed(Stage.CONDENSE)
-        reached = reach(_path(model, before, end, history.times[number]), guess, callback)
+        reached = reach(_path(model, before, end, history, number), guess, callback)
         if before is None and not reached.result.history:
             raise UnsolvableSceneError(kind.why_not(model, reached.result))
         model = replace(model, problem=reached.problem)
@@ -231,6 +231,8 @@ def solve_steps(
         if history.is_recorded and solution.is_converged:
             solution = replace(solution, loading=_loading(history, solutions, model, reached, solution))
         solutions.append(solution)
+        if len(steps) > 1:
+            announce(f"load step {number + 1} of {len(steps)} finished")
         clock, end = StageClock.start(), reached.end
         if not solution.is_converged:
             break
@@ -260,12 +262,14 @@ def solved_once(kind: Kind[AnyModel, AnySolution], model: AnyModel, start: Conta
     return kind.checked(model, result)
 
 
-def _path(model: AnyModel, before: AnyModel | None, end: Standing, time: float) -> Path:
+def _path(model: AnyModel, before: AnyModel | None, end: Standing, history: History[AnySolution], number: int) -> Path:
     def between(share: float) -> ContactProblem:
         problem: ContactProblem = model.problem if before is None else model.between(before, share)
         return problem
 
-    return Path(model, end, time, before, between)
+    factors = history.asked.load_factors
+    ends = (factors[number - 1], factors[number]) if number and len(factors) == len(history.times) else None
+    return Path(model, end, history.times[number], before, between, ends)
 
 
 def _loading(

@@ -1,6 +1,6 @@
 """Drivers one after the other: a driver that is made of drivers, and the default of scenes."""
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 
 from bemkit.contact.problem import ContactProblem, ContactState
@@ -74,9 +74,16 @@ class Fallbacks:
         return sum(driver.max_steps for driver in self.drivers)
 
     def without_whole_path(self) -> "Fallbacks":
-        """Return the drivers without those that follow the whole path, which is the same from wherever they begin."""
-        others = [driver for driver in self.drivers if not (isinstance(driver, SolutionPath) and driver.from_start)]
-        return Fallbacks(tuple(others)) if others else self
+        """Return the drivers without those that follow the whole path of solutions."""
+        return self._without(lambda driver: isinstance(driver, SolutionPath) and driver.from_start)
+
+    def without_new_starts(self) -> "Fallbacks":
+        """Return the drivers that go on from a given state, without those that begin with all nodes sticking."""
+        return self.without_whole_path()._without(lambda driver: isinstance(driver, Springs))
+
+    def _without(self, is_excluded: Callable[[ContactSolver], bool]) -> "Fallbacks":
+        others = tuple(driver for driver in self.drivers if not is_excluded(driver))
+        return Fallbacks(others) if others else self
 
     def init(self, problem: ContactProblem, start: ContactState) -> FallbackIterate:
         """Begin with the first driver that can help."""

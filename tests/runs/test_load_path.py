@@ -98,7 +98,7 @@ def test_a_jump_that_stalls_is_gone_in_halves() -> None:
     assert second.is_converged
     assert "increments in its place led there" in second.message
     remarks = [record.message for record in second.history]
-    assert any(remark.startswith("increment to 0.5 of the step") for remark in remarks)
+    assert any(remark.startswith("increment to load factor 2.3") for remark in remarks)
     steps = [record.step for record in second.history]
     assert steps == list(range(len(steps)))
     assert second.linear_solves == second.history[-1].linear_solves
@@ -115,7 +115,7 @@ def test_a_step_out_of_reach_says_how_far_it_came(monkeypatch) -> None:  # type:
     assert first.is_converged
     assert second.status is Status.LOAD_NOT_REACHED
     assert second.status.value in second.message
-    assert "Increments down to 0.25 of the step led to" in second.message
+    assert "Increments led to load factor 0, not to load factor 1.15." in second.message
     assert "finds no collapse under this load, but friction may give way before that does" in second.message
     assert re.search("The last increment ended (stalled|cycling): The", second.message)
     np.testing.assert_array_equal(second.contact.sigma_n, first.contact.sigma_n)
@@ -181,3 +181,48 @@ def test_blocks_of_the_same_objects_are_assembled_once_under_every_load() -> Non
     for step in prepare_assembly_steps(load_steps(assembly)):
         free = {id(body.own_mesh) for body in step.bodies if not body.body.is_held}
         assert len(free) == 3
+
+
+def test_increments_are_announced_with_their_load_factors(caplog) -> None:  # type: ignore[no-untyped-def]
+    assembly = replace(wall(3, 4, push=True), load_factors=(0.0, 4.6), solver=bk.SemismoothNewton(max_steps=5))
+    with caplog.at_level("DEBUG", logger="bemkit.progress"):
+        assert bk.run(assembly).is_converged
+    words = [record.getMessage() for record in caplog.records if "load " in record.getMessage()]
+    assert words[:3] == [
+        "load step 1 of 2 finished",
+        "load factor 4.6 failed, load factor 2.3 is next",
+        "load factor 2.3 reached",
+    ]
+    assert words[-1] == "load step 2 of 2 finished"
+
+
+def test_an_increment_grows_only_where_the_solver_took_few_steps(monkeypatch) -> None:  # type: ignore[no-untyped-def]
+    """The first increment that succeeds is half the way; the next one takes the rest, its half, or a quarter of it."""
+    assembly = replace(wall(3, 4, push=True), load_factors=(0.0, 4.6), solver=bk.SemismoothNewton(max_steps=5))
+
+    def factors() -> list[float]:
+        messages = [record.message for record in bk.run(assembly).history if "increment to" in record.message]
+        words = [message.split("factor ")[1].split(";")[0] for message in messages]
+        return [float(word) for word in dict.fromkeys(words)]
+
+    quick = factors()
+    monkeypatch.setattr(load_path, "_FAST", 0)
+    monkeypatch.setattr(load_path, "_SLOW", 0)
+    slow = factors()
+    assert len(slow) > len(quick)
+    assert slow[1] - slow[0] == pytest.approx(0.5 * slow[0])
+
+
+def test_the_whole_path_is_followed_once_in_a_load_step() -> None:
+    class Counting(bk.SolutionPath):
+        n_paths = 0
+
+        def step(self, problem, iterate):  # type: ignore[no-untyped-def]
+            Counting.n_paths += self.from_start
+            return replace(iterate, ended=Status.STALLED, message="counted")
+
+    drivers = (bk.SemismoothNewton(max_steps=5), Counting(from_start=True))
+    assembly = replace(wall(3, 4, push=True), load_factors=(0.0, 4.6), solver=bk.Fallbacks(drivers))
+    solution = bk.run(assembly)
+    assert "increments in its place led there" in solution.message
+    assert Counting.n_paths == 1

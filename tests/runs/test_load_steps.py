@@ -322,3 +322,21 @@ def test_degrees_do_not_rise_in_histories() -> None:
 
 def test_work_adds_up() -> None:
     assert StepWork(1.0, 2.0, 3.0) + StepWork(0.5, 0.25, 0.125) == StepWork(1.5, 2.25, 3.125)
+
+
+def test_laws_that_depend_on_slip_share_what_does_not_depend_on_the_law(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each law of an increment is another problem; the body is asked for little more than the counted solves."""
+    from bemkit.contact.condensation.dense_body import DenseBody
+
+    n_responses, respond = 0, DenseBody.respond
+
+    def counted(self: DenseBody, conditions: Any) -> Any:
+        nonlocal n_responses
+        n_responses += 1
+        return respond(self, conditions)
+
+    monkeypatch.setattr(DenseBody, "respond", counted)
+    loading = solved(replace(LOOP, law=SlipWeakening(0.6, 0.3, 0.05), steps=LOOP.steps[:3]))
+    n_solves = sum(step.linear_solves for step in loading.steps)
+    assert n_solves > 2 * len(loading.steps)
+    assert n_responses <= 1.3 * n_solves
