@@ -57,7 +57,7 @@ class Coefficients:
         """Return coefficients to be filled."""
         on_slopes: tuple[int, ...] = shape if has_slopes else (0, 0)
         tractions = np.zeros(shape), np.zeros(shape, complex)
-        return cls(*tractions, *(np.empty(each, complex) for each in (shape, shape, on_slopes, on_slopes)))
+        return cls(*tractions, *(np.zeros(each, complex) for each in (shape, shape, on_slopes, on_slopes)))
 
     @property
     def stacked(self) -> ComplexArray:
@@ -86,9 +86,8 @@ def _folded(
     """Add the coefficients of images: the signs (f, f) stand for v -> f v, and (f, -f) for v -> f conj(v)."""
     pieces = zip(images, np.split(on, len(images), axis=1), np.split(on_conjugate, len(images), axis=1), strict=True)
     total: ComplexArray = np.zeros((2, len(on), on.shape[1] // len(images)), complex)
-    with np.errstate(all="ignore"):  # displacements that nobody asked for hold anything
-        for (along_x, along_y), of_v, of_conjugate in pieces:
-            total += along_x * np.array([of_v, of_conjugate] if along_x == along_y else [of_conjugate, of_v])
+    for (along_x, along_y), of_v, of_conjugate in pieces:
+        total += along_x * np.array([of_v, of_conjugate] if along_x == along_y else [of_conjugate, of_v])
     return total[0], total[1]
 
 
