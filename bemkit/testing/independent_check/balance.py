@@ -80,7 +80,7 @@ def imbalance(fields: Fields) -> float:
     """
     solution, _, boundary, nodes, _ = fields
     mesh, table = solution.mesh, solution.contact
-    contact = table.weight[:, None] * nodes.acting
+    contact = table.weight[:, None] * nodes.traction
     motions = motions_at(solution, solution.boundary.points)
     work = np.einsum("nc,ncm->m", contact, motions[nodes.nodes])
     # what the elements make of a rotation: on curved ones it is not one exactly
@@ -142,7 +142,7 @@ def energy_mismatch(fields: Fields) -> float:
     if solution.scene.body_forces or any(np.any(held.values != 0.0) for held in boundary.held):
         return 0.0
     displacement = solution.boundary.displacement
-    contact = solution.contact.weight[:, None] * nodes.acting
+    contact = solution.contact.weight[:, None] * nodes.traction
     loads = _loads(solution, boundary)
     work = 0.5 * float(np.sum(contact * nodes.displacement))
     work += 0.5 * float(np.sum(loads * boundary.interpolated(displacement)))
@@ -172,7 +172,7 @@ def _work_of_sizes(fields: Fields, displacement: FloatArray) -> float:
     solution, _, boundary, nodes, _ = fields
     motion = boundary.interpolated(displacement)
     sizes = np.hypot(boundary.traction[..., 0], boundary.traction[..., 1]) * np.hypot(motion[..., 0], motion[..., 1])
-    contact = np.hypot(*nodes.acting.T) * np.hypot(*displacement[nodes.nodes].T)
+    contact = np.hypot(*nodes.traction.T) * np.hypot(*displacement[nodes.nodes].T)
     return 0.5 * float(np.sum(sizes * boundary.shares) + contact @ solution.contact.weight)
 
 
@@ -188,7 +188,7 @@ def reciprocity_mismatch(fields: Fields) -> float:
     points, force_points = (_with_images(solution, each, is_point=True) for each in (boundary.points, nodes.points))
     normals, displacement = (_with_images(solution, each) for each in (boundary.normals, displacement))
     loads = _with_images(solution, traction * boundary.shares[:, :, None])
-    forces = _with_images(solution, nodes.acting * solution.contact.weight[:, None])
+    forces = _with_images(solution, nodes.traction * solution.contact.weight[:, None])
     shares = np.concatenate([boundary.shares] * (len(points) // len(boundary.points)))
     # what is left of a rigid motion a million times longer is round-off
     moved = 1e-6 * float(np.abs(solution.boundary.displacement).max())

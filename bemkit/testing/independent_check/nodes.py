@@ -43,8 +43,6 @@ class Nodes:
         Nodes that belong to a support as well: part of their force is a reaction, which no friction law governs.
     displacement, traction : (n_contact, 2) arrays [m], [Pa]
         From the boundary field; from sigma_n and sigma_t of the table. In x and y.
-    acting : (n_contact, 2) array [Pa]
-        The traction that acts on the body as contact. On supports what acts along t is the support's.
     """
 
     nodes: IntArray
@@ -56,7 +54,6 @@ class Nodes:
     is_supported: BoolArray
     displacement: FloatArray
     traction: FloatArray
-    acting: FloatArray
 
     def components(self, vectors: FloatArray) -> FloatArray:
         """Return the (n_contact, 2) components along d and t of vectors in x and y."""
@@ -79,7 +76,6 @@ def contact_nodes_of(solution: Solution, boundary: Boundary) -> Nodes:
     frame = np.stack([direction, np.column_stack([-direction[:, 1], direction[:, 0]])], axis=1)
     is_supported = np.isin(nodes, supported_nodes(solution, boundary))
     components = np.column_stack([table.sigma_n, table.sigma_t])
-    acting = np.column_stack([table.sigma_n, np.where(is_supported, 0.0, table.sigma_t)])
     return Nodes(
         nodes=nodes,
         points=points,
@@ -90,7 +86,6 @@ def contact_nodes_of(solution: Solution, boundary: Boundary) -> Nodes:
         is_supported=is_supported,
         displacement=fields.displacement[nodes],
         traction=np.einsum("nk,nkc->nc", components, frame),
-        acting=np.einsum("nk,nkc->nc", acting, frame),
     )
 
 
