@@ -23,6 +23,8 @@ LIGHTEST = 1e-3
 of them, and its round-off is everywhere."""
 MOST_DENSE = 2500
 """Largest number of contact components and rigid motions for which a dense stiffness is formed."""
+MOST_CONTRAST = 1e6
+"""Largest ratio of moduli for which it is formed: of stiffer bodies the sparse form keeps strain and motion apart."""
 
 _ROUND_OFF = 1e-12
 """Forces of missed relative displacements, relative to all forces, from which on a response is refined."""
@@ -100,8 +102,12 @@ class JoinedBodies(CoupledMembers, LinearBody):
     @cached_property
     def is_costly(self) -> bool:  # type: ignore[override]  # an attribute of the protocol
         """Whether a response takes a sparse factorisation."""
-        few = 2 * self.n_contact + self.motions.shape[1] <= MOST_DENSE or self._node_coupling is not None
-        return not (few if self.is_dense is None else self.is_dense)
+        if self.is_dense is not None:
+            return not self.is_dense
+        is_small = 2 * self.n_contact + self.motions.shape[1] <= MOST_DENSE
+        moduli = [member.modulus for member in self.members]
+        is_alike = max(moduli, default=1.0) <= MOST_CONTRAST * min(moduli, default=1.0)
+        return not (is_small and is_alike or self._node_coupling is not None)
 
     def respond(self, conditions: LinearConditions) -> ContactState:
         """Return relative displacements and tractions; see `LinearBody.respond`."""

@@ -73,6 +73,9 @@ class ContactRows:
         Where a support, or a second obstacle in a corner, gives the tangential displacement.
     is_on_line : (n,) bool array
         Where the node lies on a symmetry line across its tangent: neither slips nor carries friction.
+    is_frictionless : (n,) bool array
+        Where a support holds the node in one direction and the partner moves: the tangent follows from both, and a
+        friction of its own would repeat what other nodes say.
     """
 
     name: str
@@ -92,6 +95,7 @@ class ContactRows:
     other_elements: IntArray
     tangent_follows: BoolArray
     is_on_line: BoolArray
+    is_frictionless: BoolArray
 
     @property
     def n_contact(self) -> int:
@@ -196,6 +200,7 @@ def body_rows(
             for node in nodes_on(one.space, one.elements)[0].tolist():
                 taken[number].setdefault(node, name)
         on_line = nodes_on_lines(side.space)[coupling.nodes]
+        is_held = np.asarray(conditions[first].is_fixed[coupling.nodes].any(axis=1)) & ~on_line
         found[k] = ContactRows(
             pairs[k].name,
             assembly.law_of(pairs[k]),
@@ -212,8 +217,9 @@ def body_rows(
             sparse.csr_array(coupling.on_mortar),
             side.elements,
             other_side.elements,
+            on_line | is_held,
             on_line,
-            on_line,
+            is_held,
         )
     yield from (found[k] for k in range(len(pairs)))
 
@@ -307,6 +313,7 @@ def obstacle_rows(
             else:
                 title, part, law, other, on_other = f"{body.name}.{name}", name, body.scene.laws[name], -1, None
             is_held = fixed[nodes.nodes].any(axis=1)
+            moves = on_other is not None and bool(assembly.rigid[k].is_driven.any())
             yield ContactRows(
                 title,
                 law,
@@ -323,8 +330,9 @@ def obstacle_rows(
                 on_other,
                 body.mesh.part(part),
                 np.zeros(0, np.intp),
-                nodes.is_shared | (is_held & (on_other is None or not assembly.rigid[k].is_driven.any())),
+                nodes.is_shared | is_held,
                 np.zeros(nodes.nodes.size, bool),
+                is_held & moves,
             )
 
 

@@ -115,14 +115,15 @@ class PreparedAssembly:
         for rows in self.rows:
             numbers = first + np.arange(rows.n_contact)
             first += rows.n_contact
-            if not rows.n_contact:
-                continue
-            is_uniform = isinstance(rows.law, LawOfCoefficients) and rows.law.is_uniform
-            try:
-                evaluated = rows.law if is_uniform else rows.law.at(rows.points)
-            except ValueError as error:
-                raise LawError(f"contact {rows.name!r}: friction law: {error}") from error
-            laws.setdefault(rows.law if is_uniform else first, (evaluated, []))[1].append(numbers)
+            for law, chosen in ((rows.law, ~rows.is_frictionless), (Frictionless(), rows.is_frictionless)):
+                if not chosen.any():
+                    continue
+                is_uniform = isinstance(law, LawOfCoefficients) and law.is_uniform
+                try:
+                    evaluated = law if is_uniform else law.at(rows.points[chosen])
+                except ValueError as error:
+                    raise LawError(f"contact {rows.name!r}: friction law: {error}") from error
+                laws.setdefault(law if is_uniform else first, (evaluated, []))[1].append(numbers[chosen])
         if len(laws) < 2:
             return next((law for law, _ in laws.values()), Frictionless())
         return PiecewiseLaw(*zip(*((law, np.concatenate(nodes)) for law, nodes in laws.values()), strict=True))
