@@ -67,17 +67,17 @@ def test_what_an_error_concerns_stands_before_its_message() -> None:
 
 
 @pytest.mark.parametrize(("kind", "code"), [(InputError, 2), (BemkitError, 2), (NoResultError, 1)])
-def test_the_command_line_ends_named_errors_in_one_line(
+def test_the_command_line_ends_named_errors_without_a_traceback(
     kind: type[BemkitError], code: int, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     def refuse(*arguments: object, **options: object) -> None:
-        raise kind("the mesh is\ntoo coarse")
+        raise kind("the mesh is too coarse\n\nand the load too large")
 
     monkeypatch.setattr(bemkit.runs.run, "run", refuse)
     with pytest.raises(SystemExit) as end:
         main(["run", "paper-1"])
     assert end.value.code == code
-    assert capsys.readouterr().err == "bemkit: error: paper-1: the mesh is too coarse\n"
+    assert capsys.readouterr().err == "bemkit: error: paper-1: the mesh is too coarse\nand the load too large\n"
 
 
 def test_the_command_line_leaves_defects_their_traceback(monkeypatch: pytest.MonkeyPatch) -> None:

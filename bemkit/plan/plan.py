@@ -198,7 +198,7 @@ def _contact_items(scene: Scene, sizes: Sizes, n_steps: int) -> Iterator[PlanIte
     yield PlanItem("contact system", True, f"{n} nodes may touch; every contact step solves for {c} unknowns")
     yield PlanItem("second elastic body", False, "the obstacles are rigid")
     yield friction_item(scene.laws.values(), ", static" if n_steps == 1 else ", incremental")
-    tangential = f"{c - n} of {_count(n, 'contact node')}" if c > n else "frictionless"
+    tangential = f"{c - n} of {_count(n, 'contact node')}" if c > n else "supports give all of them"
     yield PlanItem("tangential unknowns", c > n, tangential)
     modes = "the supports hold all rigid motions"
     if n_free:

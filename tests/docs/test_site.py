@@ -130,7 +130,7 @@ def test_a_scene_of_the_gallery_that_fails_stops_the_build(
     make_gallery: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     text = shipped_files()["paper-1"].read_text("utf-8")
-    scene = text.replace('solver = "semismooth-newton"', 'solver = { kind = "semismooth-newton", max_steps = 1 }')
+    scene = f'solver = {{ kind = "semismooth-newton", max_steps = 1 }}\n{text}'
     (tmp_path / "short.toml").write_text(scene, "utf-8")
     monkeypatch.setattr(make_gallery, "FOLDER", tmp_path)
     with pytest.raises(RuntimeError, match=r"short\.toml ended with MAX_STEPS"):

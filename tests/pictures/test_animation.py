@@ -72,6 +72,3 @@ def test_animations_that_cannot_be_written_are_refused(
             save_animation(tmp_path / name, steps)
     with pytest.raises(bk.InputError, match="steps_per_second is 0: give a whole number from 1 to 60"):
         save_animation(tmp_path / "a.gif", steps, steps_per_second=0)
-    (tmp_path / "a.gif").write_text("mine", "utf-8")
-    with pytest.raises(OutputFileError, match="is not a moving picture"):
-        save_animation(tmp_path / "a.gif", steps)

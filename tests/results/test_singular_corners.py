@@ -30,7 +30,7 @@ BLOCK = bk.Scene(
     mesh=bk.MeshOptions(elements=40),
 )
 SLIDES, STICKS = 0.712937, 0.711173
-"""Exponents at right angles, for outward slip and for none; see `tests/operators/test_wedge.py`."""
+"""Exponents at right angles, for outward slip and for none; see `tests/results/test_wedge.py`."""
 
 
 @lru_cache

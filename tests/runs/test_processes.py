@@ -75,10 +75,10 @@ def test_workers_end_with_a_study_that_is_killed(tmp_path: Path, end: signal.Sig
     """Workers look for work in a queue of which they hold both ends: they would wait for more for ever."""
     sizes = ("--elements", "40,60,1600,1800" if is_at_work else "1600,1800", "--meshes", "uniform")
     choice = ("--solver", "semismooth-newton", "--discretisation", "linear", "--jobs", "2")
-    study = start(tmp_path, "study", "paper-1", *sizes, *choice, "-q", "-o", "rows.h5")
+    study = start(tmp_path, "study", "paper-1", *sizes, *choice, "-q", "-o", "rows.jsonl")
     try:
         wait_until(lambda: len(children_of(study.pid)) >= 3)  # two workers and the tracker of their resources
-        wait_until(lambda: not is_at_work or (tmp_path / "rows.h5").exists())
+        wait_until(lambda: not is_at_work or (tmp_path / "rows.jsonl").exists())
         workers = children_of(study.pid)
     finally:
         study.send_signal(end)

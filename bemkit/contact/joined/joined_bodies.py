@@ -107,7 +107,7 @@ class JoinedBodies(CoupledMembers, LinearBody):
         is_small = 2 * self.n_contact + self.motions.shape[1] <= MOST_DENSE
         moduli = [member.modulus for member in self.members]
         is_alike = max(moduli, default=1.0) <= MOST_CONTRAST * min(moduli, default=1.0)
-        return not (is_small and is_alike or self._node_coupling is not None)
+        return not ((is_small and is_alike) or self._node_coupling is not None)
 
     def respond(self, conditions: LinearConditions) -> ContactState:
         """Return relative displacements and tractions; see `LinearBody.respond`."""
