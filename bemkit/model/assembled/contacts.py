@@ -312,7 +312,7 @@ def obstacle_rows(
                 gap, on_other = gap + pair.gap, assembly.rigid[k].motions_at(touched)
             else:
                 title, part, law, other, on_other = f"{body.name}.{name}", name, body.scene.laws[name], -1, None
-            is_held = fixed[nodes.nodes].any(axis=1)
+            is_held = np.asarray(fixed[nodes.nodes].any(axis=1))
             moves = on_other is not None and bool(assembly.rigid[k].is_driven.any())
             yield ContactRows(
                 title,
@@ -332,7 +332,7 @@ def obstacle_rows(
                 np.zeros(0, np.intp),
                 nodes.is_shared | is_held,
                 np.zeros(nodes.nodes.size, bool),
-                is_held & moves,
+                is_held if moves else np.zeros_like(is_held),
             )
 
 
