@@ -20,6 +20,8 @@ from bemkit.results.contact_table import ContactTable
 from bemkit.results.solved_body import SolvedBody
 from bemkit.scene.conditions import Contact
 
+_SAME_POINT = 1e-9
+"""Distance of neighbouring points, relative to the next one, below which they are one point: the end of an element."""
 _POINTS_PER_NODE = 4
 """Points on an element for each of its nodes: a polynomial is larger between them by a few per cent at most."""
 _ROUND_OFF = 64.0 * float(np.finfo(float).eps)
@@ -238,11 +240,12 @@ def _deepest(values: PointsBetween) -> float:
     if not deepest > 0.0 or not 0 < k < values.clearance.size - 1:
         return deepest
     (before, after), clearance = np.diff(values.s[k - 1 : k + 2]), values.clearance[k - 1 : k + 2]
-    if not min(before, after) > 0.0:  # the end of an element
+    if not min(before, after) > _SAME_POINT * max(before, after):  # the end of an element
         return deepest
     fall, rise = -np.diff(clearance) / (before, after)
     curvature, slope = (rise - fall) / (before + after), (fall * after + rise * before) / (before + after)
-    return deepest - float(0.25 * slope**2 / curvature) if curvature < 0.0 else deepest
+    is_between = curvature < 0.0 and -before <= -0.5 * slope / curvature <= after  # its end, off the deepest point
+    return deepest - float(0.25 * slope**2 / curvature) if is_between else deepest
 
 
 def points_between(degree: int) -> FloatArray:
