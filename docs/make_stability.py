@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import csv
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import fields
 from pathlib import Path
 
 from markers import between
@@ -15,11 +13,12 @@ from bemkit.scene.toml import with_overrides
 from bemkit.studies.stability.axes import AXES
 from bemkit.studies.stability.records import StabilityRecord, Verdict
 from bemkit.studies.stability.sweep import sweep
+from bemkit.table import Table, columns_of, markdown_table
 
 DOCS = Path(__file__).parent
 PAGE = DOCS / "stability.md"
 RUNS = (("paper-1", "linear"), ("paper-2", "constant"), ("paper-1", "constant"), ("paper-2", "linear"))
-COLUMNS = [field.name for field in fields(StabilityRecord) if field.name not in {"seconds", "message"}]  # reproducible
+COLUMNS = tuple(head for head in columns_of(StabilityRecord) if head.name not in {"seconds", "message"})  # reproducible
 
 
 def main() -> None:
@@ -34,36 +33,34 @@ def main() -> None:
 
 
 def write_rows(path: Path, records: Sequence[StabilityRecord]) -> None:
-    """Write the rows of one sweep, numbers to two digits."""
-    with path.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(COLUMNS)
-        for record in records:
-            values = [getattr(record, column) for column in COLUMNS]
-            writer.writerow([f"{value:.2g}" if isinstance(value, float) else value for value in values])
+    """Write the rows of one sweep as people read them."""
+    rows = (tuple(head.cell(getattr(record, head.name)) for head in COLUMNS) for record in records)
+    path.write_text(Table(COLUMNS, tuple(rows)).to_csv(), "utf-8")
 
 
 def summary(records: dict[tuple[str, str], list[StabilityRecord]]) -> str:
     """Return the number of rows with each verdict, one line for a sweep."""
-    lines = ["| scene | elements | rows | " + " | ".join(v.value for v in Verdict) + " |", "|---|---|" + "---:|" * 6]
+    verdicts = [verdict.value for verdict in Verdict]
+    lines = []
     for (name, discretisation), rows in records.items():
         counts = Counter(row.verdict for row in rows)
-        numbers = " | ".join(str(counts[verdict.value]) for verdict in Verdict)
-        lines.append(f"| `{name}` | {discretisation} | {len(rows)} | {numbers} |")
-    return "\n".join(lines)
+        numbers = [str(counts[verdict]) for verdict in verdicts]
+        lines.append([f"`{name}`", discretisation, str(len(rows)), *numbers])
+    heads = ["scene", "elements", "rows", *verdicts]
+    return markdown_table(heads, lines, [False, False, *(True,) * (len(heads) - 2)]).rstrip()
 
 
 def table_of_axes(records: Sequence[StabilityRecord]) -> str:
     """Return what each axis varies, from where to where, its promise and its verdicts."""
-    lines = ["| axis | quantity | range | promise | right | named |", "|---|---|---|---|---:|---:|"]
+    lines = []
     for axis in AXES:
         rows = [record for record in records if record.axis == axis.name]
         values = sorted(row.value for row in rows)
         counts = Counter(row.verdict for row in rows)
-        label = axis.label.replace("|", r"\|")
         span = f"{values[0]:g} ... {values[-1]:g}"
-        lines.append(f"| `{axis.name}` | {label} | {span} | {axis.promise} | {counts['right']} | {counts['named']} |")
-    return "\n".join(lines)
+        lines.append([f"`{axis.name}`", axis.label, span, axis.promise, str(counts["right"]), str(counts["named"])])
+    heads = ["axis", "quantity", "range", "promise", "right", "named"]
+    return markdown_table(heads, lines, [False] * 4 + [True] * 2).rstrip()
 
 
 if __name__ == "__main__":
