@@ -12,7 +12,6 @@ import numpy as np
 from bemkit.arrays import FloatArray
 from bemkit.contact.body import ContactState
 from bemkit.contact.condensation.dense_body import DenseBody
-from bemkit.contact.condensation.exact_motions import resisting_none
 from bemkit.contact.condensation.node_coupling import NodeCoupling
 from bemkit.contact.condensation.nodes import ContactNodes, NoContactNodesError
 from bemkit.contact.condensation.whole_body import WholeBody
@@ -46,12 +45,11 @@ class DirectBody(DenseBody):
         """Return a body whose contact nodes are retained."""
         coupling = NodeCoupling.of(whole.conditions, nodes)
         motions = coupling.moved(whole.motions)
-        of_unknowns = motions.reshape(len(motions), 2 * len(nodes.nodes))[:, coupling.unknown_dofs]
-        stiffness = resisting_none(coupling.stiffness(whole.stiffness), of_unknowns)
+        stiffness = coupling.stiffness(whole.stiffness, motions)
         offset = _prescribed(whole.conditions, nodes)
         return cls(
             stiffness=stiffness,
-            load=_load(whole, coupling, stiffness, offset),
+            load=coupling.load(whole.load, stiffness, offset),
             weights=nodes.weights,
             motions=motions,
             following_tangents=coupling.following(offset),
@@ -85,7 +83,7 @@ class DirectBody(DenseBody):
             self,
             whole=whole,
             offset=offset,
-            load=_load(whole, self.coupling, self.stiffness, offset),
+            load=self.coupling.load(whole.load, self.stiffness, offset),
             following_tangents=self.coupling.following(offset),
         )
 
@@ -110,11 +108,6 @@ def _prescribed(conditions: NodalConditions, nodes: ContactNodes) -> FloatArray:
     fixed = np.where(conditions.is_fixed, conditions.displacement, 0.0)[nodes.nodes]
     given = np.einsum("nkc,nk->nc", conditions.frame[nodes.nodes], fixed)
     return np.asarray(np.einsum("nkc,nc->nk", nodes.frame, given)).ravel()
-
-
-def _load(whole: WholeBody, coupling: NodeCoupling, stiffness: FloatArray, offset: FloatArray) -> FloatArray:
-    """Return the load (n_unknowns,) on the unknowns: ``K_w o + R^T f``."""
-    return coupling.on_unknowns(whole.load) + stiffness @ offset[coupling.unknown_dofs]
 
 
 def condensed_body(

@@ -14,6 +14,7 @@ import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray, IntArray
 from bemkit.contact.condensation.dense_body import FollowingTangents
+from bemkit.contact.condensation.exact_motions import resisting_none
 from bemkit.contact.condensation.nodes import ContactNodes
 from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions
 
@@ -157,6 +158,14 @@ class NodeCoupling:
         at_rest = offset[2 * nodes + 1] - self.follow @ offset[self.unknown_dofs]
         return FollowingTangents(nodes, self.follow, at_rest)
 
-    def stiffness(self, of_body: FloatArray) -> FloatArray:
-        """Return ``R^T K R`` (n_unknowns, n_unknowns) of the stiffness (n_retained, n_retained) of the body."""
-        return self.on_unknowns(self.on_unknowns(of_body.T).T)
+    def stiffness(self, of_body: FloatArray, motions: FloatArray) -> FloatArray:
+        """Return ``R^T K R`` (n_unknowns, n_unknowns) of the stiffness (n_retained, n_retained) of the body.
+
+        It resists none of the rigid motions (n_motions, n_contact, 2) of the contact nodes; see `resisting_none`.
+        """
+        of_unknowns = motions.reshape(-1, 2 * len(self.columns))[:, self.unknown_dofs]
+        return resisting_none(self.on_unknowns(self.on_unknowns(of_body.T).T), of_unknowns)
+
+    def load(self, of_body: FloatArray, stiffness: FloatArray, offset: FloatArray) -> FloatArray:
+        """Return the load (n_unknowns,) ``K_w o + R^T f`` of that on the body under an offset (2 n_contact,) [m]."""
+        return self.on_unknowns(of_body) + stiffness @ offset[self.unknown_dofs]

@@ -8,7 +8,6 @@ import numpy as np
 
 from bemkit.arrays import FloatArray
 from bemkit.contact.condensation.dense_body import DenseBody, FollowingTangents
-from bemkit.contact.condensation.exact_motions import resisting_none
 from bemkit.contact.condensation.node_coupling import NodeCoupling
 from bemkit.contact.joined.coupled_members import CoupledMembers
 from bemkit.operators.linear.dense import DenseLU
@@ -28,15 +27,14 @@ class DirectStiffness:
         (shape,) = joined.shapes
         self.coupling = coupling
         self._motions = coupling.moved(shape.motions.T)
-        of_unknowns = self._motions.reshape(-1, 2 * joined.n_contact)[:, coupling.unknown_dofs]
-        self._stiffness = resisting_none(coupling.stiffness(shape.member.stiffness), of_unknowns)
+        self._stiffness = coupling.stiffness(shape.member.stiffness, self._motions)
 
     def body(self, joined: CoupledMembers) -> DenseBody:
         """Return the body under the loads and offsets of `joined`."""
         coupling, offset = self.coupling, joined.offset
         return DenseBody(
             stiffness=self._stiffness,
-            load=coupling.on_unknowns(joined.load) + self._stiffness @ offset[coupling.unknown_dofs],
+            load=coupling.load(joined.load, self._stiffness, offset),
             weights=joined.weights,
             motions=self._motions,
             following_tangents=coupling.following(offset),
