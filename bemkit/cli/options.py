@@ -1,4 +1,4 @@
-"""What several commands have in common: degrees, pictures, where results go, progress."""
+"""What several commands have in common: changes of the scene, degrees, pictures, where results go, progress."""
 
 from __future__ import annotations
 
@@ -21,6 +21,11 @@ if TYPE_CHECKING:
     from bemkit.studies.engine import Task
     from bemkit.studies.row_file import R
     from bemkit.table import Table
+
+
+settings_option = click.option(
+    "--set", "settings", multiple=True, metavar="KEY=VALUE", help="Change the scene at a key of its file; repeatable."
+)
 
 
 def degree_of(context: click.Context, parameter: click.Parameter, value: str | None) -> int | Literal["hp"] | None:

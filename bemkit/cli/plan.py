@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Literal
 
 import click
 
-from bemkit.cli.options import degree_of, shown_progress
+from bemkit.cli.options import degree_of, settings_option, shown_progress
 from bemkit.cli.outputs import STDOUT, TextFile
 from bemkit.errors import concerning
 from bemkit.table import json_text
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
 @click.command()
 @click.argument("scene")
+@settings_option
 @click.option("--elements", type=int, metavar="N", help="Number of boundary elements, instead of the scene's.")
 @click.option("--accuracy", type=float, metavar="E", help="Plan the first mesh towards a relative error below E.")
 @click.option("--discretisation", metavar="WORD", help="hp, quadratic, linear or constant, instead of the scene's.")
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
 @click.option("--json", "json_file", metavar="FILE", help="Write the plan as JSON; - is standard output.")
 def plan(
     scene: str,
+    settings: tuple[str, ...],
     elements: int | None,
     accuracy: float | None,
     discretisation: str | None,
@@ -36,12 +38,17 @@ def plan(
 ) -> None:
     """Say what SCENE needs and what it leaves out, without solving it."""
     with shown_progress(json_file is not None):
+        from bemkit.scene.places import with_settings
         from bemkit.scene.toml import load_scene, with_overrides
 
         text = TextFile(json_file, _as_json)
         text.check()
         chosen = with_overrides(
-            load_scene(scene), elements=elements, accuracy=accuracy, discretisation=discretisation, degree=degree
+            with_settings(load_scene(scene), settings),
+            elements=elements,
+            accuracy=accuracy,
+            discretisation=discretisation,
+            degree=degree,
         )
         with concerning(scene):
             made = _planned(chosen)

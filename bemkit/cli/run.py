@@ -18,6 +18,7 @@ from bemkit.cli.options import (
     pictures_of,
     reserve,
     result_target,
+    settings_option,
     shown_progress,
     write_animation,
 )
@@ -39,6 +40,7 @@ if TYPE_CHECKING:
 @click.option("--csv", "csv_file", metavar="FILE", help="Write the contact table as CSV; - is standard output.")
 @click.option("--plot", "folder", metavar="DIR", help="Draw figures into a folder.")
 @click.option("--what", metavar="NAME,...", callback=pictures_of, help="Which figures; bemkit plot --help lists them.")
+@settings_option
 @click.option("--elements", type=int, metavar="N", help="Number of boundary elements, instead of the scene's.")
 @click.option("--accuracy", type=float, metavar="E", help="Refine until the estimated relative error is below E.")
 @click.option("--discretisation", metavar="WORD", help="hp, quadratic, linear or constant, instead of the scene's.")
@@ -58,6 +60,7 @@ def run(
     csv_file: str | None,
     folder: str | None,
     what: tuple[str, ...] | None,
+    settings: tuple[str, ...],
     elements: int | None,
     accuracy: float | None,
     discretisation: str | None,
@@ -71,12 +74,13 @@ def run(
     """Solve SCENE, a TOML file or the name of a shipped scene."""
     with ExitStack() as stack:
         callback = stack.enter_context(shown_progress(quiet))  # shown before anything is loaded
+        from bemkit.scene.places import with_settings
         from bemkit.scene.toml import load_scene, with_overrides
 
         outputs = outputs_of(json_file, csv_file, folder, what=what)
         reserve(outputs.check(result_target(output, inside)))
         chosen = with_overrides(
-            load_scene(scene),
+            with_settings(load_scene(scene), settings),
             elements=elements,
             accuracy=accuracy,
             discretisation=discretisation,

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 from bemkit.cli.exit_codes import NOT_CONVERGED
-from bemkit.cli.options import StudyProgress, reserve, study_output
+from bemkit.cli.options import StudyProgress, reserve, settings_option, study_output
 from bemkit.cli.outputs import Outputs, TextFile
 from bemkit.errors import concerning
 
@@ -23,6 +23,7 @@ DEFAULT_SHOWN = "force_tangential"
 
 @click.command()
 @click.argument("scene")
+@settings_option
 @click.option("--vary", multiple=True, required=True, metavar="KEY=...", help="A:B:N or A,B,...; several make a grid.")
 @click.option("-o", "--output", metavar="FILE", help="Rows as .csv, .json, .md, .h5; .jsonl also resumes.")
 @click.option("--csv", "csv_file", metavar="FILE", help="Write all rows as CSV; - is standard output.")
@@ -39,6 +40,7 @@ DEFAULT_SHOWN = "force_tangential"
 @click.option("-q", "--quiet", is_flag=True, help="Print neither progress nor the table.")
 def sweep(
     scene: str,
+    settings: tuple[str, ...],
     vary: tuple[str, ...],
     output: str | None,
     csv_file: str | None,
@@ -63,6 +65,7 @@ def sweep(
     if folder is None and (over is not None or show):
         raise click.UsageError("--over and --show go with figures: add --plot DIR")
     with StudyProgress(quiet) as progress:
+        from bemkit.scene.places import with_settings
         from bemkit.scene.toml import load_scene, with_overrides
         from bemkit.studies.sweep.grid import read_variations
         from bemkit.studies.sweep.records import FILE
@@ -75,7 +78,8 @@ def sweep(
         outputs = Outputs(texts, folder, *_figures(tuple(values), over, show or (DEFAULT_SHOWN,)))
         own = FILE.check(rows)  # reserved by the sweep itself
         reserve(path for path in outputs.check(own) if path not in own)
-        chosen = with_overrides(load_scene(scene), elements=elements, accuracy=accuracy, discretisation=discretisation)
+        base = with_settings(load_scene(scene), settings)
+        chosen = with_overrides(base, elements=elements, accuracy=accuracy, discretisation=discretisation)
         computed = partial(progress.compute, name="sweep", processes=jobs or 1, cluster=cluster)
         with concerning(scene):
             found = run_sweep(chosen, values, computed, file=rows, cold=cold)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, is_dataclass, replace
 from types import UnionType
 from typing import Any, TypeVar, Union, cast, get_args, get_origin
@@ -56,6 +56,44 @@ class Place:
         """The names and numbers of the path, from the outside in."""
         steps = _STEP.findall(self.text)
         return tuple(int(name[1:-1]) if name.startswith("[") else name.strip('"') for name in steps)
+
+
+def read_setting(text: str) -> tuple[Place, object]:
+    """Return place and value of ``KEY=VALUE``, the value as in scene files; a word needs no quotation marks.
+
+    Raises
+    ------
+    PlaceError
+        If the text has another form.
+    """
+    import tomllib
+
+    # the key of a scene file may hold an equals sign only inside quotation marks
+    found = re.fullmatch(r'\s*((?:"[^"]*"|[^"=])+?)\s*=\s*(.+?)\s*', text, re.DOTALL)
+    if not found:
+        raise PlaceError(f"set is {text!r}: give KEY=VALUE, such as law.friction_coefficient=0.3")
+    place, value = Place(found[1]), found[2]
+    try:
+        return place, tomllib.loads(f"value = {value}")["value"]
+    except (tomllib.TOMLDecodeError, KeyError, ValueError, RecursionError):
+        if value[0] in "[{\"'":
+            raise PlaceError(
+                f"{place.text}: {value!r} is no value of a scene file: check brackets and quotes"
+            ) from None
+        return place, value
+
+
+def with_settings(scene: Node, texts: Sequence[str]) -> Node:
+    """Return a scene with other values at some places, each given as ``KEY=VALUE``; see `with_value`.
+
+    Raises
+    ------
+    PlaceError
+        If a text has another form, there is no such place, or its value does not fit there.
+    """
+    for text in texts:
+        scene = with_value(scene, *read_setting(text))
+    return scene
 
 
 def value_at(scene: object, place: Place) -> Any:

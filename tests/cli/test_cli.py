@@ -75,6 +75,20 @@ def test_json_on_standard_output_is_one_object(capsys: pytest.CaptureFixture[str
     assert {"x", "y", "s", "from", "to"} <= set(result["transitions"][0])
 
 
+def test_a_scene_is_changed_by_its_keys(capsys: pytest.CaptureFixture[str]) -> None:
+    changes = ["--set", "law.friction_coefficient=0", "--set", "title=Smooth ground", "--set", "mesh.elements = 44"]
+    assert call("run", "paper-1", *changes, "--json", "-") == 0
+    result = json.loads(capsys.readouterr().out)
+    assert (result["title"], result["n_elements"]) == ("Smooth ground", 44)
+    assert result["force_tangential"] == 0.0
+    assert call("plan", "paper-1", "--set", "mesh.elements=44", "--json", "-") == 0
+    assert json.loads(capsys.readouterr().out)["work"]["element_pairs"] == 44**2
+    vary = ["--vary", "law.friction_coefficient=0.2,0.5"]
+    assert call("sweep", "paper-1", *changes, *vary, "--json", "-") == 0
+    rows = json.loads(capsys.readouterr().out)
+    assert len(rows["rows"] if isinstance(rows, dict) else rows) == 2
+
+
 def test_an_accuracy_instead_of_elements(capsys: pytest.CaptureFixture[str]) -> None:
     assert call("run", "paper-2", "--discretisation", "quadratic", "--accuracy", "1e-2", "--json", "-") == 0
     result = json.loads(capsys.readouterr().out)
@@ -231,6 +245,10 @@ def one_line_error(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
         (["run", "paper-1", "--discretisation", "cubic"], "unknown discretisation 'cubic'"),
         (["run", "paper-1", "--rho", "-1"], "rho"),
         (["run", "paper-1", "--bogus"], "--bogus"),
+        (["run", "paper-1", "--set", "law.friction"], "set is 'law.friction': give KEY=VALUE"),
+        (["run", "paper-1", "--set", "law.friction=1"], "law.friction: unknown key.*did you mean"),
+        (["run", "paper-1", "--set", "mesh.elements=[1"], r"mesh.elements: '\[1' is no value of a scene file"),
+        (["run", "paper-1", "--set", "mesh.elements=many"], "mesh.elements: .*many"),
         (["run"], "Missing argument"),
         (["bogus"], "No such command"),
         (["run", "paper-1", "-o", "no/r.h5"], "the folder .* does not exist"),
