@@ -195,7 +195,7 @@ def _chained(points: FloatArray, edges: Sequence[_Edge]) -> list[ChordLoop]:
     if (wrong := np.flatnonzero(count != 2)).size:
         raise GeometryError(
             f"{count[wrong[0]]} lines of its boundary meet at {format_point(points[nodes[wrong[0]]])}: the boundary "
-            "must be closed and simple, two lines at each node; leave lines inside the body out, or write its "
+            "must be closed and simple, two lines at each node; remove lines inside the body, or write its "
             "triangles too"
         )
     return [

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+import shlex
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
@@ -121,7 +122,7 @@ def join_strokes(strokes: Sequence[Stroke], tolerance: float) -> tuple[list[list
         count = int(np.count_nonzero(np.bincount(place_of_end, weights=gaps) > _ROUND_OFF * np.abs(ends).max()))
         which = "1 gap" if count == 1 else f"{count} gaps"
         notes.append(f"closed: {which} between ends of lines, of up to {2.0 * gaps.max():.2g}")
-    _check_degrees(places, place_of_end, tolerance)
+    _check_degrees(places, place_of_end.reshape(-1, 2), [stroke.side.group for stroke in strokes], tolerance)
     strokes = [
         _with_ends(stroke, *places[pair]) for stroke, pair in zip(strokes, place_of_end.reshape(-1, 2), strict=True)
     ]
@@ -174,24 +175,67 @@ def _merged(points: FloatArray, tolerance: float) -> tuple[FloatArray, IntArray]
     return low + np.stack(offsets, axis=1) / counts[:, None], place.astype(np.intp)  # exact where points are the same
 
 
-def _check_degrees(places: FloatArray, place_of_end: IntArray, tolerance: float) -> None:
-    degree = np.bincount(place_of_end)
+def _check_degrees(places: FloatArray, ends: IntArray, groups: Sequence[str], tolerance: float) -> None:
+    """Raise unless two lines meet at each place; the message names the groups that close by themselves.
+
+    Parameters
+    ----------
+    places : (m, 2) array [m]
+    ends : (n, 2) int array
+        Numbers of the places where each stroke starts and ends.
+    groups : sequence of str
+        What the file calls each stroke.
+    tolerance : float [m]
+    """
+    degree = np.bincount(ends.ravel())
+    if (degree == 2).all():
+        return
+    remedy = _groups_that_close(ends, groups)
     if (degree > 2).any():
         crowd = int(np.argmax(degree > 2))
+        named = _in_groups(groups[int(k)] for k in np.flatnonzero((ends == crowd).any(axis=1)))
         raise GeometryError(
-            f"{degree[crowd]} lines meet at {format_point(places[crowd])}, where a boundary has two: leave lines "
-            "inside the body and beside it out, or name the right ones with only"
+            f"{degree[crowd]} lines{named} meet at {format_point(places[crowd])}, where a boundary has two: "
+            + (remedy or "remove lines inside the body and beside it, or name the right ones with only")
         )
     loose = np.flatnonzero(degree == 1)
-    if loose.size:
-        first, others = places[loose[0]], places[loose[1:]]
-        distances = norms(others - first)
-        nearest = int(np.argmin(distances))
-        raise GeometryError(
-            f"the outline is open: a line ends at {format_point(first)}, and the nearest loose end is "
-            f"{distances[nearest]:.3g} away at {format_point(others[nearest])} ({loose.size} ends are loose): close "
-            f"the gaps, or give a tolerance above {tolerance:.2g}"
-        )
+    first, others = places[loose[0]], places[loose[1:]]
+    named = _in_groups(groups[int(k)] for k in np.flatnonzero((ends == loose[0]).any(axis=1)))
+    distances = norms(others - first)
+    nearest = int(np.argmin(distances))
+    raise GeometryError(
+        f"the outline is open: a line{named} ends at {format_point(first)}, and the nearest loose end is "
+        f"{distances[nearest]:.3g} away at {format_point(others[nearest])} ({loose.size} ends are loose): "
+        + (remedy or f"close the gaps, or give a tolerance above {tolerance:.2g}")
+    )
+
+
+def _in_groups(groups: Iterable[str]) -> str:
+    names = sorted({*groups} - {""})
+    return f" of {', '.join(map(repr, names))}" if names else ""
+
+
+def _groups_that_close(ends: IntArray, groups: Sequence[str]) -> str:
+    """Return as a remedy the groups whose strokes form closed loops without those of others; empty if there are none.
+
+    Tried are all groups but one, then those that close by themselves.
+    """
+    of_group = np.array(groups)
+    names = sorted({*groups})
+
+    def is_closed(kept: list[str]) -> bool:
+        return bool(kept) and set(np.bincount(ends[np.isin(of_group, kept)].ravel()).tolist()) <= {0, 2}
+
+    candidates = [[name for name in names if name != dropped] for dropped in names if dropped]
+    candidates.append([name for name in names if is_closed([name])])
+    kept = next(filter(is_closed, candidates), [])
+    if not kept:
+        return ""
+    dropped = _in_groups(set(names) - set(kept))
+    listed = ", ".join(map(repr, kept))
+    words = " ".join(f"--only {shlex.quote(name)}" for name in kept)
+    remedy = "name the others with only" if "" in kept else f"write only = [{listed}], or {words}"
+    return f"without the lines{dropped} the outline is closed: {remedy}"
 
 
 def _with_ends(stroke: Stroke, start: FloatArray, end: FloatArray) -> Stroke:

@@ -61,6 +61,26 @@ def test_gaps_within_the_tolerance_are_closed_and_said(tmp_path) -> None:
 
 
 @needs_ezdxf
+def test_open_lines_name_their_layer_and_the_layers_that_close(tmp_path) -> None:
+    square = [(0, 0, 1, 0), (1, 0, 1, 1), (1, 1, 0, 1), (0, 1, 0, 0)]
+    outline = [line("PLATE", *ends) for ends in square]
+    with pytest.raises(
+        GeometryError,
+        match=r"a line of 'AXIS' ends at .* \(2 ends are loose\): without the lines of 'AXIS' the outline is "
+        r"closed: write only = \['PLATE'\], or --only PLATE",
+    ):
+        read(tmp_path, "axis.dxf", dxf(*outline, line("AXIS", -1, 0.5, 2, 0.5)))
+    with pytest.raises(
+        GeometryError, match=r"3 lines of 'PLATE', 'RIB' meet at \(0, 0\).*: without the lines of 'RIB'"
+    ):
+        read(tmp_path, "rib.dxf", dxf(*outline, line("RIB", 0, 0, 1, 1)))
+    shape = read(tmp_path, "rib.dxf", dxf(*outline, line("RIB", 0, 0, 1, 1)), only=("PLATE",))
+    assert areas(shape) == [1.0]
+    with pytest.raises(GeometryError, match=r"3 lines meet at .* remove lines inside the body"):
+        read(tmp_path, "one.dxf", dxf(*(line("0", *ends) for ends in [*square, (0, 0, 1, 1)])))
+
+
+@needs_ezdxf
 def test_lines_drawn_twice_and_specks_are_left_out(tmp_path) -> None:
     twice = (*FRAME, line("0", 9, 9, 9, 0), line("0", 5, 5, 5.00001, 5), "CIRCLE 8 0 10 4 20 4 40 1")
     shape = read(tmp_path, "twice.dxf", dxf(*twice))
@@ -125,7 +145,10 @@ def test_blocks_are_placed_and_mirrored(tmp_path) -> None:
 @needs_ezdxf
 def test_layers_that_are_off_and_those_that_are_not_chosen_are_left_out(tmp_path) -> None:
     both = dxf(*PART_DXF, line("CUT", 0, 0, 3, 1.5))
-    with pytest.raises(GeometryError, match=r"3 lines meet at \(0, 0\), where a boundary has two: leave lines"):
+    remedy = (
+        r"where a boundary has two: without the lines of 'CUT' the outline is closed: write only = \['BODY', 'FOOT'"
+    )
+    with pytest.raises(GeometryError, match=r"3 lines of 'CUT', 'FOOT', 'WALL' meet at \(0, 0\), " + remedy):
         read(tmp_path, "part.dxf", both)
     shape = read(tmp_path, "part.dxf", both, only=("FOOT", "WALL", "BODY"))
     assert names(shape) == ["FOOT", "WALL-1", "BODY-1", "BODY-2", "WALL-2"]
