@@ -118,15 +118,34 @@ def with_value(scene: Node, place: Place, value: object) -> Node:
     scene : Scene or Assembly
     place : Place
     value : object
-        As scene files state it (a number, a formula, a word, a list or a table), or an object of Python.
+        As scene files state it (a number, also with a unit, a formula, a word, a list or a table), or an object of
+        Python.
 
     Raises
     ------
     PlaceError
         If there is no such place, or the value does not fit there.
     """
-    changed: Node = _replaced(scene, type(scene), place.names, value, "")
+    changed: Node = _replaced(scene, type(scene), place.names, _without_unit(scene, place, value), "")
     return changed
+
+
+def _without_unit(scene: Any, place: Place, value: object) -> object:
+    """Return a number with a unit as a number in the units of the scene, every other value as it is."""
+    *outer, name = place.names
+    if not isinstance(value, str) or isinstance(name, int):
+        return value
+    owner, declared, path = scene, cast(Any, type(scene)), ""
+    for each in outer:
+        owner, declared, path = _inside(owner, declared, each, path)
+    if not is_dataclass(owner):
+        return value
+    from bemkit.scene.quantities import in_units_of_scene
+
+    try:
+        return in_units_of_scene(value, cast(type, type(owner)), name, scene.units)
+    except InputError as error:
+        raise PlaceError(f"{place.text}: {error}") from error
 
 
 def _replaced(node: Any, declared: Any, names: tuple[str | int, ...], value: object, path: str) -> Any:

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import inspect
 import math
-import re
 from collections.abc import Callable, Mapping
 from dataclasses import Field, fields, is_dataclass
 from enum import Enum
@@ -20,10 +19,13 @@ from bemkit.errors import InputError
 from bemkit.formulas import Expression
 from bemkit.scene.assembly import Assembly
 from bemkit.scene.declared_types import default_of, heading_of, hints_of, is_required, options_of, registry_of
+from bemkit.scene.docstrings import parameters, summary
 from bemkit.scene.registry import RISING, Registry
 from bemkit.scene.scene import Scene
 from bemkit.scene.serialisation import unstructure
 
+_QUANTITY = r"^\s*[+-]?[\d.]+([eE][+-]?\d+)?\s*[^\d\s.,]"
+"""A number with a unit."""
 DRAFT = "http://json-schema.org/draft-07/schema#"
 Schema = dict[str, Any]
 
@@ -35,8 +37,6 @@ _PLAIN: tuple[tuple[Any, Schema], ...] = (
     (Expression, {"type": "string"}),
     (FloatArray, {"type": "array", "items": {"type": ["number", "array"]}}),
 )
-_SECTION = re.compile(r"^(\w[\w ]*)\n-{3,}\n", re.MULTILINE)
-_UNIT = re.compile(r"\[([^\]]+)\]\s*$")
 
 
 def scene_schema() -> Schema:
@@ -208,48 +208,24 @@ def _any_of(schemas: list[Schema]) -> Schema:
     return {"anyOf": schemas}
 
 
+def _with_unit(schema: Schema) -> Schema:
+    """Return the schema of a value whose numbers may have a unit, such as "210 GPa"."""
+    kinds = schema.get("type")
+    if kinds == "array" and isinstance(items := schema.get("items"), list):
+        return schema | {"items": [_with_unit(item) for item in items]}
+    if kinds == "number" or (isinstance(kinds, list) and "number" in kinds and "string" not in kinds):
+        return schema | {"type": [*([kinds] if isinstance(kinds, str) else kinds), "string"], "pattern": _QUANTITY}
+    return schema
+
+
 def _described(schema: Schema, entry: Field[Any], declared: Any, text: str) -> Schema:
     """Return a schema with the description and the default of a key."""
     described: Schema = {"description": text} if text else {}
+    if text.startswith("["):
+        schema = _with_unit(schema)
     if not is_required(entry) and "additionalProperties" not in schema:
         default = default_of(entry)
         if default is not None and default != math.inf:  # JSON has no infinity
             described["default"] = unstructure(default, declared)
     # beside a reference nothing else counts in draft 7
     return ({"allOf": [schema]} if "$ref" in schema and described else schema) | described
-
-
-def summary(docstring: str) -> str:
-    """Return the first paragraph of a docstring, as one line."""
-    return _plain(docstring.strip().partition("\n\n")[0])
-
-
-def parameters(docstring: str) -> dict[str, str]:
-    """Return what a docstring says of each parameter, as one line that begins with the unit if there is one.
-
-    Parameters
-    ----------
-    docstring : str
-        With the indentation removed, as `inspect.getdoc` returns it.
-    """
-    texts: dict[str, str] = {}
-    names: list[str] = []
-    for line in _section(docstring, "Parameters").splitlines():
-        if line[:1].strip():  # not indented: the names, and what they are
-            heading, _, kind = line.partition(" : ")
-            unit = _UNIT.search(kind)
-            names = [name.strip() for name in heading.split(",")]
-            texts |= dict.fromkeys(names, f"[{unit[1]}]" if unit else "")
-        else:
-            texts |= {name: f"{texts[name]} {_plain(line)}".strip() for name in names}
-    return texts
-
-
-def _section(docstring: str, heading: str) -> str:
-    pieces = _SECTION.split(docstring)
-    return next((text for name, text in zip(pieces[1::2], pieces[2::2], strict=True) if name == heading), "")
-
-
-def _plain(text: str) -> str:
-    """Return a text without marks of reStructuredText and line breaks."""
-    return " ".join(text.replace("``", "").replace("`", "").split())

@@ -10,7 +10,7 @@ import math
 import re
 import types
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import Field, fields, is_dataclass
+from dataclasses import Field, dataclass, fields, is_dataclass, replace
 from enum import Enum
 from functools import cache
 from typing import Any, TypeVar, cast, get_args, get_origin
@@ -22,7 +22,9 @@ from bemkit.contact.laws import FrictionLaw
 from bemkit.errors import InputError
 from bemkit.formulas import Expression, closest, nearest, shorten
 from bemkit.scene.declared_types import default_of, heading_of, hints_of, is_required, options_of, registry_of
+from bemkit.scene.quantities import in_units_of_scene
 from bemkit.scene.registry import LAWS, SYNONYMS, Registry
+from bemkit.scene.unit_names import UnitNames
 
 T = TypeVar("T")
 
@@ -61,13 +63,15 @@ class UnstructureError(InputError):
     """An object that cannot be written as a table."""
 
 
-def structure(table: object, declared: type[T]) -> T:
+def structure(table: object, declared: type[T], units: UnitNames | None = None) -> T:
     """Turn a table into an object.
 
     Parameters
     ----------
     table : dict, list, str, number or bool
     declared : type
+    units : UnitNames, optional
+        Those of the scene, to which numbers with units such as ``"210 GPa"`` are converted.
 
     Returns
     -------
@@ -79,7 +83,7 @@ def structure(table: object, declared: type[T]) -> T:
         With all mistakes, each naming the key, the value and the remedy.
     """
     try:
-        return cast(T, _structured(table, declared, ""))
+        return cast(T, _structured(table, declared, _Place("", units)))
     except RecursionError:
         raise StructureError(["nested too deeply: simplify it"]) from None
 
@@ -171,22 +175,40 @@ def _is_default(content: object, entry: Field[Any]) -> bool:
     return type(content) is type(default) and bool(np.all(content == default))
 
 
-def _structured(value: object, declared: Any, path: str) -> Any:
+@dataclass(frozen=True)
+class _Place:
+    """Where a value stands: the path of its key, the units of its scene, and the class and name of its field if any."""
+
+    path: str
+    units: UnitNames | None
+    field: tuple[type, str] | None = None
+
+    def key(self, name: str, owner: type | None = None) -> _Place:
+        path = f"{self.path}.{name}" if self.path else name
+        return _Place(path, self.units, (owner, name) if owner is not None else None)
+
+    def entry(self, index: int) -> _Place:
+        return replace(self, path=f"{self.path}[{index}]")
+
+
+def _structured(value: object, declared: Any, at: _Place) -> Any:
     """Return the object of a declared type that a value states; see `structure`."""
-    return _at(path, _reader_of(declared), value, declared, path)
+    if at.field is not None and isinstance(value, str):
+        value = _made(at, in_units_of_scene, value, *at.field, at.units)
+    return _made(at, _reader_of(declared), value, declared, at)
 
 
-def _at(path: str, function: Callable[..., Any], *arguments: Any, **values: Any) -> Any:
+def _made(at: _Place, function: Callable[..., Any], *arguments: Any, **values: Any) -> Any:
     """Return what a function makes of the text of the user; its error becomes a mistake at the path."""
     try:
         return function(*arguments, **values)
     except (StructureError, RecursionError):
         raise
     except Exception as error:  # whatever a constructor raised, it rejects the text
-        raise StructureError([f"{path}: {error}" if path else str(error)]) from error
+        raise StructureError([f"{at.path}: {error}" if at.path else str(error)]) from error
 
 
-def _structured_all(entries: Mapping[Any, tuple[object, Any, str]], mistakes: Iterable[str] = ()) -> dict[Any, Any]:
+def _structured_all(entries: Mapping[Any, tuple[object, Any, _Place]], mistakes: Iterable[str] = ()) -> dict[Any, Any]:
     """Return objects from several values, each with its type and path; all mistakes are raised together."""
     structured, found = {}, list(mistakes)
     for key, entry in entries.items():
@@ -200,8 +222,8 @@ def _structured_all(entries: Mapping[Any, tuple[object, Any, str]], mistakes: It
 
 
 @cache
-def _reader_of(declared: Any) -> Callable[[Any, Any, str], Any]:
-    """Return the function (value, declared, path) that reads values of a type."""
+def _reader_of(declared: Any) -> Callable[[Any, Any, _Place], Any]:
+    """Return the function (value, declared, at) that reads values of a type."""
     if heading_of(declared):
         return _named
     if registry_of(declared) is not None:
@@ -209,14 +231,14 @@ def _reader_of(declared: Any) -> Callable[[Any, Any, str], Any]:
     if options_of(declared):
         return _one_of
     if declared in _PLAIN:
-        return lambda value, declared, path: _PLAIN[declared](value)
+        return lambda value, declared, at: _PLAIN[declared](value)
     if get_origin(declared) is tuple:
         return _tuple
     if get_origin(declared) is Mapping:
         return _mapping
     if is_dataclass(declared):
         return _table
-    return _member if _is_class(declared, Enum) else lambda value, declared, path: value
+    return _member if _is_class(declared, Enum) else lambda value, declared, at: value
 
 
 def _number(value: object) -> float:
@@ -260,7 +282,7 @@ _PLAIN: Mapping[Any, Callable[[Any], Any]] = types.MappingProxyType(
 )
 
 
-def _member(value: object, declared: type[Enum], path: str) -> Enum:
+def _member(value: object, declared: type[Enum], at: _Place) -> Enum:
     words = [str(member.value) for member in declared]
     for member in declared:
         if member.value == value:
@@ -268,22 +290,21 @@ def _member(value: object, declared: type[Enum], path: str) -> Enum:
     raise InputError(f"{_show(value)} is unknown: give one of {', '.join(words)}{closest(str(value), words)}")
 
 
-def _tuple(value: object, declared: Any, path: str) -> tuple[Any, ...]:
+def _tuple(value: object, declared: Any, at: _Place) -> tuple[Any, ...]:
     items, inner = _exactly(value, list, "a list in square brackets"), get_args(declared)
     if len(inner) == 2 and inner[1] is Ellipsis:
         inner = (inner[0],) * len(items)
     if len(items) != len(inner):
         raise InputError(f"{_show(value)} has {len(items)} entries: give {len(inner)}")
-    entries = enumerate(zip(items, inner, strict=True))
-    return tuple(_structured_all({index: (*entry, f"{path}[{index}]") for index, entry in entries}).values())
+    return tuple(_structured_all({k: (items[k], inner[k], at.entry(k)) for k in range(len(items))}).values())
 
 
-def _mapping(value: object, declared: Any, path: str) -> dict[str, Any]:
+def _mapping(value: object, declared: Any, at: _Place) -> dict[str, Any]:
     items, inner = _exactly(value, dict, "a table"), get_args(declared)[1]
-    return _structured_all({key: (item, inner, _join(path, key)) for key, item in items.items()})
+    return _structured_all({key: (item, inner, at.key(key)) for key, item in items.items()})
 
 
-def _named(value: object, declared: Any, path: str) -> tuple[Any, ...]:
+def _named(value: object, declared: Any, at: _Place) -> tuple[Any, ...]:
     """Return the entries of a tuple from tables that are headed by their names."""
     entry_type, heading = get_args(declared)[0], heading_of(declared)
     of_bodies = ", in one of several bodies [bodies.BODY.parts.NAME]" if heading == "parts" else ""
@@ -291,39 +312,39 @@ def _named(value: object, declared: Any, path: str) -> tuple[Any, ...]:
     role = re.sub(r"(?<!^)(?=[A-Z])", " ", entry_type.__name__).lower()
     remedy = f"the name of a {role} stands in its heading [{heading}.NAME]"
     has_name = [name for name, table in tables.items() if isinstance(table, dict) and "name" in table]
-    mistakes = [f"{_join(path, name)}: unknown key 'name': {remedy}" for name in has_name]
+    mistakes = [f"{at.key(name).path}: unknown key 'name': {remedy}" for name in has_name]
     entries = {
-        name: ({"name": name, **table} if isinstance(table, dict) else table, entry_type, _join(path, name))
+        name: ({"name": name, **table} if isinstance(table, dict) else table, entry_type, at.key(name))
         for name, table in tables.items()
         if name not in has_name
     }
     return tuple(_structured_all(entries, mistakes).values())
 
 
-def _one_of(value: object, declared: Any, path: str) -> Any:
+def _one_of(value: object, declared: Any, at: _Place) -> Any:
     options = options_of(declared)
     for option in options:
         if _fits(value, option):
-            return _structured(value, option, path)
+            return _structured(value, option, at)
     raise InputError(f"{_show(value)} does not fit: give {' or '.join(_name(option) for option in options)}")
 
 
-def _tagged(value: object, declared: Any, path: str) -> Any:
+def _tagged(value: object, declared: Any, at: _Place) -> Any:
     """Return an object whose class is named by a word alone, or by the kind of a table."""
     registry = cast(Registry, registry_of(declared))  # the reader is chosen by it
     if isinstance(value, list) and registry.listed:
-        listed = _tuple(value, tuple[declared, ...], path)
-        return _at(path, registry.find(registry.listed), listed)
+        listed = _tuple(value, tuple[declared, ...], at)
+        return _made(at, registry.find(registry.listed), listed)
     table = {"kind": value} if isinstance(value, str) else value
     table = registry.with_options(_exactly(table, dict, f"a {registry.role} as a word or as a table with its kind"))
     if "kind" not in table:
         raise InputError(f"kind is missing: add kind = one of {', '.join(registry.words())}")
-    kind_path = _join(path, "kind")
-    named_class = _at(kind_path, registry.find, _structured(table.pop("kind"), str, kind_path))
-    return _structured(table, named_class, path)
+    of_kind = at.key("kind")
+    named_class = _made(of_kind, registry.find, _structured(table.pop("kind"), str, of_kind))
+    return _structured(table, named_class, at)
 
 
-def _table(value: object, declared: Any, path: str) -> Any:
+def _table(value: object, declared: Any, at: _Place) -> Any:
     """Return a dataclass from the table of its fields."""
     table = _exactly(value, dict, "a table of keys and values")
     known = {entry.name: entry for entry in fields(declared) if entry.init}
@@ -331,17 +352,17 @@ def _table(value: object, declared: Any, path: str) -> Any:
     missing = [name for name, entry in known.items() if name not in table and is_required(entry)]
     listed = f"the keys are {', '.join(known)}" if known else "there are no keys here"
     mistakes = [
-        f"{_join(path, shorten(key)[1:-1])}: unknown key: {listed}{closest(key, known, SYNONYMS)}" for key in unknown
+        f"{at.key(shorten(key)[1:-1]).path}: unknown key: {listed}{closest(key, known, SYNONYMS)}" for key in unknown
     ]
     # a key that is missing because it is misspelt is one mistake
     misspelt = {nearest(key, known, SYNONYMS) for key in unknown}
     mistakes += [
-        f"{_join(path, name)}: missing: {_MISSING_REMEDIES.get(name, f'add {name} = ...')}"
+        f"{at.key(name).path}: missing: {_MISSING_REMEDIES.get(name, f'add {name} = ...')}"
         for name in missing
         if name not in misspelt
     ]
-    entries = {name: (table[name], hints_of(declared)[name], _join(path, name)) for name in known if name in table}
-    return _at(path, declared, **_structured_all(entries, mistakes))
+    entries = {name: (table[name], hints_of(declared)[name], at.key(name, declared)) for name in known if name in table}
+    return _made(at, declared, **_structured_all(entries, mistakes))
 
 
 def _fits(value: object, option: Any) -> bool:
@@ -362,8 +383,7 @@ def _fits(value: object, option: Any) -> bool:
 
 def _name(option: Any) -> str:
     names = {float: "a number", int: "a whole number", str: "a text", bool: "true or false", Expression: "a formula"}
-    registry = registry_of(option)
-    if registry is not None:
+    if (registry := registry_of(option)) is not None:
         return f"a {registry.role}"
     return names.get(option, "a list" if _is_list(option) else "a table")
 
@@ -376,10 +396,5 @@ def _is_list(declared: Any) -> bool:
     return get_origin(declared) is tuple or declared == FloatArray  # whose origin depends on the version of numpy
 
 
-def _join(path: str, key: str) -> str:
-    return f"{path}.{key}" if path else key
-
-
 def _show(value: object) -> str:
-    text = repr(value)
-    return text if len(text) <= 60 else text[:60] + "..."
+    return text if len(text := repr(value)) <= 60 else text[:60] + "..."

@@ -20,6 +20,7 @@ from bemkit.scene.mesh_options import MeshOptions
 from bemkit.scene.registry import FILE_KINDS, RISING, SOLVERS
 from bemkit.scene.scene import Scene
 from bemkit.scene.serialisation import StructureError, UnstructureError, structure, unstructure
+from bemkit.scene.unit_names import UnitNames
 from bemkit.solvers.base import ContactSolver
 from bemkit.solvers.fallbacks import Fallbacks
 
@@ -158,7 +159,7 @@ def scene_from_table(table: dict[str, Any], folder: Path | None = None) -> Scene
     """
     table = _with_rising_degrees(_with_places_of_files(table, folder, ""))
     try:
-        scene = structure(table, _kind_of(table))
+        scene = structure(table, _kind_of(table), _units_of(table))
         if scene.steps:
             _ = load_steps(scene)  # whatever a step changes is checked
     except StructureError as error:
@@ -174,6 +175,14 @@ def _kind_of(table: dict[str, Any]) -> type[Scene | Assembly]:
     from bemkit.scene.assembly import Assembly
 
     return Assembly
+
+
+def _units_of(table: dict[str, Any]) -> UnitNames | None:
+    """Return the units that a table states, None if there are none or their table holds a mistake."""
+    try:
+        return structure(table["units"], UnitNames) if "units" in table else None
+    except StructureError:  # found again, and named, with the other mistakes of the scene
+        return None
 
 
 def _with_rising_degrees(table: dict[str, Any]) -> dict[str, Any]:

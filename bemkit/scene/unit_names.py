@@ -7,6 +7,7 @@ from dataclasses import dataclass, fields
 from types import MappingProxyType
 
 from bemkit.errors import InputError
+from bemkit.scene.known_units import name_of_force
 
 _LONGEST = 24
 _METRES: Mapping[str, float] = MappingProxyType(
@@ -25,7 +26,7 @@ class UnitNames:
     stress : str
         Such as ``"MPa"``; of tractions, pressures and moduli.
     force : str, optional
-        Of forces per thickness, stress times length, such as ``"N/mm"``; put together of the two if left out.
+        Of forces per thickness, stress times length, such as ``"N/mm"``; derived from the other two if not given.
 
     Raises
     ------
@@ -41,7 +42,8 @@ class UnitNames:
         for entry in fields(self):
             name = getattr(self, entry.name)
             if name is None and entry.name == "force":
-                object.__setattr__(self, "force", f"{self.stress} {self.length}")
+                known = name_of_force(self.length, self.stress)
+                object.__setattr__(self, "force", known or f"{self.stress} {self.length}")
                 continue
             if not (isinstance(name, str) and name.strip() and name.isprintable() and len(name) <= _LONGEST):
                 raise InputError(f"units.{entry.name} is {name!r}: give a short name such as 'mm' or 'MPa'")
@@ -49,7 +51,11 @@ class UnitNames:
     @property
     def energy(self) -> str:
         """Of energies and moments per thickness."""
-        return f"{self.force} {self.length}"
+        per_length = f"/{self.length}"
+        force = self.force or ""
+        if force.endswith(per_length):
+            return f"{force.removesuffix(per_length)} {self.length}{per_length}"
+        return f"{force} {self.length}"
 
     def as_dict(self) -> dict[str, str]:
         """Return the names of all quantities."""

@@ -88,7 +88,7 @@ def test_all_links_lead_somewhere_and_all_sections_are_there(page: Page, solutio
     for words in (
         "converged",
         "A <square> & 5 > 4",
-        "0.5 MPa mm",
+        "0.5 N/mm",
         "paper",
         "foundation",
         "friction_coefficient",

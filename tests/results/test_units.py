@@ -22,8 +22,16 @@ def solution() -> bk.Solution:
 
 
 def test_derived_names() -> None:
-    assert bk.UnitNames("m", "Pa").as_dict() == {"length": "m", "stress": "Pa", "force": "Pa m", "energy": "Pa m m"}
-    assert NAMES.as_dict()["energy"] == "N/mm mm"
+    assert bk.UnitNames("m", "Pa").as_dict() == {"length": "m", "stress": "Pa", "force": "N/m", "energy": "N m/m"}
+    assert bk.UnitNames("mm", "MPa") == NAMES
+    assert NAMES.as_dict()["energy"] == "N mm/mm"
+    assert bk.UnitNames("in", "psi").force == "lbf/in"
+    assert bk.UnitNames("furlong", "Pa").as_dict() == {
+        "length": "furlong",
+        "stress": "Pa",
+        "force": "Pa furlong",
+        "energy": "Pa furlong furlong",
+    }
 
 
 def test_names_change_no_number(solution: bk.Solution) -> None:
@@ -43,7 +51,7 @@ def test_every_array_of_a_file_says_what_it_is(solution: bk.Solution, tmp_path: 
     bk.write_result(tmp_path / "r.h5", bk.run(replace(solution.scene, load_factors=(0.5, 1.0))))
     with h5py.File(tmp_path / "r.h5") as file:
         assert file["contact/sigma_n"].attrs["unit"] == "MPa"
-        assert file["parts/moment"].attrs["unit"] == "N/mm mm"
+        assert file["parts/moment"].attrs["unit"] == "N mm/mm"
         assert "unit" not in file["contact/status"].attrs
         for group in MEANINGS:
             for name in file[group]:

@@ -14,7 +14,8 @@ from jsonschema import Draft7Validator
 
 from bemkit.cli.main import commands
 from bemkit.errors import BemkitError
-from bemkit.scene.schema import parameters, scene_schema, summary
+from bemkit.scene.docstrings import parameters, summary
+from bemkit.scene.schema import scene_schema
 from bemkit.scene.toml import shipped_files
 from checks.random_scenes.scenes import random_case
 from tests.docs.test_scene_files_page import EXAMPLES, as_text
@@ -51,7 +52,7 @@ TYPOS = [
     ("paper-1", "title = ", "titel = ", "$", "'titel' is not one of ['title', "),
     ("paper-1", "width = 1.0", "widht = 1.0", "$.shape", "('widht' was unexpected)"),
     ("paper-1", "width = 1.0", "", "$.shape", "'width' is a required property"),
-    ("paper-1", "width = 1.0", 'width = "1.0"', "$.shape.width", "'1.0' is not of type 'number'"),
+    ("paper-1", "width = 1.0", 'width = "1.0"', "$.shape.width", "'1.0' does not match"),
     ("paper-1", '"coulomb"', '"colomb"', "$.law.kind", "'colomb' is not one of"),
     ("paper-1", 'condition = "roller"', 'condition = "rollr"', "$.parts.wall.condition", "'rollr' is not one of"),
     ("paper-1", 'condition = "roller"', 'condition = "contact"', "$.parts.wall.condition", "'contact' is not one of"),

@@ -193,7 +193,7 @@ def test_any_column_is_drawn_over_any_other() -> None:
     both = draw_sweep(table, "energy", "force_tangential").axes[0]
     assert both.get_xlabel() == "energy"
     named = replace(table, scene=replace(SCENE, units=bk.UnitNames(length="mm", stress="MPa", force="N/mm")))
-    assert draw_sweep(named, FRICTION, "energy").axes[0].get_ylabel() == "energy [N/mm mm]"
+    assert draw_sweep(named, FRICTION, "energy").axes[0].get_ylabel() == "energy [N mm/mm]"
     assert draw_sweep(named, FRICTION, "peak_pressure").axes[0].get_ylabel() == "peak pressure [MPa]"
     assert draw_sweep(table, FRICTION, "seconds").axes[0].get_ylabel() == "seconds [s]"
     assert [list(line.get_ydata()) for line in both.lines] == [
