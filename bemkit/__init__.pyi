@@ -1,4 +1,4 @@
-# The public names and where they stand; `__init__.py` reads them here, and so do type checkers.
+# The public names and their modules; `__init__.py` reads them here, and so do type checkers.
 
 from bemkit.contact.further_laws import CohesiveCoulomb as CohesiveCoulomb
 from bemkit.contact.further_laws import RateStrengthening as RateStrengthening

@@ -166,7 +166,7 @@ def evaluate_field(value: ScalarField, points: FloatArray) -> FloatArray:
 
 
 def _not_finite(values: FloatArray, x: FloatArray, y: FloatArray, name: str, remedy: str) -> ExpressionError:
-    """Return an error that tells the first value that is not finite, and its place."""
+    """Return an error that names the first value that is not finite, and its index."""
     wrong = int(np.argmin(np.isfinite(values)))
     value, *place = (float(array.ravel()[wrong]) for array in (values, x, y))
     return ExpressionError(f"{name} is {value} at (x, y) = ({place[0]:.6g}, {place[1]:.6g}); {remedy}")

@@ -90,7 +90,7 @@ def seal(path: Path, mark: bytes) -> None:
 
 
 def checksum_in(path: Path) -> str:
-    """Return the checksum that stands in a sealed file, empty if there is no such file; see `opened` for its proof."""
+    """Return the checksum of a sealed file, empty if there is no such file; see `opened` for its proof."""
     try:
         with path.open("rb") as stream:
             block = stream.read(USER_BLOCK)
@@ -142,7 +142,7 @@ class FileFormat:
         Raises
         ------
         OutputFileError
-            If the file cannot be written, or a file of another kind stands in the way.
+            If the file cannot be written, or a file of another kind has its name.
         """
         with created(self.check_target(path)) as file:
             file.attrs.update({"format": self.name, "schema_version": self.version})

@@ -5,7 +5,7 @@ from __future__ import annotations
 from importlib import import_module
 
 _MAKER = "bemkit.report.notebook"
-"""Stands below all that it shows, and is loaded when a notebook first asks, by its name as `bemkit` loads its parts."""
+"""Imported by all that it shows, and loaded when a notebook first asks, by its name as `bemkit` loads its parts."""
 
 
 class ShownInNotebooks:

@@ -13,7 +13,7 @@ _ITEM = re.compile(r"\s*([*-]|\d+\.) ")
 def as_restructured_text(lines: list[str]) -> list[str]:
     """Return the lines with formulas protected.
 
-    An indented block after a line that ends with a colon is shown as it stands, and so is a paragraph that begins with
+    An indented block after a line that ends with a colon is shown verbatim, and so is a paragraph that begins with
     a slash, a list of places in a file; bars such as those of ``|x|`` are no marks.
     """
     lines = list(_with_places_indented(lines))
@@ -46,7 +46,7 @@ def _with_places_indented(lines: list[str]) -> Iterator[str]:
 
 
 def _is_block(following: list[str], indent: int) -> bool:
-    """Tell whether a blank line and an indented block follow that is no list."""
+    """Return whether a blank line and an indented block follow that is no list."""
     if len(following) < 2 or following[0].strip():
         return False
     first = following[1]

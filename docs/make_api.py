@@ -101,7 +101,7 @@ def names_page(folder: str, names: list[str]) -> str:
 
 
 def modules_page(package: str, modules: list[str]) -> str:
-    """Show the modules of a folder; members that are names of the package stand on other pages."""
+    """Show the modules of a folder; members that are names of the package are on other pages."""
     text = heading(package)
     for module in modules:
         text += heading(module, "-") + f".. automodule:: {module}\n   :members:\n   :member-order: bysource\n"

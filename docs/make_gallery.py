@@ -98,7 +98,7 @@ def run_scene(entry: Entry) -> tuple[str, str, Mapping[str, Figure]]:
 
 
 def chosen(solution: bk.Solution | bk.AssemblySolution) -> dict[str, Figure]:
-    """Draw the deformation and what tells most besides."""
+    """Draw the deformation and the most informative other picture."""
     suiting = [picture.name for picture in default_pictures(solution)]
     second = next(name for name in SECOND if name in suiting)
     return dict(islice(figures(solution, ["deformation", second]).items(), 2))

@@ -1,4 +1,4 @@
-"""Pages with generated parts: what stands between two markers is replaced."""
+"""Pages with generated parts: the text between two markers is replaced."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import re
 
 
 def between(text: str, marker: str, content: str) -> str:
-    """Replace what stands between ``<!-- marker -->`` and ``<!-- end marker -->``."""
+    """Replace the text between ``<!--  marker -->`` and ``<!-- end marker -->``."""
     pattern = rf"(<!-- {marker} -->\n).*?(<!-- end {marker} -->)"
     replaced, count = re.subn(pattern, lambda match: f"{match[1]}\n{content}\n\n{match[2]}", text, flags=re.DOTALL)
     if count != 1:

@@ -122,7 +122,7 @@ def paper_model(number: int) -> Model:
     """Return example 1 or 2 on the paper's uniform mesh of plain constant elements, made ready to solve."""
     scene = load_single_body(f"paper-{number}")
     sides = [side for loop in scene.shape.outline().loops for side in loop]
-    # as many elements on each side, whatever its length
+    # as many elements on each side, of any length
     density = {
         side.name: 1.0 / float(np.hypot(*np.ptp(side.curve.point(np.array([0.0, 1.0])), axis=0))) for side in sides
     }

@@ -44,12 +44,12 @@ def print_summary(solution: Solution | AssemblySolution, console: Console | None
 
 
 def print_plan(title: str, plan: Plan) -> None:
-    """Print what a scene needs and what it leaves out, and the time and memory of all."""
+    """Print what a scene needs and what it skips, with the time and memory of each."""
     console = stdout_console()
     table = plain_table(("", "item", "why"), gap=2)
     for item in plan.items:
         style = "" if item.is_needed else "dim"
-        mark = Text("needed", style="green") if item.is_needed else Text("left out", style="dim")
+        mark = Text("needed", style="green") if item.is_needed else Text("skipped", style="dim")
         table.add_row(mark, Text(item.name, style=style), Text(item.reason, style=style))
     console.print(Text(title, style="bold"))
     console.print(table)
@@ -84,7 +84,7 @@ class ConvergenceTable:
 
 
 def print_explanation(solution: Solution | AssemblySolution, output_seconds: float, *, to_stderr: bool = False) -> None:
-    """Print planned against measured time and memory, the counts, and what was left out.
+    """Print planned and measured time and memory, the counts, and what was skipped.
 
     Memory was traced in the run, which makes small scenes about twice as slow. Standard output may be taken by data.
     """
@@ -128,7 +128,7 @@ def _lines(work: OperationCounts) -> Iterator[tuple[str, str]]:
 
 
 def _left_out(solution: Solution | AssemblySolution) -> Table:
-    table = plain_table(("left out", "why"), gap=2)
+    table = plain_table(("skipped", "why"), gap=2)
     for item in solution.plan.items:
         if not item.is_needed:
             table.add_row(item.name, item.reason)
@@ -253,7 +253,7 @@ def _history_rows(solution: Solution | AssemblySolution) -> Iterator[tuple[str, 
         yield "friction took", f"{_amount(work.dissipation, 'energy', units)}  in all steps"
         if loading.has_coarse_increments:
             left = _amount(work.increment_work, "energy", units)
-            yield "left over", f"{left}  by the size of increments: smaller ones leave less"
+            yield "increment error", f"{left}  decreases with smaller increments"
 
 
 def _status(solution: Solution | AssemblySolution) -> Text:

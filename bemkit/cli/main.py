@@ -25,7 +25,7 @@ _COMMANDS = {
     "cite": ("listings", "Name the works behind a scene or a result."),
     "critical-friction": ("critical_friction", "Find the friction at which sliding states lose uniqueness."),
     "outline": ("outline", "Show the sides of a part from a file; write a scene to start from."),
-    "plan": ("plan", "Say what a scene needs and what it leaves out, without solving it."),
+    "plan": ("plan", "List what would be computed, what skipped, and why, with time and memory."),
     "plot": ("plot", "Draw a result or a scene."),
     "report": ("report", "Write a page on a result or a scene."),
     "run": ("run", "Solve a scene."),
@@ -82,7 +82,7 @@ def _run_to_end(arguments: list[str] | None) -> int:
 
 
 _TERMINATION = KeyboardInterrupt("SIGTERM")
-"""The system asks the process to end: whatever Ctrl-C does not lose, this does not."""
+"""The system asks the process to end: finished work is kept, as after Ctrl-C."""
 
 
 @contextmanager

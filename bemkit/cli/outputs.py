@@ -115,7 +115,7 @@ class TableFile(Generic[Content]):
 
 @dataclass(frozen=True)
 class Outputs(Generic[Content]):
-    """Where a content goes; each may be left out.
+    """Where a content goes; each is optional.
 
     Parameters
     ----------

@@ -36,7 +36,7 @@ def plan(
     degree: int | Literal["hp"] | None,
     json_file: str | None,
 ) -> None:
-    """Say what SCENE needs and what it leaves out, without solving it."""
+    """List what SCENE needs, what is skipped and why, without solving it."""
     with shown_progress(json_file is not None):
         from bemkit.scene.places import with_settings
         from bemkit.scene.toml import load_scene, with_overrides

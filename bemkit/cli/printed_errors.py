@@ -87,7 +87,7 @@ def _print_orders(records: Sequence[ErrorRecord], measures: Sequence[str], conso
 
 
 def _costs(record: ErrorRecord, *, is_wide: bool) -> dict[str, str]:
-    """Return what stands before the errors, by the heads of the columns."""
+    """Return the columns before the errors, by their heads."""
     costs = {"aim": _aim(record.size)} if record.meshes == "adaptive" else {}
     costs |= {"N": str(record.elements or "-"), "it": str(record.linear_solves)}
     if is_wide:

@@ -38,7 +38,7 @@ def print_left_out(reasons: Mapping[str, str]) -> None:
     """Print which axes say nothing of a scene, and why."""
     console = stdout_console()
     for name, reason in reasons.items():
-        console.print(Text(f"{name}: left out: {reason}", style="dim"))
+        console.print(Text(f"{name}: skipped: {reason}", style="dim"))
 
 
 def print_verdicts(records: Sequence[StabilityRecord]) -> None:

@@ -50,7 +50,7 @@ def print_sweep(sweep: Sweep) -> None:
 
 
 def _short_keys(keys: Sequence[str]) -> list[str]:
-    """Return the last names of the keys, where these tell them apart."""
+    """Return the last names of the keys, where these are distinct."""
     last = [key.rsplit(".", 1)[-1] for key in keys]
     return [short if last.count(short) == 1 else key for short, key in zip(last, keys, strict=True)]
 

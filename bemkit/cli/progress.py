@@ -99,7 +99,7 @@ class _Display(logging.Handler):
         self._mesh, self._n_meshes = "", 0
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Show a stage; a plan tells the elements of the next mesh and the time for it."""
+        """Show a stage; a plan contains the elements of the next mesh and the time for it."""
         seconds: float | None = getattr(record, "seconds", None)
         if seconds is None:
             self._bar.update(self._row, description=f"{self._mesh}{record.getMessage()}")

@@ -50,7 +50,7 @@ if TYPE_CHECKING:
 @click.option("--solver", metavar="WORD", help="Such as augmented-lagrangian, instead of the scene's.")
 @click.option("--rho", type=float, metavar="R", help="Penalty of the solver in units of E'/L, instead of the scene's.")
 @click.option("--cascade", is_flag=True, help="Solve on coarser meshes first and start from there.")
-@click.option("--explain", is_flag=True, help="Print planned against measured time and memory, and what was left out.")
+@click.option("--explain", is_flag=True, help="Print planned and measured time and memory, and what was skipped.")
 @click.option("-q", "--quiet", is_flag=True, help="Print neither the convergence table nor the summary.")
 def run(
     scene: str,

@@ -41,7 +41,7 @@ def guarded_streams() -> Iterator[None]:
 
 
 def print_data(text: str) -> None:
-    """Write data to standard output, in UTF-8 whatever the encoding of the terminal."""
+    """Write data to standard output, in UTF-8 for any encoding of the terminal."""
     stream = sys.stdout
     if isinstance(stream, GuardedStream):
         stream.write_data(text)

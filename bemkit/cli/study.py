@@ -83,7 +83,7 @@ def errors(
     The exit code is 1 if a run did not converge.
     """
     if jobs > 1 and repeat is not None:
-        raise click.UsageError("--jobs measures no run times: leave out --repeat, or --jobs")
+        raise click.UsageError("--jobs measures no run times: remove --repeat or --jobs")
     with StudyProgress(quiet) as progress:
         from bemkit.cli.printed_errors import print_reference, print_study
         from bemkit.scene.toml import load_single_body
@@ -159,7 +159,7 @@ def solutions(scene: str, starts: int, elements: int | None, json_file: str | No
 
 
 def _print_solutions(found: Sequence[Solution], n_starts: int) -> None:
-    """Print how many distinct solutions there are, and what tells them apart."""
+    """Print how many distinct solutions there are, and how they differ."""
     from rich.text import Text
 
     console = stdout_console()

@@ -14,7 +14,7 @@ MISSED = 1
 
 @click.command()
 @click.argument("names", nargs=-1)
-@click.option("--quick", is_flag=True, help="Leave out the finest resolutions: at most one minute.")
+@click.option("--quick", is_flag=True, help="Skip the finest resolutions: at most one minute.")
 @click.option("-o", "--output", metavar="FILE", help="Rows as .csv, .json, .md, .h5; .jsonl also resumes.")
 @click.option("--json", "json_file", metavar="FILE", help="Write the rows as JSON; - is standard output.")
 @click.option("--markdown", metavar="FILE", help="Write the table as Markdown; - is standard output.")

@@ -137,7 +137,7 @@ class SlipHistory:
 class LinearBody(Protocol):
     """One or several elastic bodies under their loads, reduced to the contact nodes.
 
-    Everything nonlinear in bemkit sees bodies through this protocol alone: a body never learns of friction, drivers
+    All nonlinear code in bemkit sees bodies only through this protocol: a body never learns of friction, drivers
     never learn how it finds its response. Derive from this class and write `weights`, `stiffness_scale` and `respond`;
     a body that only contact can hold also writes `rigid_motions` and `rigid_load`. `bemkit.testing.check_body` tests
     everything said here.

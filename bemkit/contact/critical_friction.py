@@ -57,7 +57,7 @@ def critical_coefficient(normal: FloatArray, tangential: FloatArray, direction: 
     Parameters
     ----------
     normal, tangential : (n_sliding, n_sliding) arrays [Pa/m]
-        From `sliding_response`, or a part of it: nodes left out stick.
+        From `sliding_response`, or a part of it: other nodes stick.
     direction : (n_sliding,) array
         +1 for sliding along the tangent, -1 against it.
 

@@ -107,7 +107,7 @@ class FrictionLaw(Protocol):
         return False
 
     def at_slip(self, motion: SlipHistory) -> FrictionLaw:
-        """Return the law for one load step, whose bound depends on the normal traction alone.
+        """Return the law for one load step, whose bound depends only on the normal traction.
 
         Parameters
         ----------

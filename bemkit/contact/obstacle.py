@@ -1,7 +1,7 @@
 """Rigid obstacles: how far each boundary point is from them, and in which direction it touches.
 
 Contact acts along the obstacle's normal at its nearest point [Wriggers2006]: that is where the point touches first, and
-a frictionless obstacle pushes along its own normal, whatever shape the body has there.
+a frictionless obstacle pushes along its own normal, for any shape of the body there.
 """
 
 from __future__ import annotations
@@ -206,7 +206,7 @@ class Cavity(_Round):
 
 @dataclass(frozen=True)
 class Gap:
-    """An obstacle known by its gap alone, as a number or a function of the boundary point.
+    """An obstacle given by its gap, as a number or a function of the boundary point.
 
     Parameters
     ----------

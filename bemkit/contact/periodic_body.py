@@ -105,7 +105,7 @@ class PeriodicBody(LinearBody):
 
     @cached_property
     def _rest(self) -> ComplexArray:
-        """(n_contact,) array [m]: displacements under the given forces and motions alone."""
+        """(n_contact,) array [m]: displacements under the given forces and motions."""
         of_force = self.elastic.to_complex(self.elastic.strain_displacement(self.force))
         motion = np.array(self.elastic.drive.motion[:2])
         return np.asarray(self._at_contact(of_force) + motion @ self._motions)

@@ -43,7 +43,7 @@ class PolygonalObstacle:
         for number, vertex in enumerate(self.vertices):
             check_pair(f"vertices[{number}]", vertex)
             if tuple(vertex) == tuple(self.vertices[number - 1]):
-                raise InputError(f"vertices[{number}] is {vertex}, as is the one before it: leave one of them out")
+                raise InputError(f"vertices[{number}] is {vertex}, as is the one before it: remove one of them")
 
     def gap(self, points: FloatArray, normals: FloatArray) -> FloatArray:
         """Measure the distance from the nearest side or corner; see `Obstacle.gap`."""

@@ -194,7 +194,7 @@ class ContactProblem:
     def _ask_law(self, method: str, sigma_n: FloatArray) -> FloatArray:
         try:
             values = np.asarray(getattr(self.law, method)(sigma_n), dtype=float)
-        except Exception as error:  # whatever a law raises must surface with the name of the law
+        except Exception as error:  # every error of a law must surface with the name of the law
             raise LawError(f"{self._name(method)} failed: {type(error).__name__}: {error}") from error
         if values.shape != sigma_n.shape:
             shapes = f"the shape {values.shape} for {sigma_n.shape}"

@@ -32,7 +32,7 @@ class ReducedConditions:
     Parameters
     ----------
     given : (n_contact,) complex array [Pa]
-        Tractions that follow from conditions on tractions alone; zero elsewhere.
+        Tractions given by conditions without displacements; zero elsewhere.
     node : (n_unknowns,) int array
         The node of each unknown; those with two unknowns come twice, one after the other.
     direction : (n_unknowns,) complex array

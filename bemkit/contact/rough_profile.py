@@ -25,13 +25,13 @@ class ProfileError(InputError):
 
 @dataclass(frozen=True)
 class Profile:
-    """A rigid rough obstacle whose heights stand in a file; its highest point touches the undeformed body.
+    """A rigid rough obstacle with heights from a file; its highest point touches the undeformed body.
 
     Parameters
     ----------
     file : str
         Text of two columns, position and height [m], between which it is straight; separated by commas, semicolons or
-        blanks. Lines that begin with # and a first line without numbers are left out. The file is found from the folder
+        blanks. Lines that begin with # and a first line without numbers are skipped. The file is found from the folder
         in which bemkit runs.
     period : float, optional [m]
         Distance after which the profile repeats itself. Without it nothing can be touched beyond its ends.
@@ -113,7 +113,7 @@ def read_profile(file: str | Path) -> tuple[FloatArray, FloatArray]:
     if (k := int(np.argmin(steps))) >= 0 and steps[k] <= 0.0:
         raise ProfileError(
             f"{name}: line {numbers[k + 1]}: the position {x[k + 1]:.6g} comes after {x[k]:.6g}: sort the lines by "
-            "position, and leave out points that are there twice"
+            "position, and remove repeated points"
         )
     if steps[k := int(np.argmax(steps))] > _LARGEST_STEP * float(np.median(steps)):
         raise ProfileError(

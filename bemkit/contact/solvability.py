@@ -159,7 +159,7 @@ def _rigid_load(problem: ContactProblem, unit: FloatArray) -> tuple[FloatArray, 
 
 
 def find_long_travel(problem: ContactProblem) -> float | None:
-    """Return how far the load moves the body before an obstacle can hold it, if that is too far to tell deformation.
+    """Return how far the load moves the body before an obstacle can hold it, if that is too far to resolve deformation.
 
     Parameters
     ----------

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 _SAMPLES = 8
 """Samples of each span among which the nearest point is looked for first."""
 _MOST_STEPS = 60
-"""Steps that refine it; halving the bracket alone would need fewer than these."""
+"""Steps that refine it; pure bisection would need fewer than these."""
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,7 @@ class SplineObstacle:
         for number, point in enumerate(self.points):
             check_pair(f"points[{number}]", point)
             if tuple(point) == tuple(self.points[number - 1]) and (number or self.is_closed):
-                raise InputError(f"points[{number}] is {point}, as is the one before it: leave one of them out")
+                raise InputError(f"points[{number}] is {point}, as is the one before it: remove one of them")
 
     def gap(self, points: FloatArray, normals: FloatArray) -> FloatArray:
         """Measure the distance from the curve; see `Obstacle.gap`."""

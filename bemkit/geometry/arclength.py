@@ -72,7 +72,7 @@ class ArcLength:
         for _ in range(_MOST_STEPS):
             excess = chebyshev.chebval(x, length, tensor=False) - target
             low, high = np.where(excess <= 0.0, x, low), np.where(excess >= 0.0, x, high)
-            # a curve may stand still at its end
+            # a curve may have no speed at its end
             slope = np.maximum(chebyshev.chebval(x, speed, tensor=False), _ROUND_OFF * self.total)
             following = x - excess / slope
             following = np.where((following < low) | (following > high), 0.5 * (low + high), following)

@@ -202,7 +202,7 @@ class ParametricCurve:
     The curve itself takes the arc length, as a fraction of its total, for its parameter s: p(s) is found to round-off.
     """
 
-    is_straight: ClassVar[bool] = False  # whatever it is
+    is_straight: ClassVar[bool] = False  # for any shape
 
     function: Callable[[FloatArray], FloatArray]
     derivative_function: Callable[[FloatArray], FloatArray]

@@ -145,7 +145,7 @@ class SplineTo:
             raise GeometryError(f"spline through {len(self.through)} points: give more, or write a line or an arc")
         if not (np.isfinite(points).all() and steps.min() > 0.0):
             place = int(np.argmin(steps > 0.0))
-            raise GeometryError(f"spline: the point {format_point(points[place])} comes twice in a row: leave one out")
+            raise GeometryError(f"spline: the point {format_point(points[place])} comes twice in a row: remove one")
         lengths = np.append(0.0, np.cumsum(steps)) / steps.sum()
         spline = CubicSpline(lengths, points, bc_type="periodic" if is_closed else "not-a-knot")
         return ParametricCurve(spline, spline.derivative(), is_analytic=False)
@@ -162,11 +162,11 @@ class NurbsTo:
     points : tuple of (float, float) [m]
         The control points between the start and the end: two of a cubic Bezier curve.
     degree : int, optional
-        That of a Bezier curve, the number of all control points less one, if left out.
+        By default that of a Bezier curve, the number of control points minus one.
     knots : tuple of float, optional
-        As many as control points, degree and one; at equal distances if left out.
+        As many as control points, degree and one; by default at equal distances.
     weights : tuple of float, optional
-        Of all control points, both ends counted; all 1 if left out.
+        Of all control points, both ends counted; by default all 1.
     name, group : str
         See `DrawnSide`.
     """

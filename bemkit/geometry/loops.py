@@ -42,7 +42,7 @@ def check_loops(
     Parameters
     ----------
     pieces : Pieces
-        One piece of every side or element, none of zero length; those of a loop stand together and in order.
+        One piece of every side or element, none of zero length; those of a loop are consecutive and in order.
     loop_of_owner : (n,) int array
         Number of the loop that each owner belongs to.
     is_exterior : bool
@@ -74,7 +74,7 @@ def check_loops(
 
 
 def following_in_loops(loop_sizes: IntArray) -> IntArray:
-    """Return for each piece the index of the next one, where the pieces of each loop stand together and in order."""
+    """Return for each piece the index of the next one, where the pieces of each loop are consecutive and in order."""
     after = np.cumsum(loop_sizes)
     following = np.arange(1, after[-1] + 1)
     following[after - 1] = after - loop_sizes
@@ -100,7 +100,7 @@ def swept_areas(pieces: Pieces) -> FloatArray:
 
 
 def is_inside(point: FloatArray, loop: Pieces) -> bool:
-    """Tell whether a point (2,), not on the loop, lies inside of it, whichever way the loop runs.
+    """Return whether a point (2,), not on the loop, lies inside of it, whichever way the loop runs.
 
     The winding number is the sum of the angles under which the pieces are seen. That of a curved piece is that of its
     chord unless the point lies between them; then the piece is halved.
@@ -119,7 +119,7 @@ def _meeting_message(first: int, second: int, describe: Callable[[int], str]) ->
         return f"{describe(first)} meets itself: a boundary must not cross or touch itself; correct its curve"
     return (
         f"{describe(min(first, second))} and {describe(max(first, second))} cross, touch or fold back onto each other, "
-        "as far as their digits tell: a boundary must not meet itself; move them apart"
+        "within round-off: a boundary must not meet itself; move them apart"
     )
 
 
@@ -149,7 +149,7 @@ def _check_body(areas: FloatArray, members: list[Pieces], describe_loop: Callabl
         if not is_inside(members[hole].start[0], members[outer]):
             raise GeometryError(
                 f"{describe_loop(hole)} is a hole that lies outside of the outer {describe_loop(outer)}: "
-                "move it into the body or leave it out"
+                "move it into the body or remove it"
             )
     return holes
 
@@ -168,7 +168,7 @@ def _check_holes_apart(holes: list[int], members: list[Pieces], describe_loop: C
             if is_inside(point, members[other]):
                 raise GeometryError(
                     f"{describe_loop(hole)} lies inside {describe_loop(int(other))}, where there is no body: "
-                    "leave one of the two out"
+                    "remove one of the two"
                 )
 
 

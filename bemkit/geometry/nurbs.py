@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from scipy.interpolate import BSpline
 
 _END = 1e-7
-"""How close to an end where the curve stands still, its control points being one, its tangent is taken."""
+"""How close to an end where the curve has no speed, its control points being one, its tangent is taken."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,7 +84,7 @@ class Nurbs:
 
     @cached_property
     def _inset(self) -> tuple[float, float]:
-        """How far from its ends the derivative is taken: where the curve stands still there, not at zero."""
+        """How far from its ends the derivative is taken: where the curve has no speed there, not at zero."""
         first, last = norms(self._velocity(np.array([0.0, 1.0])))
         size = norms(np.diff(self.points, axis=0)).max()
         return (_END if first <= _END * size else 0.0), (_END if last <= _END * size else 0.0)

@@ -15,7 +15,7 @@ from bemkit.geometry.surface import Surface
 from bemkit.geometry.vectors import check_magnitude, norms
 
 _JOINT_TOLERANCE = 64 * RESOLUTION  # times the coordinates: trigonometry and splines lose a few more digits
-_N_SEEN = 4  # points of a side that tell its size, also of a closed one
+_N_SEEN = 4  # points of a side that define its size, also of a closed one
 _LEAST_SPLITS = 4  # 16 pieces, 9 tangents each: a side with fewer than about 30 waves is seen as it is
 N_SAMPLES = 257
 """Points at which a predicate is looked at along a side; 2**k + 1, so that halves and quarters are among them."""
@@ -167,7 +167,7 @@ class Outline:
         for k in np.flatnonzero(is_straight & (norms(end - start) <= resolution(start, end))).tolist():
             raise GeometryError(
                 f"Outline: {self._describe(k)} at {format_point(start[k])} has no length, or less than the digits of "
-                "its coordinates resolve: leave it out, or move the body towards the origin"
+                "its coordinates resolve: remove it, or move the body towards the origin"
             )
         return start, end
 
@@ -202,11 +202,11 @@ class Selection:
         object.__setattr__(self, "sides", tuple(self.sides))
 
     def names(self, side_name: str, group: str = "") -> bool:
-        """Tell whether a side is named, itself or by its group."""
+        """Return whether a side is named, itself or by its group."""
         return not self.sides or side_name in self.sides or group in self.sides
 
     def holds(self, side_name: str, points: FloatArray, group: str = "") -> BoolArray:
-        """Tell which points (n, 2) of the named side are selected, (n,)."""
+        """Return which points (n, 2) of the named side are selected, (n,)."""
         if not self.names(side_name, group):
             return np.zeros(len(points), dtype=bool)
         return np.ones(len(points), dtype=bool) if self.where is None else evaluate_predicate(self.where, points)

@@ -283,7 +283,7 @@ def _keep_apart(a: Pieces, b: Pieces) -> BoolArray:
 
 
 def _neighbours_part(a: Pieces, b: Pieces) -> BoolArray:
-    """Tell whether b leaves the end of a in a direction other than back along a."""
+    """Return whether b leaves the end of a in a direction other than back along a."""
     angle = np.abs(angles_between(a.start - a.end, b.end - b.start)) - a.turning - b.turning
     opening = np.minimum(a.chord_length, b.chord_length) * np.sin(np.clip(angle, 0.0, 0.5 * np.pi))
     return opening > np.maximum(a.resolution, b.resolution)

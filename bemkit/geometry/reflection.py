@@ -45,7 +45,7 @@ def element_images(space: BoundarySpace) -> Iterator[tuple[slice, FloatArray, In
     if not np.array_equal(nodes, -nodes[::-1]):
         raise GeometryError(
             f"symmetry: {type(space).__name__} has the local nodes {nodes.tolist()}, which an image does not share: "
-            "choose local nodes that are symmetric about 0, or leave out the symmetry"
+            "choose local nodes that are symmetric about 0, or remove the symmetry"
         )
     for g, signs in enumerate(symmetry.images):
         dofs = space.element_dofs
@@ -82,7 +82,7 @@ def reflected_to_whole(space: BoundarySpace, whole: BoundarySpace, values: Float
 
 
 def antisymmetric_dofs(space: BoundarySpace) -> BoolArray:
-    """Tell which vector dofs are zero, because the function goes over into its image on a symmetry line.
+    """Return which vector dofs are zero, because the function goes over into its image on a symmetry line.
 
     Returns
     -------

@@ -73,7 +73,7 @@ class Polygon(CheckedShape):
     vertices : tuple of (float, float) [m]
         At least three corners, anticlockwise.
     side_names : tuple of str, optional
-        Name of the side that starts at each vertex; "side-1", "side-2", ... if left out.
+        Name of the side that starts at each vertex; by default "side-1", "side-2", ...
 
     Raises
     ------
@@ -90,7 +90,7 @@ class Polygon(CheckedShape):
             raise GeometryError(f"Polygon: vertices has {len(vertices)} points: give at least three")
         for k, vertex in enumerate(vertices):
             if vertex == vertices[k - 1]:
-                raise GeometryError(f"Polygon: vertices repeats the point {vertex} (vertex {k + 1}): leave one out")
+                raise GeometryError(f"Polygon: vertices repeats the point {vertex} (vertex {k + 1}): remove one")
         if self.side_names is not None:
             object.__setattr__(self, "side_names", tuple(self.side_names))
             if len(self.side_names) != len(vertices):
@@ -100,7 +100,7 @@ class Polygon(CheckedShape):
         x, y = (np.array(vertices) - vertices[0]).T
         is_clockwise = bool(x @ np.roll(y, -1) - y @ np.roll(x, -1) < 0.0)
         object.__setattr__(self, "vertices", vertices[::-1] if is_clockwise else vertices)
-        self.outline()  # says first if the sides cross: then there is no telling which way they run
+        self.outline()  # says first if the sides cross: then their sense is undefined
         if is_clockwise:
             raise GeometryError("Polygon: vertices run clockwise: list the vertices anticlockwise")
 

@@ -134,19 +134,19 @@ def reflected_curve(curve: Curve, symmetry: Symmetry, image: FloatArray) -> Tran
 
 
 def is_reversing(image: FloatArray) -> bool:
-    """Tell whether an image is traversed from the images of ends to the images of starts."""
+    """Return whether an image is traversed from the images of ends to the images of starts."""
     return bool(np.prod(image) < 0.0)
 
 
 def check_half(symmetry: Symmetry, nodes: FloatArray, elements: IntArray, is_exterior: bool) -> None:
     """Raise if an element lies on a line, or the body is an exterior."""
     if is_exterior:
-        raise GeometryError(f"BoundaryMesh: symmetry ({symmetry}) of an exterior is not supported: leave it out")
+        raise GeometryError(f"BoundaryMesh: symmetry ({symmetry}) of an exterior is not supported: remove it")
     start, end = symmetry.meets(nodes)[elements].transpose(1, 0, 2)
     for element in np.flatnonzero((start & end).any(axis=1)):
         raise GeometryError(
             f"BoundaryMesh: element {element} lies on the symmetry line ({symmetry}), inside of the whole body: "
-            "leave it out, or leave out the symmetry and give the line a roller"
+            "remove it, or remove the symmetry and give the line a roller"
         )
 
 

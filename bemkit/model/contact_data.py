@@ -89,7 +89,7 @@ class FacingPart:
 def find_contact(
     scene: Scene, mesh: BoundaryMesh, space: BoundarySpace, further: Sequence[FacingPart] = ()
 ) -> ContactData:
-    """Find the nodes that may touch an obstacle, whatever supports hold them.
+    """Find the nodes that may touch an obstacle, held by supports or not.
 
     Parameters
     ----------
@@ -104,9 +104,9 @@ def find_contact(
     Notes
     -----
     A node that may touch several obstacles, of one part or of several, belongs to the nearest, and to the first of
-    those that are equally near. Where the directions of several parts are alike, it stands for its share of all of
-    them. In a corner between two obstacles without friction it touches both, and stands in two rows. With friction two
-    displacements cannot tell four tractions: the share of the other obstacle goes to its next node, as at crosspoints
+    those that are equally near. Where the directions of several parts are alike, it represents its share of all of
+    them. In a corner between two obstacles without friction it touches both, and has two rows. With friction two
+    displacements do not fix four tractions: the share of the other obstacle goes to its next node, as at crosspoints
     of mortar methods [Wohlmuth2000].
     """
     parts = [

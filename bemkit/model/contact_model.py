@@ -164,7 +164,7 @@ class Model:
         return self.prepared.inside is not None
 
     def with_law(self, scene: Scene) -> Model:
-        """Return the same body under the same loads; the scene differs in its solver and the numbers of its law alone.
+        """Return the same body under the same loads; the scene differs only in its solver and the numbers of its law.
 
         Where this model's law has friction that of the scene has some, too, and nowhere else.
         """
@@ -219,8 +219,8 @@ class Model:
     def _rows_of(self, part: str, elements: IntArray) -> IntArray:
         """Return the contact nodes (n_elements, n_local) whose tractions the elements of a part have; -1 without one.
 
-        In a corner that is the row of the part's own obstacle. Where the node there belongs to another part alone, the
-        next node stands for it.
+        In a corner that is the row of the part's own obstacle. Where the node there belongs only to another part, the
+        next node represents it.
         """
         is_of_part, directions = np.equal(self.contact.parts, part), self.nodes.directions
         row_of_dof = np.full(self.prepared.space.n_dofs // 2, -1)

@@ -30,7 +30,7 @@ from bemkit.scene.scene import Scene
 HIGHEST_DEGREE = 16
 """Of the polynomials that are tried."""
 ACCURACY = 1e-10
-"""Largest difference between a field and what stands for it, relative to the field."""
+"""Largest difference between a field and its approximation, relative to the field."""
 _GOOD_ENOUGH = 1e-14
 _GRID = 12
 _MOST_ELEMENTS = 200
@@ -44,13 +44,13 @@ _ROUND_OFF = 64.0 * float(np.finfo(float).eps)
 
 
 class TemperatureError(InputError):
-    """A temperature that is not harmonic, or that no polynomial and logarithm stand for."""
+    """A temperature that is not harmonic, or that no polynomial and logarithm approximate."""
 
 
 def harmonic_sources(
     field: Callable[[FloatArray], FloatArray], mesh: BoundaryMesh, round_off: float = 0.0
 ) -> tuple[Source, ...]:
-    """Return the expansions that stand for a harmonic field in a body.
+    """Return the expansions of a harmonic field in a body.
 
     Parameters
     ----------
@@ -191,7 +191,7 @@ def particular_solution(scene: Scene, mesh: BoundaryMesh, modulus: float, stress
     Raises
     ------
     TemperatureError
-        If a temperature is not harmonic, or nothing that is known in closed form stands for it.
+        If a temperature is not harmonic, or no closed form approximates it.
     """
     sources = [
         source for force in scene.body_forces for source in _sources(force, scene.material, mesh, modulus, stress)

@@ -121,7 +121,7 @@ class Prepared:
     conditions : NodalConditions
         Supports, and the directions that are retained for contact.
     candidates : ContactData
-        The nodes on contact parts, whatever supports hold them.
+        The nodes on contact parts, held by supports or not.
     contact : ContactData
         Those of them that can touch their obstacle.
     force : (n_nodes, 2) array [-]
@@ -177,7 +177,7 @@ class Prepared:
     def is_condensed(self) -> bool:
         """Whether contact sees the stiffness of the body even if its equations are compressed over a tree.
 
-        The stiffness is needed to tell whether the energy of elements that are too long can be negative, for rotations
+        The stiffness is needed to see whether the energy of elements that are too long can be negative, for rotations
         that no support holds and displacements do not contain, and for nodes between two obstacles (two rows each).
         """
         if self.contact.nodes.is_shared.any():
@@ -195,7 +195,7 @@ class Prepared:
         Parameters
         ----------
         scene : Scene
-            Differs from this one in numbers of its conditions, its law and its solver alone.
+            Differs from this one only in numbers of its conditions, its law and its solver.
 
         Raises
         ------

@@ -112,13 +112,13 @@ def with_energy_checked(model: Model, result: ContactSolution) -> ContactSolutio
         return result
     displacement, force = map_fields(model.elastic, *model.body.recover(result.state))
     space = model.prepared.space
-    if model.body.condensed is None:  # the work of the solution alone tells
+    if model.body.condensed is None:  # only the work of the solution shows it
         sensitivity = np.full(displacement.shape, model.elastic.material.plane_modulus)
-        doubt = _negative_work(model.elastic, displacement, force, space, sensitivity)
+        finding = _negative_work(model.elastic, displacement, force, space, sensitivity)
     else:
         is_symmetric = model.scene.discretisation.is_symmetric
-        doubt = _doubt_of(model.body.condensed, model.elastic, space, is_symmetric, (displacement, force))
-    return _named_negative(result, doubt) if doubt else result
+        finding = _negative_energy_of(model.body.condensed, model.elastic, space, is_symmetric, (displacement, force))
+    return _named_negative(result, finding) if finding else result
 
 
 def with_energies_checked(model: AssembledModel, result: ContactSolution) -> ContactSolution:
@@ -132,13 +132,13 @@ def with_energies_checked(model: AssembledModel, result: ContactSolution) -> Con
     bodies = zip(model.prepared.bodies, model.elastic, model.condensed, unknowns, strict=True)
     for body, elastic, condensed, own in bodies:
         fields, is_symmetric = map_fields(elastic, *condensed.recover(own)), body.scene.discretisation.is_symmetric
-        doubt = _doubt_of(condensed, elastic, body.own_space, is_symmetric, fields)
-        if doubt:
-            return _named_negative(result, f"body {body.name!r}: {doubt}")
+        finding = _negative_energy_of(condensed, elastic, body.own_space, is_symmetric, fields)
+        if finding:
+            return _named_negative(result, f"body {body.name!r}: {finding}")
     return result
 
 
-def _doubt_of(
+def _negative_energy_of(
     condensed: CondensedMap,
     elastic: SteklovPoincare,
     space: BoundarySpace,
@@ -160,9 +160,9 @@ def _doubt_of(
     """
     displacement, force = fields
     sensitivity = condensed.sensitivity
-    if sensitivity is None:  # a node resists by about E' per displacement, whatever the elements around it are
+    if sensitivity is None:  # a node resists by about E' per displacement, for any elements around it
         sensitivity = np.full(displacement.shape, elastic.material.plane_modulus)
-    # a symmetric map is negative in no direction but for round-off, which the work of the solution tells
+    # a symmetric map is negative in no direction but for round-off, which the work of the solution shows
     if not is_symmetric and is_indefinite(condensed.stiffness, sensitivity):
         return "the stiffness that the contact boundary sees is negative in some direction"
     return _negative_work(elastic, displacement, force, space, sensitivity)
@@ -210,14 +210,14 @@ def negative_share(
     strained = displacement - (motions @ np.linalg.lstsq(motions, displacement.ravel(), rcond=None)[0]).reshape(-1, 2)
     parts = np.append(strained * force, [] if beyond is None else beyond)
     size = float(np.abs(parts).sum())
-    # a body that only moves has strains of round-off alone, and these are known no better than that
+    # a body that only moves has only strains of round-off, and these are known no better than that
     farthest = max(
         float(np.abs(strained).max()), NOISE_FACTOR * float(np.finfo(float).eps * np.abs(displacement).max())
     )
     round_off = _ROUND_OFF * size + round_off_of(displacement, sensitivity) * farthest
     # strains are differences of displacements, and known no better than these are
     round_off += _OF_DIFFERENCES * float(np.finfo(float).eps * np.sum(np.abs(displacement * force)))
-    # forces that strain nothing, such as a pressure all around an incompressible body, move it by round-off alone
+    # forces that strain nothing, such as a pressure all around an incompressible body, move it only by round-off
     stiffest = 0.0 if sensitivity is None else float(np.abs(sensitivity).max(initial=0.0))
     if stiffest > 0.0:
         round_off += NOISE_FACTOR * float(np.finfo(float).eps * np.sum(np.abs(force)) ** 2) / stiffest
@@ -226,7 +226,7 @@ def negative_share(
 
 
 def is_indefinite(stiffness: FloatArray, sensitivity: FloatArray | None = None) -> bool:
-    """Tell whether the symmetric part of a stiffness has an eigenvalue that is negative beyond round-off.
+    """Return whether the symmetric part of a stiffness has an eigenvalue that is negative beyond round-off.
 
     Parameters
     ----------

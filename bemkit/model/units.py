@@ -93,7 +93,7 @@ def find_units(scene: Scene, mesh: BoundaryMesh) -> Units:
 def largest_sizes(scene: Scene, mesh: BoundaryMesh, length: float) -> tuple[float, float, float]:
     """Return the largest traction [Pa], the largest given displacement or interference, and the largest gap [m].
 
-    The length [m] tells which overlaps and gaps are the round-off of coordinates.
+    The length [m] decides which overlaps and gaps are the round-off of coordinates.
     """
     loads, motions, gaps = [0.0], [0.0], [0.0]
     if scene.body_forces:

@@ -26,7 +26,7 @@ _TOLERANCE = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class UntouchedBody(LinearBody):
-    """An elastic body held by its supports alone; fulfils `LinearBody` with no contact node.
+    """An elastic body held only by its supports; fulfils `LinearBody` with no contact node.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""The boundary operators of plane elasticity as scipy's linear operators: lazy, with blocks that stand alone.
+"""The boundary operators of plane elasticity as scipy's linear operators: lazy, with separate blocks.
 
 ``operator @ x``, ``operator.T``, sums and multiples are those of `scipy.sparse.linalg.LinearOperator`; they build the
 matrix on first use. ``operator.block(rows, columns)`` computes no other entries. Bodies are solved without this module,

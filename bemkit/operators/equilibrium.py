@@ -1,4 +1,4 @@
-"""Whether the forces on a body are in equilibrium, and as far as round-off lets one tell."""
+"""Whether the forces on a body are in equilibrium, up to round-off."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class Imbalance:
     force, moment : float
         As measured.
     round_off : float
-        How much of that round-off alone may leave. It is cut off at `ROUND_OFF_LIMIT`.
+        How much of that may be round-off. It is cut off at `ROUND_OFF_LIMIT`.
     """
 
     force: float
@@ -65,7 +65,7 @@ class Unbalanced:
     at_nodes, on_motions : float
         Largest force that is missing at a node, and largest work of all forces on a rigid motion of unit size.
     nodes_round_off, motions_round_off : float
-        How much of that round-off alone may leave.
+        How much of that may be round-off.
     terms : float
         Largest of the terms whose differences the forces are: those of the stiffness on each displacement.
     """

@@ -29,7 +29,7 @@ def save_animation(
 ) -> Path:
     """Write a moving picture of the deformed bodies over the steps of a load history.
 
-    Displacements of all steps are enlarged by the same factor: the smallest of those of the steps alone.
+    Displacements of all steps are enlarged by the same factor: the smallest factor of all steps.
 
     Parameters
     ----------

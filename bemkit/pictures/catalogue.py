@@ -167,7 +167,7 @@ _ALL = (
     _contact("status", "pressure and clearance along each contact", draw_contact_clearance),
     _contact("friction-cone", "friction over pressure, along each contact", draw_friction_cone, is_default=_never),
     *map(_stress, STRESSES),
-    Picture("scene", "bodies, supports, loads and obstacles alone", draw_scene, is_default=_never),
+    Picture("scene", "bodies, supports, loads and obstacles", draw_scene, is_default=_never),
     Picture("convergence", "violations over the solver's steps", draw_convergence, is_default=_never),
     Picture("friction-loop", "friction over displacement", draw_friction_loop, _without_history, _has_friction),
     Picture("work", "work and energy over time", draw_work, _without_history),

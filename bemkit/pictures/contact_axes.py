@@ -20,7 +20,7 @@ FIRST: Mapping[str, Any] = MappingProxyType({"color": BLUE, "linewidth": 1.6})
 SECOND: Mapping[str, Any] = MappingProxyType({"color": VERMILION, "linestyle": "--", "linewidth": 1.6})
 LIMIT: Mapping[str, Any] = MappingProxyType({"color": "black", "linestyle": ":", "linewidth": 1.2})
 _MOST_LINES = 40
-"""Places of change that lines mark; of a rough surface the strip of its status tells more than a forest of them."""
+"""Places of change that lines mark; of a rough surface the strip of its status shows more than many lines."""
 _PEAKED, _SHORT = 2.5, 0.015
 """How much larger the range of tractions must be than that on all but a short share of the length, and the share."""
 _NAMED = 0.12
@@ -93,7 +93,7 @@ def _draw_status(strip: Axes, solution: Result, part: str) -> None:
 def cut_peaks(
     axes: Axes, s: FloatArray, curves: Sequence[FloatArray], units: UnitNames | None, *, note_on_top: bool = False
 ) -> None:
-    """Leave peaks out that flatten all else, such as those at corners, where tractions are infinite, and say so.
+    """Cut off peaks that flatten all else, such as those at corners, where tractions are infinite, and say so.
 
     Parameters
     ----------

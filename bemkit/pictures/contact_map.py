@@ -69,7 +69,7 @@ def _longest_tooth(scene: Shown) -> float:
 
 
 def is_short(solution: Result) -> bool:
-    """Tell whether the contact that is closed takes a small share of the picture of all bodies."""
+    """Return whether the contact that is closed takes a small share of the picture of all bodies."""
     scene = shown(solution)
     frame = _zone(scene.contact)
     return frame is not None and float(np.hypot(*np.ptp(frame, axis=1))) < SHORT * scene.size

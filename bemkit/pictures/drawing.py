@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 else:
     Axes = Figure = Any  # matplotlib is loaded when something is drawn
 
-# the colours of Okabe and Ito, which people with colour-vision deficiencies can tell apart
+# the colours of Okabe and Ito, which people with colour-vision deficiencies can distinguish
 BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY = "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9"
 GREY = "#9A9A9A"
 
@@ -52,7 +52,7 @@ def ignore_round_off(axes: Axes, scale: float, axis: Literal["x", "y"] = "y") ->
     scale : float
         Size of the quantity where it matters: the largest value of the whole result, say.
     axis : {"x", "y"}
-        Along which the values stand.
+        Position of the values.
     """
     low, high = axes.dataLim.intervaly if axis == "y" else axes.dataLim.intervalx
     if high - low < _NOISE * scale:  # of the values: axes of a single one are widened by matplotlib

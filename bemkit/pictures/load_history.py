@@ -58,7 +58,7 @@ def draw_friction_loop(solution: Result, axes: Axes | None = None, *, units: Uni
 
 
 def has_friction(loading: LoadHistory) -> bool:
-    """Tell whether friction forces are more than round-off in any step."""
+    """Return whether friction forces are more than round-off in any step."""
     return any(abs(step.force_tangential) > _NO_FRICTION * abs(step.force_normal) for step in loading.steps)
 
 

@@ -90,7 +90,7 @@ def drawn_depths(shown: Shown, factor: float) -> Iterator[FloatArray]:
 
 
 def drawn_overlap(shown: Shown, factor: float) -> float:
-    """Return how much deeper [m] bodies reach into each other as they are drawn than where they stand.
+    """Return how much deeper [m] bodies overlap as drawn than in their true positions.
 
     Sliding along curved sides brings that about.
 

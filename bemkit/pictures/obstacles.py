@@ -1,4 +1,4 @@
-"""Rigid obstacles in figures: where they stand, and those that move where they are in the end."""
+"""Rigid obstacles in figures; those that move in their final position."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ _FILLED: dict[str, Any] = {"facecolor": "#EDEDED", "hatch": "////", "edgecolor":
 _BEFORE: dict[str, Any] = {"fill": False, "edgecolor": GREY, "linewidth": 1.0, "linestyle": "--", "zorder": 0}
 _POINTS_OF_CIRCLE, _POINTS_OF_SPAN, _POINTS_OF_GRID, _POINTS_OF_ELEMENT = 181, 12, 301, 5
 _BAND = 0.04
-"""Thickness of the drawn part of an obstacle known by its gap alone, in sizes of the picture."""
+"""Thickness of the drawn part of an obstacle given by its gap, in sizes of the picture."""
 
 
 def draw_obstacles(axes: Axes, shown: Shown) -> None:
     """Draw the fixed obstacles of all contact parts, within the frame of the axes.
 
-    One that is known by its gap alone is drawn where it faces the body: at the distance of the gap from each point.
+    One that is given by its gap is drawn where it faces the body: at the distance of the gap from each point.
     """
     frame = _frame(axes)
     drawn: list[object] = []

@@ -81,7 +81,7 @@ def draw_stress(
     Returns
     -------
     Axes
-        Colours end where only half a per cent of the picture has more; the title tells the largest drawn stress.
+        Colours end where only half a per cent of the picture has more; the title states the largest drawn stress.
 
     Raises
     ------

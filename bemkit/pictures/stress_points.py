@@ -30,7 +30,7 @@ _NEAREST = 0.7
 _SMALLEST = 1.0 / 8.0
 """Distance from the boundary, by the spacing far from it, below which points are not seen apart."""
 _CROWDED = 0.25
-"""Distance of points of a layer, by that from the boundary, below which one of them stands for all."""
+"""Distance of points of a layer, by that from the boundary, below which one of them represents all."""
 _GROWTH = 2.0
 """Of the distances from the boundary, from one layer of points to the next."""
 _PER_ELEMENT = 2
@@ -128,7 +128,7 @@ def _on_boundary(
 def _slopes(mesh: BoundaryMesh, space: BoundarySpace, displacement: FloatArray) -> FloatArray:
     """Return derivatives (n_elements, 2) along the boundary of what is constant on each element.
 
-    At corners, where differences of neighbours mean nothing, from the other neighbour alone.
+    At corners, where differences of neighbours mean nothing, only from the other neighbour.
     """
     values = displacement[space.element_dofs[:, 0]]
     before, after = mesh.node_elements[mesh.elements[:, 0], 0], mesh.node_elements[mesh.elements[:, 1], 1]
@@ -179,7 +179,7 @@ def _inner_points(
 
 
 def _apart(points: FloatArray, distance: FloatArray) -> IntArray:
-    """Return which of points (n, 2) that are closer to each other than distances (n,), about, stand for all of them."""
+    """Return which of points (n, 2) that are closer to each other than distances (n,), about, represent all of them."""
     cell = 2.0 ** np.floor(np.log2(distance))
     keys = np.column_stack([np.round(points / cell[:, None]), cell])
     _, first = np.unique(keys, axis=0, return_index=True)

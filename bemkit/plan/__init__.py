@@ -1,4 +1,4 @@
-"""Only what the scene needs: what a scene will take, what is left out, and why."""
+"""Only what the scene needs: the cost of a scene, what is skipped, and why."""
 
 from bemkit.operators.steklov_poincare.needs import PlanItem as PlanItem
 from bemkit.plan.plan import Plan as Plan

@@ -1,4 +1,4 @@
-"""The plan of an assembly: what its bodies and contacts need, and what is left out."""
+"""The plan of an assembly: what its bodies and contacts need, and what is skipped."""
 
 from __future__ import annotations
 
@@ -124,7 +124,7 @@ def _items(prepared: PreparedAssembly, sizes: Sizes, n_steps: int, *, is_dense: 
     yield PlanItem("contact system", True, f"{sizes.n_contact} nodes, {sizes.n_contact_unknowns} unknowns: {form}")
     modes = "supports hold all bodies"
     if sizes.n_free_motions:
-        modes = f"{sizes.n_free_motions} of {sizes.n_motions} rigid motions are held by contact alone"
+        modes = f"{sizes.n_free_motions} of {sizes.n_motions} rigid motions are held only by contact"
     yield PlanItem("rigid motions as unknowns", sizes.n_free_motions > 0, modes)
     yield from last_items(n_steps, "fields inside the bodies")
 

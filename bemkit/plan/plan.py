@@ -1,4 +1,4 @@
-"""The plan of a scene: what it needs and leaves out and why, counts, memory and time; refusal of what does not fit."""
+"""The plan of a scene: what it needs, what it skips and why, counts, memory and time; refusal of what does not fit."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ LEAST_SECONDS = 0.1
 _MANY = 10_000
 """Elements that are divided and planned in a moment, whether they fit or not."""
 _FEW = 4_000
-"""Elements of the mesh from whose plan larger ones are told."""
+"""Elements of the mesh from whose plan larger ones are extrapolated."""
 _OF_SIDE = 4
 """Elements of a side on a coarse mesh; no mesh has less than one between two ends of sides and parts."""
 _DEGREES = ("constant", "linear", "quadratic")
@@ -112,7 +112,7 @@ def find_sizes(prepared: Prepared) -> Sizes:
 def plan_items(
     scene: Scene, sizes: Sizes, of_body: tuple[PlanItem, ...], n_steps: int, proposal: Symmetry | None = None
 ) -> tuple[PlanItem, ...]:
-    """Say what a scene needs and what it leaves out, in the order in which it is used.
+    """List what a scene needs and what it skips, in the order of use.
 
     Besides the sizes that is what the discretisation says of its map, the number of load steps, and a symmetry that the
     scene has but does not use.
@@ -202,7 +202,7 @@ def _contact_items(scene: Scene, sizes: Sizes, n_steps: int) -> Iterator[PlanIte
     yield PlanItem("tangential unknowns", c > n, tangential)
     modes = "the supports hold all rigid motions"
     if n_free:
-        modes = f"{n_free} of {sizes.n_motions} rigid motions {'is' if n_free == 1 else 'are'} held by contact alone"
+        modes = f"{n_free} of {sizes.n_motions} rigid motions {'is' if n_free == 1 else 'are'} held only by contact"
     yield PlanItem("rigid motions as unknowns", n_free > 0, modes)
 
 
@@ -228,7 +228,7 @@ class Plan(ShownInNotebooks):
     memory : int [bytes]
         Largest sum of all arrays that exist at the same time.
     seconds : float [s]
-        On a common computer; tells milliseconds from seconds from minutes.
+        On a common computer; its order of magnitude is right.
     items : tuple of PlanItem
         In the order in which they are used.
     warnings : tuple of ResultWarning
@@ -258,7 +258,7 @@ class Plan(ShownInNotebooks):
 
 
 def make_plan(scene: Scene, mesh: BoundaryMesh, *, proposal: Symmetry | None = None) -> Plan:
-    """Return what a scene needs on a mesh and what it leaves out, before anything expensive happens.
+    """Return what a scene needs on a mesh and what it skips, before anything expensive happens.
 
     Parameters
     ----------
@@ -332,7 +332,7 @@ def check_elements(scene: Scene) -> None:
     """Refuse a number of elements whose matrices cannot fit into this computer, before the mesh is made.
 
     Memory grows with the square of that number, or linearly where the equations are compressed: the plans for small
-    meshes tell what a large one takes. A periodic half-plane has no matrices.
+    meshes predict the cost of a large one. A periodic half-plane has no matrices.
 
     Raises
     ------

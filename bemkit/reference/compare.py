@@ -70,7 +70,7 @@ class Places:
     s : (n,) array [m]
         Arc lengths from the start of the part.
     weight : (n,) array [m]
-        Length of boundary that each place stands for.
+        Length of boundary of each point.
     """
 
     part: str
@@ -122,7 +122,7 @@ class Reference:
     places : tuple of Places
     answer : Answer
     own_errors : mapping of str to float
-        How far it may itself be wrong, by the names of `MEASURES`; round-off where left out.
+        How far it may itself be wrong, by the names of `MEASURES`; by default round-off.
     """
 
     source: str

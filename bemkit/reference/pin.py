@@ -19,7 +19,7 @@ from bemkit.reference.hertz import check_positive
 from bemkit.reference.pressure import N_TERMS, EvenPressure, half_width_for, solve_pressure
 
 NEAT_FIT = np.radians(84.827946)
-"""Half-angle [rad] of contact without clearance between equal materials, whatever the load."""
+"""Half-angle [rad] of contact without clearance between equal materials, for any load."""
 
 
 def persson_load(half_angle: float) -> float:

@@ -1,4 +1,4 @@
-"""Rings and discs under pressures, interference, torque and rotation: fields that depend on the radius alone.
+"""Rings and discs under pressures, interference, torque and rotation: fields that depend only on the radius.
 
 Stresses are positive in tension, displacements outwards. Formulas are those of plane strain in kappa and the shear
 modulus, so that they hold for plane stress and for incompressible bodies too.

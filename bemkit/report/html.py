@@ -45,7 +45,7 @@ def facts(rows: Iterable[tuple[str, str]], caption: str) -> Element:
 
 
 def table(rows: Sequence[Mapping[str, object]], caption: str) -> Element:
-    """Return a table of rows that share their keys, which head the columns; numbers stand to the right."""
+    """Return a table of rows that share their keys, which head the columns; numbers are aligned to the right."""
     names = list(rows[0]) if rows else []
     head = element("tr", *(element("th", name.replace("_", " "), scope="col") for name in names))
     lines = [element("tr", *(_cell(row[name]) for name in names)) for row in rows]

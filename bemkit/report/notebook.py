@@ -43,8 +43,8 @@ def notebook_html(value: object) -> str:
 
 def _result(result: Result) -> Element:
     warnings = [element("li", warning.text) for warning in result.warnings]
-    doubts = [element("ul", *warnings)] if warnings else []
-    return element("div", element("p", badge(result)), facts(headline_rows(result), "Result"), *doubts)
+    lists = [element("ul", *warnings)] if warnings else []
+    return element("div", element("p", badge(result)), facts(headline_rows(result), "Result"), *lists)
 
 
 def _pictures_of(result: Result) -> list[Callable[[], Axes]]:

@@ -76,7 +76,7 @@ def save_report(path: str | Path, result: Result) -> Path:
     Raises
     ------
     OutputFileError
-        If the file cannot be written, or a file that is no page stands in the way.
+        If the file cannot be written, or a file that is no page has its name.
     """
     target = check_report(path)
     write_text(target, report(result))

@@ -23,7 +23,7 @@ _COUNTED = ("n_bodies", "n_elements", "n_contact", "linear_solves", "outer_steps
 
 def badge(result: Result) -> Element:
     """Return the status in a word, with a class for its colour."""
-    kind = "good" if result.is_converged else "doubtful" if result.is_certified else "bad"
+    kind = "good" if result.is_converged else "warned" if result.is_certified else "bad"
     return element("strong", result.status_words, class_=f"badge {kind}")
 
 
@@ -42,9 +42,9 @@ def headline_rows(result: Result) -> Iterator[tuple[str, str]]:
 
 
 def warnings_section(result: Result) -> list[Element]:
-    """Return what is doubtful, one sentence each."""
+    """Return the warnings, one sentence each."""
     sentences = [element("li", warning.text) for warning in result.warnings]
-    return [element("ul", *sentences) if sentences else element("p", "Nothing is known to be doubtful.")]
+    return [element("ul", *sentences) if sentences else element("p", "No warnings.")]
 
 
 def forces_section(result: Result) -> list[Element]:
@@ -86,10 +86,10 @@ def convergence_section(result: Result) -> list[Element]:
 
 
 def plan_section(plan: Plan) -> list[Element]:
-    """Return what was needed and what was left out, and why."""
+    """Return what was needed and what was skipped, and why."""
     rows = [{"item": item.name, "needed": item.is_needed, "why": item.reason} for item in plan.items]
     size = f"{plan.memory / 1e6:.3g} MB of memory, about {plan.seconds:.2g} s on a common computer."
-    return [element("p", size), table(rows, "What the scene needs and what is left out")]
+    return [element("p", size), table(rows, "What is computed, what is skipped, and why")]
 
 
 def scene_section(result: Result) -> list[Element]:

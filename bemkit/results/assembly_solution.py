@@ -33,7 +33,7 @@ class BodyResult(SolvedBody):
     ----------
     name : str
     scene : Scene
-        What was said of the body alone, its mesh in the coordinates of its shape.
+        The scene of the body, its mesh in the coordinates of its shape.
     mesh : BoundaryMesh
         In its place.
     boundary : BoundaryFields
@@ -226,7 +226,7 @@ class AssemblySolution(SolvedProblem):
         """Estimated error of the contact tractions of all bodies in L2, relative to their norm.
 
         From degree 3 on; None for other elements, and if there are no such tractions. Elements at edges that press into
-        another side, and at singular corners, are left out; see `contact_elements`.
+        another side, and at singular corners, are excluded; see `contact_elements`.
         """
         size, errors_of_bodies = self.contact_traction_size, [body.coefficient_errors for body in self.solved_bodies]
         if size == 0.0 or any(errors is None for errors in errors_of_bodies):

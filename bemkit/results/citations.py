@@ -98,7 +98,7 @@ def cite(subject: Scene | Assembly | Solution | AssemblySolution) -> Citations:
     Parameters
     ----------
     subject : Scene, Assembly, Solution or AssemblySolution
-        A solution tells more than its scene: the linear solver that was chosen, and which drivers took part.
+        A solution contains more than its scene: the linear solver that was chosen, and which drivers took part.
 
     Returns
     -------

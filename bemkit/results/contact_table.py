@@ -35,7 +35,7 @@ CONTACT_COLUMNS = (
     Column("gap", "m", "initial distance", ".6g"),
     Column("clearance", "m", "distance left, gap - u_n", ".6g"),
     Column("status", "", "separated, slip or stick; in files 0, 1 stick, 2 slip along the tangent, 3 slip against it"),
-    Column("weight", "m", "length of boundary that the node stands for", ".6g"),
+    Column("weight", "m", "length of boundary of the node", ".6g"),
     Column("part", "", "contact part or contact of each node"),
 )
 """Columns of the contact table in results, tables and files."""
@@ -66,7 +66,7 @@ class ContactTable:
         Distance left, ``gap - u_n``.
     status : (n_contact,) array of `NodeStatus` values
     weight : (n_contact,) array [m]
-        Length of boundary that the node stands for.
+        Length of boundary of the node.
 
     Raises
     ------
@@ -134,7 +134,7 @@ class ContactTable:
     def is_joined(self) -> BoolArray:
         """(n_contact - 1,) bool: whether a node and the next one follow each other on one piece of one part."""
         distance = np.hypot(np.diff(self.x), np.diff(self.y))
-        # the lengths two neighbours stand for add up to at least their distance, however graded the mesh is
+        # the lengths of two neighbours add up to at least their distance, however graded the mesh is
         reach = (1.0 + 1e-9) * (self.weight[:-1] + self.weight[1:])
         return np.equal(self.part[:-1], self.part[1:]) & (distance <= reach)
 
@@ -219,7 +219,7 @@ def find_transitions(contact: ContactTable, slip: FloatArray | None = None) -> t
     Returns
     -------
     tuple of Transition
-        In order along each part. A change of the direction of slip alone is not a transition.
+        In order along each part. A mere change of the direction of slip is not a transition.
 
     Notes
     -----

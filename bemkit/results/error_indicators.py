@@ -98,7 +98,7 @@ def element_errors(space: BoundarySpace, displacement: FloatArray, plane_modulus
     Notes
     -----
     At a node between elements of lengths a and b whose strains du/ds differ by j the estimate is E' h^2 |j|^2 / 64,
-    h = 2 a b / (a + b), half of it for either element. Corners and ends of boundary parts are left out: there strains
+    h = 2 a b / (a + b), half of it for either element. Corners and ends of boundary parts are excluded: there strains
     may jump. So is the rigid motion of the body, which curved elements hold only as an interpolant.
     """
     mesh = space.mesh
@@ -186,8 +186,8 @@ def mean_traction_errors(mesh: BoundaryMesh, traction: FloatArray) -> FloatArray
 
     Notes
     -----
-    What an element leaves out of a traction with the slope t' is a saw tooth of the moment m = h^2 t' / 12 for each
-    length. It displaces the surface as the tractions -m' do, which therefore stand in the solution: on smooth meshes
+    The error of an element for a traction with the slope t' is a saw tooth of the moment m = h^2 t' / 12 for each
+    length. It displaces the surface as the tractions -m' do, which are therefore in the solution: on smooth meshes
     the second order, more where lengths jump. To the jumps of m, half of one for either element, comes the
     difference between the mean of an element and its centre, a 24th of the second difference. Where tractions are
     infinite, at ends of parts, nothing is added.
@@ -245,7 +245,7 @@ def place_error(
 
 
 def blind_elements(mesh: BoundaryMesh, degree: int) -> BoolArray:
-    """Tell which elements have too few neighbours on their piece of the boundary to estimate the error of tractions.
+    """Return which elements have too few neighbours on their piece of the boundary to estimate the error of tractions.
 
     Parameters
     ----------

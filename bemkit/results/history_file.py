@@ -1,4 +1,4 @@
-"""Load histories in result files: what stands there besides the last step, which the file holds like any result.
+"""Load histories in result files: the steps before the last, which the file holds like any result.
 
 /asked           text, the scene or assembly as TOML with all its steps; /scene or /assembly is that of the last step
 /steps           table: time, work and energy of each finished step; attribute n_steps
@@ -6,7 +6,7 @@
 /steps/slip      (n_finished, n_contact) array: the path that each node has slipped; last_slip: in the last increment
 /steps/state     dimensionless displacement and traction of the contact nodes, from which a run goes on, a row a step
 
-and what stands there of the ends of all steps, stacked:
+and the ends of all steps, stacked:
 
 /steps/certificate       table: the entries of the certificate of each step
 /steps/transitions       table as /transitions, with the number of the step, counted from 0

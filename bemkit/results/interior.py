@@ -18,7 +18,7 @@ def interior_fields(solution: SolvedBody) -> InteriorFields:
     ----------
     solution : Solution or BodyResult
         As `run` returns it or `read_result` reads it. Look at its status first: fields of a run that did not converge
-        are fields of whatever it reached.
+        are fields of the last state it reached.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""What a result says of the steps of a load history: forces, status and work of each, and where the last one stands."""
+"""What a result says of the steps of a load history: forces, status and work of each, position of the last."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class StepEnd(Protocol):
 
 
 _COARSE = 0.01
-"""Share of the external work that the size of increments may leave without a word."""
+"""Share of the external work that increments may lose without a warning."""
 
 
 @dataclass(frozen=True)

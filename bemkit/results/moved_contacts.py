@@ -16,7 +16,7 @@ from bemkit.results.solved_body import SolvedBody
 from bemkit.scene.conditions import Contact
 
 _IN_THE_PLANE = (HalfPlane, Circle, Cavity, PolygonalObstacle, SplineObstacle, SignedDistance)
-"""Obstacles that stand somewhere in the plane, so that their distance from a point that has moved is known."""
+"""Obstacles with a position in the plane, so that their distance from a point that has moved is known."""
 _PRESSED = 0.01
 """Share of the largest pressure from which on a point counts as pressed."""
 
@@ -30,8 +30,8 @@ def distances_off(body: SolvedBody) -> dict[str, tuple[float, float]]:
     Returns
     -------
     dict of str to (float, float) [m]
-        By contact part, of obstacles that stand in the plane: the largest difference where the part is pressed, and the
-        displacement that its contact force causes, force / E'. Parts without contact force are left out.
+        By contact part, of obstacles in the plane: the largest difference where the part is pressed, and the
+        displacement that its contact force causes, force / E'. Parts without contact force are excluded.
     """
     found = {}
     for part in body.scene.parts:

@@ -47,7 +47,7 @@ class RigidResult(PartForce):
     ----------
     name : str
     force_x, force_y : float [N/m]
-        What acts on it besides its contacts: its given load, or the reaction that moves it as it is told. Contacts
+        What acts on it besides its contacts: its given load, or the reaction to its given motion. Contacts
         exert the opposite.
     moment : float [N m/m]
         The same about its centre, anticlockwise.

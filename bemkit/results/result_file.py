@@ -25,7 +25,7 @@ Of an assembly these groups differ:
     /bodies/N        mesh and boundary of body N, as /mesh and /boundary of a scene; attributes name, energy
     /contact         with columns direction_x, direction_y and, with friction, friction_bound
     /contacts        table: what each contact transmits
-    /rigid           table: how each rigid body moved, and what acts on it; left out without rigid bodies
+    /rigid           table: how each rigid body moved, and what acts on it; absent without rigid bodies
 
 Of a load history there are also /asked and /steps; see `bemkit.results.history_file`.
 """
@@ -91,7 +91,7 @@ def check_result_target(path: str | Path) -> Path:
     Raises
     ------
     OutputFileError
-        If the folder cannot be written to, or a file that is not a bemkit result stands in the way.
+        If the folder cannot be written to, or a file that is not a bemkit result has its name.
     """
     if str(path) == "-":
         raise OutputFileError("- is standard output, which cannot take a binary result: give a file name")
@@ -110,7 +110,7 @@ def write_result(path: str | Path, solution: Solution | AssemblySolution) -> Non
     Raises
     ------
     OutputFileError
-        If the file cannot be written, or a file that is not a bemkit result stands in the way.
+        If the file cannot be written, or a file that is not a bemkit result has its name.
     SceneError
         If the scene holds a Python function, which a file cannot hold.
     """

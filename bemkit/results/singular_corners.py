@@ -28,7 +28,7 @@ from bemkit.solvers.active_sets import NodeStatus
 _PARALLEL = 1e-6
 """Component along the normal, or along the tangent, that is none."""
 _DIGITS = 6
-"""Of angles: round-off of short elements must not tell them apart."""
+"""Of angles: round-off of short elements must not separate equal ones."""
 _BEFORE, _AFTER = 0, 1
 """The element that ends at a node, and the one that starts there."""
 
@@ -73,7 +73,7 @@ def singular_corners(
 ) -> tuple[SingularCorner, ...]:
     """Return the corners and ends of contact parts at which contact tractions grow without bound.
 
-    Contact reaches them, and what is given on their two sides lets tractions grow; contact nodes beside them tell
+    Contact reaches them, and what is given on their two sides lets tractions grow; contact nodes beside them show
     whether they stick, and which way they slip. None on symmetry lines, where nothing is singular, and on half-planes.
 
     Parameters

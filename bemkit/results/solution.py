@@ -92,9 +92,9 @@ class Solution(SolvedProblem, SolvedBody):
     def estimated_local_traction_error(self) -> float | None:
         """Estimated largest error of the tractions of a half-plane on an element; None for another body.
 
-        Relative to the traction on the element or to the mean of all, whichever is larger. The worst elements are left
-        out, on a share of the loaded length no larger than the error itself: where tractions are infinite no element is
-        right.
+        Relative to the traction on the element or to the mean of all, whichever is larger. The worst elements are
+        excluded, on a share of the loaded length no larger than the error itself: no element is right where tractions
+        are infinite.
         """
         return None if self.surface_errors is None else self.surface_errors.largest
 

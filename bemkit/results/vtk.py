@@ -1,6 +1,6 @@
 """Results for ParaView and the like: boundaries as lines, contact nodes as vertices, quadrilaterals inside.
 
-The XML files of VTK are unstructured grids (.vtu) and polygonal data (.vtp). Arrays stand there in base64, each behind
+The XML files of VTK are unstructured grids (.vtu) and polygonal data (.vtp). Arrays are written in base64, each behind
 the number of its bytes; see "VTK XML file formats" in the documentation of VTK.
 """
 
@@ -210,7 +210,7 @@ def _inside(body: Solution | BodyResult, number: int, across: int) -> Block:
 
 
 def _is_clear(centres: FloatArray, lengths: FloatArray, points: FloatArray) -> BoolArray:
-    """Tell which points are farther from every element than its half length; centres stand for elements."""
+    """Return which points are farther from every element than its half length; centres represent elements."""
     from scipy.spatial import cKDTree
 
     reach = (0.5 + _CLEAR) * lengths

@@ -44,7 +44,7 @@ LARGEST_DISTANCE_OFF = 0.2
 """Difference between distances from an obstacle after the displacement and the clearances that were solved, relative to
 the displacement that the contact force causes, above which contact is no longer where it was solved."""
 FEWEST_NODES = 4
-"""Contact nodes that resolve a zone: fewer tell neither its size nor its largest traction."""
+"""Contact nodes that resolve a zone: fewer show neither its size nor its largest traction."""
 _CLOSED = 1e-9
 """Clearance, relative to the largest one, up to which a node counts as closed: round-off of zero."""
 
@@ -255,7 +255,7 @@ def _coarse_curves(mesh: BoundaryMesh) -> Iterator[ResultWarning]:
 
 
 def _narrow_zones(contact: ContactTable, smooth: Collection[str], remedy: str) -> Iterator[ResultWarning]:
-    """Warn of zones of contact, stick and slip of few nodes; of smooth parts, without friction, of contact alone."""
+    """Warn of zones of contact, stick and slip of few nodes; of smooth parts, without friction, only of contact."""
     words = np.array(contact.status_words(), dtype=object)
     # friction that acts across a gap sticks or slips without contact
     clearance = np.where(np.isfinite(contact.clearance), contact.clearance, 0.0)

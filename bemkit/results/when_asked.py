@@ -11,7 +11,7 @@ Value = TypeVar("Value")
 class WhenAsked(Generic[Value]):
     """A field of a dataclass that holds its value, or a function of the whole that returns it, called at most once.
 
-    Type checkers see the value alone. Where the field may be a function, a method of the class takes it.
+    Type checkers see only the value. Where the field may be a function, a method of the class takes it.
 
     Parameters
     ----------

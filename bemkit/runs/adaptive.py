@@ -146,7 +146,7 @@ class _Refinement(Generic[AnyScene, AnySolution]):
     def following(self, level: Level[AnyScene], solutions: Sequence[AnySolution]) -> Level[AnyScene] | None:
         following = self.meshes.following(level, solutions)
         if following is not None:
-            _ = following.meshes  # whatever is wrong with them is said now
+            _ = following.meshes  # errors in them are raised now
         return following
 
     def excess(self, level: Level[AnyScene], most_elements: int) -> str:

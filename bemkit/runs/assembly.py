@@ -85,7 +85,7 @@ def run_assembly_history(
     ----------
     assemblies : sequence of Assembly
         The same bodies and contacts under changing loads, motions, gaps or laws; one with several steps or load factors
-        stands for as many.
+        is as many.
     meshes, callback, executor : optional
         As for `run_assembly`.
 

@@ -52,5 +52,5 @@ def largest_load_factor(assembly: Assembly, *, meshes: Mapping[str, BoundaryMesh
         growing = model.body.rigid_load() - at_rest.body.rigid_load()
         factor = largest_factor(at_rest.problem, growing)
     if factor is None:
-        raise UnsolvableSceneError("no contact tractions can balance the constant load, whatever the load factor")
+        raise UnsolvableSceneError("no contact tractions can balance the constant load, at any load factor")
     return factor

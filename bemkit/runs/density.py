@@ -68,7 +68,7 @@ class DensityMeshes:
         return max(self.accuracy, LEAST_LOCAL)
 
     def is_enough(self, solutions: Sequence[AnySolution]) -> bool:
-        """Tell whether the estimated error is small enough, and the elements in which the status changes short."""
+        """Return whether the estimated error is small enough, and the elements in which the status changes short."""
         ends = StepErrors.of(solutions[-1]).worst.zone_ends
         return is_enough([self.error(each) for each in solutions], ends, self.accuracy)
 
@@ -111,7 +111,7 @@ class DensityMeshes:
 
 
 def is_enough(errors: Sequence[float], ends: Iterable[ZoneEnd], accuracy: float) -> bool:
-    """Tell whether the estimated errors have become small enough, and the elements in which the status changes short.
+    """Return whether the estimated errors have become small enough, and the elements in which the status changes short.
 
     Tractions there behave like square roots; an element of length h leaves a relative error of about h / (3 l) in a
     contact zone of length l. The energy hardly notices.

@@ -44,7 +44,7 @@ class EarlierSteps(Generic[AnySolution]):
 
 
 def _has_meshes(solution: Solution | AssemblySolution, meshes: Mapping[str, BoundaryMesh]) -> bool:
-    """Tell whether a solution is one on these meshes, wherever its bodies lie."""
+    """Return whether a solution is one on these meshes, wherever its bodies lie."""
     own = {"": solution.mesh} if isinstance(solution, Solution) else {k: v.mesh for k, v in solution.bodies.items()}
     pairs = [(own[name].lengths, mesh.lengths) for name, mesh in meshes.items()]
     return all(one.shape == two.shape and np.allclose(one, two, rtol=_SAME, atol=0.0) for one, two in pairs)

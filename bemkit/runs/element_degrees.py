@@ -2,7 +2,7 @@
 
 On a geometric mesh the best degrees fall in proportion to the number of layers below the longest element, and smooth
 fields on short elements need less than on long ones [GuiBabuska1986]. As every pair of degrees is a sweep of its own,
-there are only a few, and one alone where the sweeps would cost more than the unknowns.
+there are only a few, and only one where the sweeps would cost more than the unknowns.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import numpy as np
 from bemkit.arrays import FloatArray, IntArray
 
 LEAST_DEGREE = 3
-"""Lowest degree whose error the decay of coefficients tells."""
+"""Lowest degree whose error follows from the decay of coefficients."""
 DEGREES_PER_LAYER = 1.5
 """Degrees that elements lose from layer to layer: a square root at the tip of layers that shrink by 0.2 would allow
 1.7."""

@@ -45,7 +45,7 @@ def run_history(
     Parameters
     ----------
     scenes : sequence of Scene
-        One body under changing loads, obstacles or laws; a scene with several steps or load factors stands for as many.
+        One body under changing loads, obstacles or laws; a scene with several steps or load factors is as many.
     mesh, start, callback : optional
         As for `run`.
 
@@ -81,7 +81,7 @@ def _guess(scene: Scene, start: Solution | None) -> Callable[[Model], ContactSta
     if start is None:
         return None
     if not scene.contact_parts:
-        raise NoContactError("start is given, but no part is in contact: leave it out, there is nothing to iterate")
+        raise NoContactError("start is given, but no part is in contact: remove it; nothing is iterated")
     from bemkit.runs.warm_start import state_on
 
     return lambda model: state_on(model, start)

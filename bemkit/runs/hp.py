@@ -54,23 +54,23 @@ COARSE = 2e-3
 """Accuracy that the first mesh in layers may reach with degree 4; for less, if it may be the last, it has a degree
 more, and a layer more where loads jump."""
 NEXT_ERROR = 0.04
-"""Part of the error of contact tractions that the next mesh keeps, whatever its degree: places where the status changes
+"""Part of the error of contact tractions that the next mesh keeps, at any degree: points where the status changes
 have moved away from their nodes (0.01 to 0.1 on the scenes with a reference)."""
 LAST_TIPS = 10.0
 """Length of the elements beside places that have moved, relative to a piece and in units of the accuracy, from which
-the last mesh asks for no shorter ones. Shorter ones only tell the places of the next mesh."""
+the last mesh asks for no shorter ones. Shorter ones only locate the points of the next mesh."""
 SPREADING = 0.6
 """Factor per degree from which an error of contact tractions beside a singular corner has spread from there. In layers
 that a power of the distance runs through it is 0.36."""
 MOST_CUTS = 8
 """Places of change at which the mesh of all copies of a body is cut: each cut costs all of them layers."""
 MOST_LOOKS = 3
-"""Meshes to resolve zones for which a single node stands; what is left then is a node that a support holds."""
+"""Meshes to resolve zones of a single node; a zone that remains then is a node that a support holds."""
 
 
 @dataclass(frozen=True)
 class LayeredMeshes:
-    """Each mesh divides what the degree alone would leave too inaccurate.
+    """Each mesh divides the elements that a higher degree would not make accurate enough.
 
     The first one after the first look is made anew, of few elements; its pieces end where the contact status changes,
     and move with these places from mesh to mesh.
@@ -91,12 +91,12 @@ class LayeredMeshes:
         return np.inf if energy is None or tractions is None else max(energy, tractions)
 
     def is_enough(self, solutions: Sequence[AnySolution]) -> bool:
-        """Tell whether the error is small enough; not after the first look, whose zones end inside of elements."""
+        """Return whether the error is small enough; not after the first look, whose zones end inside of elements."""
         is_first = len(solutions) == 1 and bool(solutions[0].transitions)
         return not is_first and self.error(solutions[-1]) <= self.accuracy
 
     def _is_stuck(self, solutions: Sequence[AnySolution]) -> bool:
-        """Tell whether the last two meshes have not halved the error of the best before them, all in layers."""
+        """Return whether the last two meshes have not halved the error of the best before them, all in layers."""
         errors = [
             self.error(solution)
             for solution in solutions
@@ -112,7 +112,7 @@ class LayeredMeshes:
         if mesh.lengths[worst] < 2.0 / FACTOR * shortest_length(mesh):
             x, y = mesh.centres[worst]
             raise GeometryError(
-                f"the largest error stands at ({x:.6g}, {y:.6g}), where an element of the length "
+                f"the largest error is at ({x:.6g}, {y:.6g}), where an element of the length "
                 f"{mesh.lengths[worst]:.1e} is about as short as coordinates hold"
             )
 
@@ -136,7 +136,7 @@ class LayeredMeshes:
     def _finer_look(
         self, level: Level[AnyScene], members: Sequence[Member], solutions: Sequence[AnySolution]
     ) -> Level[AnyScene] | None:
-        """Return denser meshes if single nodes stand for zones; None if none does, or another look does not help."""
+        """Return denser meshes if zones have single nodes; None if none does, or another look does not help."""
         table, transitions = solutions[-1].contact, solutions[-1].transitions
         n_unresolved = len(transitions) - len(resolved_transitions(table, transitions))
         # both ends of a stick zone of one node between opposite slips are resolved by layers
@@ -209,7 +209,7 @@ class LayeredMeshes:
         def excess(degrees: IntArray) -> FloatArray:
             return self._share(errors, errors.elements.at_higher_degrees(degrees - errors.degrees))
 
-        # never below the old degree: coefficients that have reached round-off do not tell how fast they fell before
+        # never below the old degree: coefficients that have reached round-off do not show how fast they fell before
         kept = np.maximum(sufficient_degrees(excess, errors.degrees.size, largest), errors.degrees)[elements]
         return tuple(few_kinds(below_layers(np.where(is_cut, largest, kept), layers)).tolist())
 
@@ -264,7 +264,7 @@ class _Errors:
 
     @classmethod
     def of(cls, level: Level[AnyScene], solution: AnySolution) -> _Errors | None:
-        """Return the errors of a solution; None if degrees are too low to tell them."""
+        """Return the errors of a solution; None if degrees are too low for an estimate."""
         members = level.members(solution)
         known = [[body.coefficient_errors for body in member.bodies] for member in members]
         if any(own is None for of_copies in known for own in of_copies):
@@ -351,7 +351,7 @@ def _settled_cuts(member: Member) -> dict[int, list[float]]:
 
 
 def _settled(places: Sequence[float]) -> list[float]:
-    """Return the medians of places of change that `FLICKER` does not tell apart."""
+    """Return the medians of transition points closer than `FLICKER`."""
     ascending = np.sort(places)
     groups = np.split(ascending, 1 + np.flatnonzero(np.diff(ascending) > FLICKER))
     return [float(np.median(group)) for group in groups]

@@ -155,8 +155,8 @@ class ReachedStep:
     @property
     def work(self) -> StepWork:
         """The work up to that end."""
-        stands = pairwise((self.path.start, *self.ends))
-        return sum((end.work_from(before, self.path.model) for before, end in stands), StepWork())
+        pairs = pairwise((self.path.start, *self.ends))
+        return sum((end.work_from(before, self.path.model) for before, end in pairs), StepWork())
 
 
 @dataclass(frozen=True, eq=False)

@@ -50,7 +50,7 @@ class Level(Generic[AnyScene]):
     partitions : tuple of Partition
         How bodies are divided; copies have one in common.
     keys : mapping of str to int
-        The number of the partition of each body, by its name; a body alone has none.
+        The number of the partition of each body, by its name; a single body has none.
     touching : tuple of tuple of str
         The parts of each partition that are in contact.
     is_layered : bool
@@ -59,7 +59,7 @@ class Level(Generic[AnyScene]):
         Of the elements on layered meshes if degrees rise; 2 on the first mesh, which only looks for the places where
         the contact status changes.
     degrees : tuple of int
-        Of each element of a body alone, where they are lower than `degree`.
+        Of each element of a single body, where they are lower than `degree`.
     """
 
     asked: AnyScene
@@ -79,7 +79,7 @@ class Level(Generic[AnyScene]):
 
     @property
     def partition(self) -> Partition:
-        """How a body alone is divided."""
+        """How a single body is divided."""
         (partition,) = self.partitions
         return partition
 
@@ -167,7 +167,7 @@ class MeshSequence(Protocol[AnyJudged]):
         ...
 
     def is_enough(self, solutions: Sequence[AnyJudged]) -> bool:
-        """Tell whether the last of the solutions is as accurate as it shall be."""
+        """Return whether the last of the solutions is as accurate as it shall be."""
         ...
 
     def following(self, level: Level[AnyScene], solutions: Sequence[AnyJudged]) -> Level[AnyScene] | None:

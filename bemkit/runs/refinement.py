@@ -15,7 +15,7 @@ from bemkit.solvers.base import Status
 
 
 class SizedLevel(Protocol):
-    """What is solved next, by whatever a `Refinement` keeps of it."""
+    """What is solved next, in the form that a `Refinement` keeps."""
 
     @property
     def n_elements(self) -> int:
@@ -47,7 +47,7 @@ class Refinement(Protocol[AnyLevel, AnySolution]):
         ...
 
     def is_enough(self, solutions: Sequence[AnySolution]) -> bool:
-        """Tell whether the last of the solutions is as accurate as it shall be."""
+        """Return whether the last of the solutions is as accurate as it shall be."""
         ...
 
     def following(self, level: AnyLevel, solutions: Sequence[AnySolution]) -> AnyLevel | None:

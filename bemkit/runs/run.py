@@ -95,9 +95,7 @@ def run(
     if not isinstance(scene, Scene):
         return _run_assembly(scene, mesh, start, callback, executor)
     if executor is not None:
-        raise InputError(
-            "executor is given with one body, which is a single piece of work: leave it out, or give several"
-        )
+        raise InputError("executor is given with one body, which is a single piece of work: remove it, or give several")
     if scene.mesh.accuracy is not None and mesh is None:
         from bemkit.runs.adaptive import run_adaptive  # only where it is asked for
 
@@ -137,7 +135,7 @@ def _run_assembly(
 ) -> AssemblySolution:
     for name, value in (("mesh", mesh), ("start", start)):
         if value is not None:
-            raise InputError(f"{name} is given with an assembly of several bodies: leave it out")
+            raise InputError(f"{name} is given with an assembly of several bodies: remove it")
     if assembly.mesh.accuracy is not None:
         from bemkit.runs.adaptive import run_assembly_adaptive
 

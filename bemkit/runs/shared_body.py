@@ -34,7 +34,7 @@ AnySolution = Solution | AssemblySolution
 
 
 class SharedBody:
-    """Solves scenes that differ in loads, obstacles and laws alone; slip counts from rest in each of them.
+    """Solves scenes that differ only in loads, obstacles and laws; slip counts from rest in each of them.
 
     The body is made when the first scene is solved, out of the scene with most friction, so that results do not depend
     on which scenes were solved before.
@@ -44,7 +44,7 @@ class SharedBody:
     scenes : sequence of Scene or Assembly
         All of the same bodies, meshes, discretisation and kinds of conditions, without an accuracy.
     has_one_load : bool
-        Whether they differ in their laws and solvers alone.
+        Whether they differ only in their laws and solvers.
     starts_cold : bool
         Whether each solve begins with every node sticking, as `bemkit.run` does. By default it begins at the solution
         before, as a guess; where a scene has several solutions the guess chooses among them.
@@ -150,7 +150,7 @@ class _OneBody:
         return solution
 
     def _under(self, scene: Scene) -> tuple[Model, tuple[Prepared, ...]]:
-        """Return the model of the first load step, and all steps, in the units that the scene has when it is alone."""
+        """Return the model of the first load step, and all steps, in the units of the scene itself."""
         steps, base = load_steps(scene), self._model.scene
         if self._has_one_load and _frictionless_parts(scene) == _frictionless_parts(base):
             model = self._model.with_law(steps[0])

@@ -142,7 +142,7 @@ def solved_history(
     ----------
     kind : Kind
     asked : sequence of Scene or of Assembly
-        One with several steps or load factors stands for as many.
+        One with several steps or load factors is as many.
     meshes : BoundaryMesh, or mapping of str to BoundaryMesh, optional
         As `bemkit.run` and `bemkit.run_assembly_history` take them.
     callback : callable, optional
@@ -298,7 +298,7 @@ def _loading(
 
 
 def _not_reached(before: AnySolution | None, result: ContactSolution, clock: StageClock) -> AnySolution:
-    """Return what stands for a step that failed: the fields of the step before, and why they are the last."""
+    """Return the result of a step that failed: the fields of the step before, and why they are the last."""
     if before is None or before.loading is None:
         raise InputError("there is no step before the one that failed")
     return replace(

@@ -43,7 +43,7 @@ class ContactPair:
         Each ``"body.part"``, or ``"body.side"`` by the name of a side of its shape; one of them may be the name of a
         `RigidBody`. Two sides of one body may touch, too, as in a split ring.
     law : FrictionLaw, optional
-        That of the assembly if left out.
+        By default that of the assembly.
     gap : float [m]
         Added to the distance of the shapes; negative presses bodies together that are drawn touching.
     interference : float [m]
@@ -118,7 +118,7 @@ class Touching:
     within : float [m]
         Largest distance of sides that face each other.
     law : FrictionLaw, optional
-        That of the assembly if left out.
+        By default that of the assembly.
     reach : float [m], optional
         Of each contact found; see `ContactPair`.
 
@@ -169,8 +169,8 @@ class Assembly(Stated):
     linear_solver : LinearSolver or Automatic
     symmetry : Symmetry, optional
         Lines about which everything is symmetric. Bodies that they cross are halved, and must be drawn in their places;
-        of those beside them only the ones on the side of smaller x, or y, are listed: images stand for the others.
-        Whatever touches its own image at a line needs an obstacle there.
+        of those beside them only the ones on the side of smaller x, or y, are listed: images replace the others.
+        A body that touches its own image at a line needs an obstacle there.
     mesh : MeshOptions
         Of each body that has none of its own; `elements` are those of one body. An accuracy is that of all bodies.
     solver : ContactSolver
@@ -216,13 +216,13 @@ class Assembly(Stated):
         pairs = Counter(frozenset(pair.sides) for pair in self.contacts)
         for pair in self.contacts:
             if pairs[frozenset(pair.sides)] > 1:
-                raise InputError(f"contact {pair.name!r} is listed twice: leave one out")
+                raise InputError(f"contact {pair.name!r} is listed twice: remove one")
             for side in pair.elastic_sides:
                 self._check_side(side)
         self._check_rigid()
         if self.symmetry is not None:
             if self.rigid:
-                raise InputError("symmetry goes with elastic bodies alone: leave it or rigid bodies out")
+                raise InputError("symmetry goes only with elastic bodies: remove it, or the rigid bodies")
             for body in self.placed_bodies:
                 check_place(body, self.symmetry)
         if self.mesh.accuracy is not None:
@@ -232,7 +232,7 @@ class Assembly(Stated):
             if isinstance(scene.discretisation, Galerkin) and isinstance(scene.discretisation.degree, tuple):
                 raise InputError(
                     f"degree is a list, of body {body.name!r}: elements have several degrees in scenes of one body "
-                    "alone: give one degree"
+                    "only; give one degree"
                 )
 
     def _check_accuracy(self, accuracy: float) -> None:
@@ -265,7 +265,7 @@ class Assembly(Stated):
                 )
         for name in known:
             if name not in named:
-                raise InputError(f"rigid body {name!r} touches nothing: list a contact with it, or leave it out")
+                raise InputError(f"rigid body {name!r} touches nothing: list a contact with it, or remove it")
 
     def _check_side(self, side: str) -> None:
         body, part = body_and_part(side)

@@ -1,4 +1,4 @@
-"""One of several elastic bodies: what stands where, what acts on it, and which symmetry lines cross it."""
+"""One of several elastic bodies: its position, what acts on it, and which symmetry lines cross it."""
 
 from __future__ import annotations
 
@@ -45,13 +45,13 @@ class Body:
     body_forces : tuple of BodyForce
         What acts inside the body, in the coordinates of the scene.
     placement : Placement
-        Where the body stands: turned, then shifted.
+        Position of the body: turned, then shifted.
     copies : Copies, optional
         Makes many of it, each named ``"name-..."``; copies that no support holds share one factorisation.
     discretisation : Discretisation, optional
-        That of the assembly if left out.
+        By default that of the assembly.
     mesh : MeshOptions, optional
-        A number of elements for this body; those of the assembly if left out.
+        A number of elements for this body; by default that of the assembly.
 
     Raises
     ------
@@ -138,7 +138,7 @@ def check_place(body: Body, symmetry: Symmetry) -> None:
     others = (line for line in symmetry.lines if crossing is None or line not in crossing.lines)
     if any(line.is_beyond(middle) for line in others):
         raise InputError(
-            f"body {body.name!r} lies beyond the symmetry line {symmetry}: its image stands for it, leave it out"
+            f"body {body.name!r} lies beyond the symmetry line {symmetry}: its image represents it, remove it"
         )
 
 

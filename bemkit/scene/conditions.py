@@ -33,7 +33,7 @@ class Roller:
 
 @dataclass(frozen=True)
 class PrescribedDisplacement:
-    """Displacement components are given; a component that is left out is free of traction.
+    """Displacement components are given; a component that is not given is free of traction.
 
     Parameters
     ----------
@@ -42,7 +42,7 @@ class PrescribedDisplacement:
     Raises
     ------
     ValueError
-        If both are left out, or one is not a finite number, a formula or a function.
+        If neither is given, or one is not a finite number, a formula or a function.
     """
 
     x: ScalarField | None = None
@@ -139,7 +139,7 @@ class Contact:
     ----------
     obstacle : Obstacle
     law : FrictionLaw, optional
-        The friction law on this part; the scene's law if left out.
+        The friction law on this part; by default that of the scene.
 
     Raises
     ------
@@ -187,7 +187,7 @@ class Part:
     Raises
     ------
     ValueError
-        If the name is empty, `where` is not a condition, or a word stands where an object or a tuple belongs.
+        If the name is empty, `where` is not a condition, or a word is given instead of an object or a tuple.
     """
 
     name: str

@@ -22,7 +22,7 @@ class Copies(Protocol):
 
 @dataclass(frozen=True)
 class GridCopies:
-    """Copies in columns and rows; the first one stands where the body itself is placed.
+    """Copies in columns and rows; the first one is the body itself.
 
     Parameters
     ----------
@@ -54,7 +54,7 @@ class GridCopies:
 
 @dataclass(frozen=True)
 class CircleCopies:
-    """Copies turned about a centre, each by one angle further; the first one stands where the body is placed.
+    """Copies turned about a centre, each by one angle further; the first one is the body itself.
 
     Parameters
     ----------

@@ -93,7 +93,7 @@ class Discretisation(Protocol):
         return self.hierarchical_map(mesh, material, chosen.hierarchical)
 
     def needs(self, case: BodyCase) -> BodyNeeds:
-        """Return counts, memory and time that the map will take, for the plan; by default none are foreseen."""
+        """Return counts, memory and time that the map will take, for the plan; by default none are predicted."""
         return BodyNeeds()
 
 
@@ -139,7 +139,7 @@ class Galerkin(SymmetricGalerkin):
     """Symmetric Galerkin: displacements continuous and of degree p, tractions of degree p - 1 on each element.
 
     Tractions are constant on each element for p = 1, else continuous except at corners and at ends of boundary parts.
-    Half-planes, whose tractions displace their surface in closed form, take p = 1 alone.
+    Half-planes, whose tractions displace their surface in closed form, take only p = 1.
     Contact conditions hold at the nodes of the displacements, the Gauss-Lobatto points of each element.
 
     Parameters
@@ -190,7 +190,7 @@ class Galerkin(SymmetricGalerkin):
     def displacement_space(self, mesh: BoundaryMesh) -> BoundarySpace:
         """Return the continuous functions of the degree; the nodes of the mesh are their first dofs.
 
-        On the surface of a half-plane tractions alone are unknown functions, and displacements their means on elements.
+        On the surface of a half-plane only tractions are unknown functions, and displacements their means on elements.
         """
         return _galerkin_displacements(self, mesh) if mesh.surface is None else ConstantSpace(mesh)
 

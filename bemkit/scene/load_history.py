@@ -105,7 +105,7 @@ def _at_time(scene: AnyScene, changes: Mapping[str, Any], factor: TimeValue, tim
         scene = with_value(scene, Place(place), _value(value, time))
     scaled = _value(factor, time)
     if not isinstance(scaled, int | float) or not math.isfinite(scaled):
-        raise InputError(f"load_factor is {scaled!r} at t = {time:g}: give a number, or a formula of t alone")
+        raise InputError(f"load_factor is {scaled!r} at t = {time:g}: give a number, or a formula of t only")
     return replace(with_scaled_loads(scene, float(scaled)), steps=(Step(time),))
 
 

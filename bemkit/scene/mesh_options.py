@@ -45,18 +45,18 @@ class MeshOptions:
     grading : Grading
         Distribution along each piece between corners and ends of parts.
     density : mapping of str to float
-        How densely sides are divided compared with the others, by the name of the side; 1 where left out.
+        How densely sides are divided compared with the others, by the name of the side; by default 1.
     accuracy : float, optional
         Wanted error relative to the solution, instead of a number of elements, at least 1e-10: in the energy norm, and
         of degree 3 and more (or rising) of contact tractions in L2, too, on half-planes of all tractions in the mean
         and, down to 1e-3, element by element (`Solution.estimated_local_traction_error`).
         Meshes then follow the solution: see `bemkit.runs.adaptive.run_adaptive`.
     most_elements : int, optional
-        Largest number of elements of a mesh on the way to the accuracy, except the first; 1500 if left out. Elements of
+        Largest number of elements of a mesh on the way to the accuracy, except the first; default 1500. Elements of
         high degree count as the quadratic ones with as many nodes. Of a scene with a symmetry only elements with
         unknowns count.
     most_seconds : float, optional [s]
-        Time for all meshes: no mesh is begun that would exceed it. No limit if left out.
+        Time for all meshes: no mesh is begun that would exceed it. No limit by default.
     rising_degrees : bool
         Whether the degree of Galerkin elements rises from mesh to mesh, from 2 on, until the accuracy is reached
         (hp-adaptivity); the scene of a result has the degrees of its mesh. In scene files ``discretisation = "hp"``.
@@ -84,7 +84,7 @@ class MeshOptions:
                 f"elements is {self.elements} and accuracy is {self.accuracy}: give one of them, the other follows"
             )
         if self.grading != Uniform() or self.density:
-            raise InputError(f"accuracy is {self.accuracy}: leave out grading and density, they follow the solution")
+            raise InputError(f"accuracy is {self.accuracy}: remove grading and density, they follow the solution")
         if not 0.0 < self.accuracy < 1.0:
             raise InputError(f"accuracy is {self.accuracy}: give a relative error between 0 and 1, such as 1e-3")
         if self.accuracy < SMALLEST_ACCURACY:

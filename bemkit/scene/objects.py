@@ -36,7 +36,7 @@ def check_objects(owner: Any, name: str = "") -> None:
     Parameters
     ----------
     owner : object
-        Its attributes are checked by their names; None stands for what is left out.
+        Its attributes are checked by their names; None means not given.
     name : str
         Of the owner, to begin messages with.
 

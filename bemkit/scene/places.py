@@ -37,7 +37,7 @@ class Place:
     ----------
     text : str
         Names with dots between them, and numbers of list entries from 0 on in brackets:
-        ``bodies.punch.placement.shift[0]``. A name with a dot stands in quotation marks.
+        ``bodies.punch.placement.shift[0]``. Quote a name with a dot.
 
     Raises
     ------
@@ -184,11 +184,11 @@ def _fitting(value: object, declared: Any, path: str) -> Any:
 def _inside(node: Any, declared: Any, name: str | int, path: str) -> tuple[Any, Any, str]:
     """Return the entry of an object under a name or number, its declared type, and its path."""
     if node is None:
-        raise PlaceError(f"{path} is left out in the scene: write it there first")
+        raise PlaceError(f"{path} is not given in the scene: write it there first")
     inner_path = f"{path}[{name}]" if isinstance(name, int) else f"{path}.{name}".lstrip(".")
     if isinstance(name, int):
         if not isinstance(node, tuple | list | np.ndarray):
-            raise PlaceError(f"{inner_path}: {path} is no list: leave [{name}] out")
+            raise PlaceError(f"{inner_path}: {path} is not a list: remove [{name}]")
         if name >= len(node):
             raise PlaceError(f"{inner_path}: unknown entry: {path} has {len(node)}, counted from 0")
         return node[name], _entry_type(declared, name, node[name]), inner_path

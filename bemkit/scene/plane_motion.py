@@ -89,7 +89,7 @@ class RigidBody(PlaneMotion):
     name : str
         Without a dot: contacts name the body by it, ``("plate.top", "punch")``.
     obstacle : Obstacle
-        Its shape, where it stands before it moves.
+        Its shape, in its position before it moves.
     centre : (float, float) [m]
         The point whose motion is `x`, `y`, about which it turns, and where its forces act.
     x, y : float, optional [m]

@@ -13,7 +13,7 @@ from bemkit.formulas import closest, shorten
 
 
 def reference_of(declared: object) -> str:
-    """Return where a class stands, as ``"module:Class"``; of another declared type what is no place of a class."""
+    """Return the import path of a class, as ``"module:Class"``; of another declared type a text that is none."""
     return f"{getattr(declared, '__module__', '')}:{getattr(declared, '__qualname__', '')}"
 
 
@@ -48,7 +48,7 @@ class Registry:
     listed: str = ""
 
     def holds(self, alternatives: Iterable[object]) -> bool:
-        """Whether a type declared by these alternatives stands for the role: its protocol, or several classes."""
+        """Whether a type declared by these alternatives plays the role: its protocol, or several classes."""
         names = {reference_of(each) for each in alternatives}
         return names <= {self.protocol, *self.built_in.values()} and (self.protocol in names or len(names) > 1)
 
@@ -66,7 +66,7 @@ class Registry:
         kind, options = self.presets[word]
         if len(table) > 1:
             keys = ", ".join(key for key in table if key != "kind")
-            raise InputError(f"{word!r} has no keys, but {keys} is given: leave it out, or write kind = {kind!r}")
+            raise InputError(f"{word!r} has no keys, but {keys} is given: remove it, or write kind = {kind!r}")
         return {"kind": kind, **options}
 
     def written(self, kind: str, options: Mapping[str, Any]) -> str | dict[str, Any]:
@@ -304,7 +304,7 @@ HEADINGS = {
     "bemkit.scene.body:Body": "bodies",
     "bemkit.scene.plane_motion:RigidBody": "rigid",
 }
-"""Classes of which several stand in tables headed by their names, and the word before the name."""
+"""Classes of which several are in tables headed by their names, and the word before the name."""
 
 SYNONYMS: Mapping[str, tuple[str, ...]] = MappingProxyType(
     {

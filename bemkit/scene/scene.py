@@ -48,7 +48,7 @@ class NoContactError(InputError):
 class Scene(Stated):
     """One body with its supports, loads and contacts: everything that determines the solution.
 
-    Boundary that belongs to no part is free of traction. Without contact this is a problem of elasticity alone.
+    Boundary that belongs to no part is free of traction. Without contact this is a problem of elasticity.
 
     Parameters
     ----------
@@ -126,7 +126,7 @@ class Scene(Stated):
         if self.body_forces and outline.is_exterior:
             raise InputError(
                 f"body_forces is {self.body_forces!r}, but the body has no end: nothing holds its infinite weight, and "
-                "heat expands it without bound: leave the body forces out, or give a bounded shape"
+                "heat expands it without bound: remove the body forces, or give a bounded shape"
             )
         names = outline.selectable_names
         for part in self.parts:
@@ -138,7 +138,7 @@ class Scene(Stated):
         for name, default in (("law", Frictionless()), ("solver", Fallbacks())):
             if getattr(self, name) != default:
                 raise InputError(
-                    f"{name} is {getattr(self, name)!r}, but no part is in contact: leave the {name} out, or give one "
+                    f"{name} is {getattr(self, name)!r}, but no part is in contact: remove the {name}, or give one "
                     "part the condition 'contact' with an obstacle"
                 )
 
@@ -277,7 +277,7 @@ def _check_half_plane(
     if discretisation != Galerkin(1) or mesh.rising_degrees:
         raise InputError(
             f"discretisation is {discretisation}, but tractions on a half-plane are constant on each element: choose "
-            "the discretisation 'linear', or leave it out"
+            "the discretisation 'linear', or remove it"
         )
     if outline.surface.is_periodic:
         _check_periodic(far, mesh, parts)
@@ -286,7 +286,7 @@ def _check_half_plane(
 def _check_periodic(far: FarField | None, mesh: MeshOptions, parts: Sequence[Part]) -> None:
     if far is not None and (far.turn or far.moment is not None):
         name = "turn" if far.turn else "moment"
-        raise InputError(f"far.{name} is {getattr(far, name)}: a periodic half-plane cannot turn: leave it out")
+        raise InputError(f"far.{name} is {getattr(far, name)}: a periodic half-plane cannot turn: remove it")
     for part in parts:
         if isinstance(part.condition, Clamped | PrescribedDisplacement | Roller):
             raise InputError(

@@ -79,7 +79,7 @@ class _Definitions:
         self.made: dict[str, Schema] = {}
 
     def of_type(self, declared: Any) -> Schema:
-        """Return the schema of what may stand under a declared type."""
+        """Return the schema of the values of a declared type."""
         if heading_of(declared):
             entry = get_args(declared)[0]
             without_name = self._referred(entry.__name__, partial(self.table, entry, leave_out="name"))
@@ -135,9 +135,9 @@ class _Definitions:
         }
 
     def _kinds(self, registry: Registry) -> Schema:
-        """Return the schema of a word alone, or a table with a kind: what is wrong in it is told of its kind alone."""
+        """Return the schema of a single word, or a table with a kind: errors in it are reported for its kind only."""
         tables = {word: self._kind(registry, word) for word in registry.words() if _can_be_loaded(registry, word)}
-        alone = [word for word, table in tables.items() if not table["required"]]
+        without_keys = [word for word, table in tables.items() if not table["required"]]
         role, listed = f"{registry.role[0].upper()}{registry.role[1:]}", {}
         if registry.listed:
             listed = {"items": {"$ref": f"#/definitions/{_slug(registry.role)}"}, "minItems": 1}
@@ -148,7 +148,7 @@ class _Definitions:
             "required": ["kind"],
             "properties": {"kind": {"enum": list(tables)}} | _hints(tables),
             "allOf": [
-                {"if": {"type": "string"}, "then": {"enum": alone}},
+                {"if": {"type": "string"}, "then": {"enum": without_keys}},
                 *({"if": _is_of_kind(word), "then": table} for word, table in tables.items()),
             ],
         }
@@ -173,7 +173,7 @@ def _or_word(described: Schema, word: str) -> Schema:
 
 
 def _can_be_loaded(registry: Registry, word: str) -> bool:
-    """Tell whether scene files may use a word: a broken package cannot add any."""
+    """Return whether scene files may use a word: a broken package cannot add any."""
     try:
         registry.find(word)
     except InputError:

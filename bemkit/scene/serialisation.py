@@ -89,7 +89,7 @@ def structure(table: object, declared: type[T], units: UnitNames | None = None) 
 
 
 def unstructure(value: Any, declared: Any = None, path: str = "", *, keep_defaults: bool = False) -> Any:
-    """Turn an object into numbers, texts, lists and tables, leaving out what has its default value.
+    """Turn an object into numbers, texts, lists and tables, without keys that have their default value.
 
     Parameters
     ----------
@@ -162,7 +162,7 @@ def _unstructure_dataclass(value: Any, declared: Any, path: str, keep_defaults: 
 def _written_fields(value: Any, keep_defaults: bool) -> Iterator[tuple[Field[Any], Any]]:
     for entry in fields(value):
         content = getattr(value, entry.name)
-        # the number of elements is always written, so that a file tells how fine its mesh is
+        # the number of elements is always written, so that a file states how fine its mesh is
         is_kept = keep_defaults or entry.name == "elements" or not _is_default(content, entry)
         if entry.init and content is not None and is_kept:
             yield entry, content
@@ -204,7 +204,7 @@ def _made(at: _Place, function: Callable[..., Any], *arguments: Any, **values: A
         return function(*arguments, **values)
     except (StructureError, RecursionError):
         raise
-    except Exception as error:  # whatever a constructor raised, it rejects the text
+    except Exception as error:  # any error of a constructor rejects the text
         raise StructureError([f"{at.path}: {error}" if at.path else str(error)]) from error
 
 
@@ -310,7 +310,7 @@ def _named(value: object, declared: Any, at: _Place) -> tuple[Any, ...]:
     of_bodies = ", in one of several bodies [bodies.BODY.parts.NAME]" if heading == "parts" else ""
     tables = _exactly(value, dict, f"a table of {heading}: write [{heading}.NAME]{of_bodies}")
     role = re.sub(r"(?<!^)(?=[A-Z])", " ", entry_type.__name__).lower()
-    remedy = f"the name of a {role} stands in its heading [{heading}.NAME]"
+    remedy = f"write the name of a {role} in its heading [{heading}.NAME]"
     has_name = [name for name, table in tables.items() if isinstance(table, dict) and "name" in table]
     mistakes = [f"{at.key(name).path}: unknown key 'name': {remedy}" for name in has_name]
     entries = {
@@ -330,7 +330,7 @@ def _one_of(value: object, declared: Any, at: _Place) -> Any:
 
 
 def _tagged(value: object, declared: Any, at: _Place) -> Any:
-    """Return an object whose class is named by a word alone, or by the kind of a table."""
+    """Return an object whose class is named by a word, or by the kind of a table."""
     registry = cast(Registry, registry_of(declared))  # the reader is chosen by it
     if isinstance(value, list) and registry.listed:
         listed = _tuple(value, tuple[declared, ...], at)

@@ -1,4 +1,4 @@
-"""Steps of a load history, and what a scene says about itself whatever it is made of."""
+"""Steps of a load history, and the facts that a scene and an assembly share."""
 
 from __future__ import annotations
 

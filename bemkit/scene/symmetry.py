@@ -101,7 +101,7 @@ def check_symmetry(scene: SymmetricScene, mesh: BoundaryMesh) -> None:
             if difference is not None:
                 raise AsymmetricSceneError(
                     f"symmetry: the scene is not symmetric about {line}: {difference}: correct the scene or the line, "
-                    "or leave the symmetry out"
+                    "or remove the symmetry"
                 )
 
 

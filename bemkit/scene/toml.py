@@ -161,7 +161,7 @@ def scene_from_table(table: dict[str, Any], folder: Path | None = None) -> Scene
     try:
         scene = structure(table, _kind_of(table), _units_of(table))
         if scene.steps:
-            _ = load_steps(scene)  # whatever a step changes is checked
+            _ = load_steps(scene)  # every change of a step is checked
     except StructureError as error:
         raise SceneError("\n".join(map(printable, error.mistakes))) from error
     except InputError as error:
@@ -213,7 +213,7 @@ def _with_places_of_files(table: dict[str, Any], folder: Path | None, path: str)
 
 
 def scene_to_toml(scene: Scene | Assembly) -> str:
-    """Write a scene as TOML text, leaving out what has its default value.
+    """Write a scene as TOML text, without keys that have their default value.
 
     Returns
     -------
@@ -320,7 +320,7 @@ def _with_rho(solver: Any, rho: float) -> Any:
         return Fallbacks(tuple(_with_rho(each, rho) if _penalties(each) else each for each in solver.drivers))
     names = _penalties(solver)
     if not names:
-        raise SceneError(f"rho is {rho}: the solver {SOLVERS.kind_of(solver)} has no penalty: leave rho out")
+        raise SceneError(f"rho is {rho}: the solver {SOLVERS.kind_of(solver)} has no penalty: remove rho")
     return replace(solver, **dict.fromkeys(names, rho))
 
 

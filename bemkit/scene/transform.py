@@ -159,7 +159,7 @@ def transformed_scene(
         Factor of all loads, of the stresses of body forces, of those that act far away, and of those in the friction
         law.
     displacement : float, optional
-        Factor of gaps and prescribed displacements, also far away; the first factor of the map if left out.
+        Factor of gaps and prescribed displacements, also far away; by default the first factor of the map.
     modulus : float
         Factor of Young's modulus.
 
@@ -187,7 +187,7 @@ def transformed_scene(
 
 
 def with_gap_offset(scene: Scene, offset: float) -> Scene:
-    """Return a scene whose obstacles stand further away by `offset` [m], nearer if it is negative."""
+    """Return a scene whose obstacles are further away by `offset` [m], nearer if it is negative."""
     return with_conditions(
         scene,
         lambda condition: (

@@ -61,7 +61,7 @@ class BoundUpdate(Enum):
 
     CURRENT = "current"
     """The present one, differentiated inside the inner Newton iteration. The outer iteration then converges at the rate
-    of the augmentation alone."""
+    only of the augmentation."""
 
 
 @dataclass(frozen=True)
@@ -143,7 +143,7 @@ def _solves(equations: ProjectionEquations, iterate: NewtonIterate, following: N
     # The round-off of displacements times a large rho may be larger, so compare what was linearised instead.
     linearised = before.bound + before.slope * (reached.predicted_sigma_n - before.predicted_sigma_n)
     is_exact = bool(np.all(np.abs(reached.bound - linearised)[iterate.sets.direction != 0] <= tolerance))
-    # nodes without friction slide, whatever their direction
+    # nodes without friction slide, in any direction
     keeps_direction = (reached.sets.direction == iterate.sets.direction) | reached.is_free
     keeps_sets = bool(np.all((reached.sets.is_closed == iterate.sets.is_closed) & keeps_direction))
     return keeps_sets and is_exact and not following.is_regularised

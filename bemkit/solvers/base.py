@@ -29,7 +29,7 @@ class Status(Enum):
         "The iterates repeat themselves; add drivers such as SolutionPath to Fallbacks, or try another one: "
         "the problem may have no solution, or several."
     )
-    SINGULAR = "The body can move freely whatever its contact nodes do; hold it by its boundary conditions."
+    SINGULAR = "The body can move freely for every state of its contact nodes; hold it by its boundary conditions."
     UNSOLVABLE_LOAD = "No contact tractions can balance this load; change the load or hold the body."
     TOO_FAR = (
         "The load must first carry the body so far to an obstacle that numbers do not hold the deformation beside the "
@@ -40,7 +40,7 @@ class Status(Enum):
         "The state satisfies contact and friction on its mesh, but the accuracy asked for was not reached; allow more "
         "elements or more time, or ask for less."
     )
-    LOAD_NOT_REACHED = "Ever smaller increments led to a part of this load alone; load less, or give more load steps."
+    LOAD_NOT_REACHED = "Ever smaller increments reached only a part of this load; load less, or give more load steps."
     UNFINISHED = (
         "The load history has not come to its end; run its scene with the same result file again to go on from the "
         "last step that is finished."
@@ -86,7 +86,7 @@ class ContactSolver(Protocol):
 
     @property
     def max_steps(self) -> int:
-        """Steps allowed unless `solve` is told otherwise."""
+        """Default number of steps of `solve`."""
         ...
 
     def init(self, problem: ContactProblem, start: ContactState) -> Iterate:
@@ -241,7 +241,7 @@ def solve(
 def check_rho(name: str, rho: float | None) -> None:
     """Raise ValueError unless `rho` is None (automatic) or a positive finite number."""
     if rho is not None and not (math.isfinite(rho) and rho > 0.0):
-        raise InputError(f"{name} = {rho}; give a positive number, or leave it out for the automatic choice")
+        raise InputError(f"{name} = {rho}; give a positive number, or omit it for the automatic choice")
 
 
 def check_max_steps(max_steps: int) -> None:
@@ -317,7 +317,7 @@ class _Run:
     def _without_contact(self, iterate: Iterate, untouched: FloatingResponse | None) -> Iterate:
         """Return the iterate without contact tractions, if the body needs none at its displacements.
 
-        Drivers only approach tractions that vanish, and where all vanish nothing tells that the rest is small. A body
+        Drivers only approach tractions that vanish, and where all vanish nothing shows that the rest is small. A body
         that has moved far may be moved on by a little, out of the obstacle.
         """
         if untouched is None or not iterate.state.is_finite:

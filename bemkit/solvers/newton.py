@@ -115,7 +115,7 @@ def spring_stiffness(problem: ContactProblem, state: ContactState) -> float:
 def carried_on(problem: ContactProblem, before: ContactState, after: ContactState) -> ContactState:
     """Return a state in which springs hold a body, moved on in the direction of the step until the next node closes.
 
-    A force so small that it hardly moves the body against the springs, such as that on a disc that stands on a single
+    A force so small that it hardly moves the body against the springs, such as that on a disc that rests on a single
     node a little out of balance, would need ever weaker springs, until these no longer hold the body.
 
     Parameters

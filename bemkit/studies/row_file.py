@@ -23,7 +23,7 @@ class Record(Protocol):
 
     @property
     def key(self) -> Hashable:
-        """What tells the records of one study apart."""
+        """Key of a record in its study."""
 
 
 R = TypeVar("R", bound=Record)

@@ -1,8 +1,8 @@
 """Friction left behind after a push
 
-A block stands under pressure on a rigid foundation, is pushed to the right, and is let go. Friction does not let it
+A block is pressed on a rigid foundation, is pushed to the right, and is let go. Friction does not let it
 return: tractions remain along the foundation although nothing pushes any more. Poisson's ratio is zero, so that the
-weight alone causes no friction.
+its own weight causes no friction.
 """
 
 from dataclasses import replace
@@ -33,7 +33,7 @@ def pushed(traction: float) -> bk.Scene:
 figure = Figure(figsize=(7.0, 4.0), layout="constrained")
 axes = figure.subplots()
 for name, solution in zip(
-    ("weight alone", "pushed", "let go"),
+    ("only weight", "pushed", "let go"),
     bk.run_history([pushed(0.0), pushed(0.6), pushed(0.0)]),
     strict=True,
 ):

@@ -1,7 +1,7 @@
 """What the flanks of the wedge carry
 
 The pressing force on both flanks of the wedge over the coefficient of friction: twenty-one solves that share one
-factored body. The more friction carries, the less the flanks press; where all of them slip, equilibrium alone says
+factored body. The more friction carries, the less the flanks press; where all of them slip, equilibrium determines
 how much.
 """
 

@@ -1,7 +1,7 @@
 """Stress inside a disc between two plates
 
-The equivalent stress of von Mises inside a disc that two rigid plates press together, evaluated from its boundary
-alone. The largest stress lies inside the body above the contact, not at its surface.
+The equivalent stress of von Mises inside a disc that two rigid plates press together, evaluated from its
+boundary. The largest stress lies inside the body above the contact, not at its surface.
 """
 
 import bemkit as bk

@@ -160,7 +160,7 @@ def test_a_state_that_is_no_response_is_out_of_balance() -> None:
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"mesh": bk.MeshOptions(elements=32, grading=bk.Algebraic(2.0))}, "leave out the grading"),
+        ({"mesh": bk.MeshOptions(elements=32, grading=bk.Algebraic(2.0))}, "remove the grading"),
         ({"mesh": bk.MeshOptions(accuracy=1e-3)}, "elements of a periodic half-plane are equal"),
         ({"far": bk.FarField(moment=1.0)}, "far.moment is 1.0: a periodic half-plane cannot turn"),
         ({"far": bk.FarField(turn=0.1)}, "far.turn is 0.1: a periodic half-plane cannot turn"),

@@ -127,7 +127,7 @@ def test_units_do_not_matter(scale: float) -> None:
         (lambda: SplineObstacle(((0.0, 0.0), (1.0, 0.0))), "points has 2 entries: give at least three"),
         (
             lambda: SplineObstacle(((0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 0.0))),
-            r"points\[0\] is \(0.0, 0.0\), as is the one before it: leave one of them out",
+            r"points\[0\] is \(0.0, 0.0\), as is the one before it: remove one of them",
         ),
         (lambda: SplineObstacle(((0.0, 0.0), (1.0, math.nan), (1.0, 1.0))), r"points\[1\] is \(1.0, nan\)"),
         (lambda: SignedDistance(1.0), "distance = 1.0 is a number; give a formula in x and y, or a function"),

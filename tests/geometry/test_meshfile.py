@@ -240,8 +240,8 @@ SQUARE = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
         ({"lines": np.array([[0, -1]])}, "its cells do not join"),
         ({"lines": np.array([0, 1, 2])}, "its cells do not join"),
         ({"cell_sets": {"top\x1b[31m": [[0]]}}, r"the group 'top\\x1b\[31m' has a name that is not printable"),
-        ({"cell_sets": {"top": [[7]]}}, "its groups cannot be told"),
-        ({"cell_sets": {"top": [["x"]]}}, "its groups cannot be told"),
+        ({"cell_sets": {"top": [[7]]}}, "its groups cannot be read"),
+        ({"cell_sets": {"top": [["x"]]}}, "its groups cannot be read"),
     ],
 )
 def test_contents_that_make_no_sense_are_named(
@@ -270,5 +270,5 @@ def test_what_meshio_says_is_printable(tmp_path: Path, monkeypatch: pytest.Monke
 
 
 def test_surfaces_have_no_boundary_lines(tmp_path: Path) -> None:
-    with pytest.raises(GeometryError, match="such files hold surfaces alone: export the lines"):
+    with pytest.raises(GeometryError, match="such files hold only surfaces: export the lines"):
         read_mesh(tmp_path / "x.ply")

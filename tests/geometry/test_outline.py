@@ -135,7 +135,7 @@ REFUSED = {
     ),
     "tiny side far away": (
         lambda: Outline((polygon((1e9, 0), (1e9 + 2, 0), (1e9 + 2, 1e-7), (1e9 + 2, 2), (1e9, 2)),)),
-        r"side 's2' at .* has no length, or less than the digits .* resolve: leave it out, or move the body",
+        r"side 's2' at .* has no length, or less than the digits .* resolve: remove it, or move the body",
     ),
     "bow tie": (
         lambda: Outline((polygon((0, 0), (1, 1), (1, 0), (0, 1)),)),

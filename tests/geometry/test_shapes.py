@@ -91,7 +91,7 @@ def test_polygon_that_is_none_is_refused(vertices, size, angle) -> None:
     with pytest.raises(GeometryError, match=r"Polygon: vertices run clockwise: list the vertices anticlockwise"):
         Polygon(clockwise)
     repeated = np.insert(turned, 1, turned[0], axis=0)
-    with pytest.raises(GeometryError, match=r"repeats the point .* \(vertex 2\): leave one out"):
+    with pytest.raises(GeometryError, match=r"repeats the point .* \(vertex 2\): remove one"):
         Polygon(tuple(map(tuple, repeated.tolist())))
     # a spike out of a vertex and back folds back, whatever the digits
     spike = np.insert(turned, 1, [2.0 * turned[0], turned[0]], axis=0)

@@ -274,8 +274,8 @@ def test_an_incompressible_body() -> None:
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"law": bk.Coulomb(0.3)}, "law is Coulomb.*, but no part is in contact: leave the law out, or give one part"),
-        ({"solver": bk.FixedPoint()}, "solver is FixedPoint.*, but no part is in contact: leave the solver out"),
+        ({"law": bk.Coulomb(0.3)}, "law is Coulomb.*, but no part is in contact: remove the law, or give one part"),
+        ({"solver": bk.FixedPoint()}, "solver is FixedPoint.*, but no part is in contact: remove the solver"),
     ],
 )
 def test_friction_and_drivers_are_refused(change: dict[str, object], message: str) -> None:
@@ -285,7 +285,7 @@ def test_friction_and_drivers_are_refused(change: dict[str, object], message: st
 
 def test_friction_is_refused_in_files() -> None:
     text = scene_to_toml(bending()) + '\n[law]\nkind = "coulomb"\nfriction_coefficient = 0.3\n'
-    with pytest.raises(SceneError, match=r"scene: law is Coulomb.*: leave the law out"):
+    with pytest.raises(SceneError, match=r"scene: law is Coulomb.*: remove the law"):
         scene_from_toml(text)
 
 

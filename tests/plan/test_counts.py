@@ -74,7 +74,7 @@ SCENES: dict[str, Callable[[], bk.Scene]] = {
     "load history from zero": lambda: paper(load_factors=(0.0, 1.0)),
     "symmetry": lambda: block("linear", symmetry=bk.Symmetry(x=1.0)),
     "symmetry, constant": lambda: block("constant", symmetry=bk.Symmetry(x=1.0)),
-    "held by contact alone": lambda: block("quadratic"),
+    "held only by contact": lambda: block("quadratic"),
     "nu = 1/2": lambda: block("linear", poisson_ratio=0.5),
     "nu = 1/2, quadratic": lambda: block("quadratic", poisson_ratio=0.5),
 }

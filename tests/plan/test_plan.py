@@ -62,8 +62,8 @@ def test_rigid_motions_that_only_contact_holds_are_counted(scene: Scene, n_free:
 
 def test_numbers_and_verbs_agree() -> None:
     one, three = (reasons(scene)["rigid motions as unknowns"] for scene in (block(("right", Roller())), block()))
-    assert one == "1 of 3 rigid motions is held by contact alone"
-    assert three == "3 of 3 rigid motions are held by contact alone"
+    assert one == "1 of 3 rigid motions is held only by contact"
+    assert three == "3 of 3 rigid motions are held only by contact"
 
 
 def test_a_disc_on_rollers_all_round_may_still_turn() -> None:

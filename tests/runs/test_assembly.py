@@ -391,7 +391,7 @@ def test_an_interference_that_is_given_is_pressed_together() -> None:
 
 
 def test_what_goes_with_one_body_alone_is_refused() -> None:
-    with pytest.raises(bk.InputError, match="mesh is given with an assembly of several bodies: leave it out"):
+    with pytest.raises(bk.InputError, match="mesh is given with an assembly of several bodies: remove it"):
         bk.run(patch(1), mesh=bk.discretise(bk.Rectangle(1.0, 1.0).outline(), n_elements=8))  # type: ignore[call-overload]
     with pytest.raises(bk.InputError, match="assemblies is empty"):
         bk.run_assembly_history([])

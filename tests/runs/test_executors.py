@@ -166,9 +166,7 @@ def test_what_cannot_be_sent_is_named(processes: Executor) -> None:
 
 def test_a_process_that_ends_is_named() -> None:
     with ProcessPoolExecutor(1, get_context("spawn")) as executor:
-        with pytest.raises(
-            NotSentError, match=r"the executor broke down \(.*\): take fewer processes, or leave it out"
-        ):
+        with pytest.raises(NotSentError, match=r"the executor broke down \(.*\): take fewer processes, or remove it"):
             bk.run(coarse(discretisation=Fading()), executor=executor)
 
 

@@ -191,7 +191,7 @@ def moved(number: int, **changes: object) -> tuple[bk.Body, ...]:
                 "rigid": (bk.RigidBody(name="punch", obstacle=bk.HalfPlane((0.0, 1.0), (0.0, -1.0))),),
                 "contacts": (*blocks().contacts, bk.ContactPair(("upper.left", "punch"))),
             },
-            "symmetry goes with elastic bodies alone: leave it or rigid bodies out",
+            "symmetry goes only with elastic bodies: remove it, or the rigid bodies",
         ),
     ],
 )

@@ -357,7 +357,7 @@ def test_a_pressure_without_bound_takes_short_elements() -> None:
     assert last.mesh.lengths.min() < 1e-11
     *_, last = risen("clamped-angle", 1e-7)
     assert last.status is bk.Status.ACCURACY_NOT_REACHED
-    assert "the largest error stands at (1, 0), where an element of the length" in last.message
+    assert "the largest error is at (1, 0), where an element of the length" in last.message
     assert last.estimated_traction_error is not None
     assert last.estimated_traction_error <= 1e-6
 

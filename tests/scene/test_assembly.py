@@ -153,7 +153,7 @@ def test_shipped_assemblies_survive_their_text(name: str) -> None:
             {"rigid": (PUNCH,), "contacts": (ContactPair(("punsh", "lower.top")),)},
             "a contact names 'punsh': the rigid bodies are punch; did you mean 'punch'?; write a side of",
         ),
-        ({"rigid": (PUNCH,)}, "rigid body 'punch' touches nothing: list a contact with it, or leave it out"),
+        ({"rigid": (PUNCH,)}, "rigid body 'punch' touches nothing: list a contact with it, or remove it"),
         ({"rigid": (replace(PUNCH, name="lower"),)}, "'lower' is the name of two bodies: give each its own name"),
         ({"mesh": MeshOptions(accuracy=1e-3), "discretisation": ConstantCollocation()}, "has no error estimate"),
         (
@@ -242,9 +242,9 @@ def test_bad_values_are_named(make: object, message: str) -> None:
         ("title = 'a'\n[bodies]\n[rigid.one]\nx = 1.0", "rigid.one.obstacle: missing"),
         (
             "title = 'a'\n[bodies]\n[rigid.one]\nname = 'x'",
-            "rigid.one: unknown key 'name': the name of a rigid body stands",
+            "rigid.one: unknown key 'name': write the name of a rigid body",
         ),
-        ("title = 'a'\n[bodies.one]\nname = 'x'", "bodies.one: unknown key 'name': the name of a body stands in its"),
+        ("title = 'a'\n[bodies.one]\nname = 'x'", "bodies.one: unknown key 'name': write the name of a body in its"),
     ],
 )
 def test_texts_are_refused_by_key(text: str, message: str) -> None:

@@ -320,7 +320,7 @@ def test_words_of_degrees_stand_for_galerkin_elements() -> None:
             scene = scene_from_toml(BLOCK.replace('"constant"', written))
             assert scene.discretisation == Galerkin(degree)
             assert f'discretisation = "{word}"' in scene_to_toml(scene)
-    with pytest.raises(SceneError, match="discretisation: 'linear' has no keys, but degree is given: leave it out, or"):
+    with pytest.raises(SceneError, match="discretisation: 'linear' has no keys, but degree is given: remove it, or"):
         scene_from_toml(BLOCK.replace('"constant"', '{ kind = "linear", degree = 3 }'))
 
 

@@ -64,7 +64,7 @@ class DenseBody(LinearBody):
     ------
     InputError
         If shapes do not fit or entries are not finite, if a weight or the modulus is not positive, or if the modulus is
-        left out where the motions leave nothing of the stiffness to tell it from.
+        excluded where the stiffness vanishes without the motions.
     """
 
     stiffness: FloatArray
@@ -293,7 +293,7 @@ class DenseBody(LinearBody):
             is_sought = np.flatnonzero(~is_given[unknown])
             matrix[row[is_sought], column_of[unknown[is_sought]]] += on_displacement[row[is_sought]]
             right_side[row] -= factor * forces[unknown] + on_displacement[row] * given[unknown]
-        # rows of size one, so that pivots compare whatever the units of the conditions
+        # rows of size one, so that pivots compare in any units of the conditions
         sizes = np.abs(matrix)
         row_size = sizes.max(axis=1)
         if not row_size.all():

@@ -41,7 +41,7 @@ class HeldFriction:
         Raises
         ------
         InputError
-            If the tangential condition at such a node is not on tractions alone.
+            If the tangential condition at such a node involves displacements.
         SingularResponse
             If friction there cancels the pressure that causes it.
         """
@@ -62,7 +62,7 @@ class HeldFriction:
         return LinearConditions(on_displacement, on_traction, value)
 
     def check(self, conditions: LinearConditions) -> None:
-        """Raise InputError if a tangential condition at such a node is not on tractions alone."""
+        """Raise InputError if a tangential condition at such a node involves displacements."""
         self._friction(conditions, np.flatnonzero(self.follows))
 
     def restored(self, conditions: LinearConditions, state: ContactState) -> ContactState:

@@ -103,7 +103,7 @@ class HierarchicalBody(LinearBody):
     loaded : LoadedSystem
         The equations under the given supports and forces.
     nodes : ContactNodes
-        Elements, or nodes of Galerkin's method, that may touch, along whose frames those of the equations stand.
+        Elements, or nodes of Galerkin's method, that may touch, along whose frames the equations have theirs.
     conditions : NodalConditions
         Of the elements.
     force : (n_elements, 2) array [N/m]

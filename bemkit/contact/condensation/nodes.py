@@ -27,7 +27,7 @@ class NoContactNodesError(InputError):
 class ContactNodes:
     """Displacement nodes that may touch an obstacle.
 
-    A node in a corner between two frictionless obstacles stands in two rows, one for each direction of contact. Both
+    A node in a corner between two frictionless obstacles has two rows, one for each direction of contact. Both
     displacements are unknowns; their tangents follow.
 
     Parameters
@@ -54,14 +54,14 @@ class ContactNodes:
 
     @cached_property
     def is_second(self) -> BoolArray:
-        """(n_contact,) bool: the second rows of nodes that stand in two."""
+        """(n_contact,) bool: the second rows of nodes with two."""
         repeated = np.ones(self.nodes.size, bool)
         repeated[np.unique(self.nodes, return_index=True)[1]] = False
         return repeated
 
     @cached_property
     def is_shared(self) -> BoolArray:
-        """(n_contact,) bool: both rows of nodes that stand in two."""
+        """(n_contact,) bool: both rows of nodes with two."""
         return np.isin(self.nodes, self.nodes[self.is_second])
 
     def forces(self, traction: FloatArray, n_nodes: int) -> FloatArray:
@@ -105,7 +105,7 @@ def contact_conditions(
         The displacement space.
     supports : sequence of Support
     candidates : ContactNodes
-        Nodes that may touch, whatever holds them.
+        Nodes that may touch, held by supports or not.
     driven : tuple of int
         Rigid motions that forces far away drive; see `NodalConditions`.
 

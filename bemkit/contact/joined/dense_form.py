@@ -42,7 +42,7 @@ class DirectStiffness:
         )
 
 
-_TIED = "the bodies tied to each other at all contact nodes (a tie that others imply may have to be left out)"
+_TIED = "the bodies tied to each other at all contact nodes (remove a tie that follows from the others)"
 
 
 class RelativeStiffness:

@@ -102,7 +102,7 @@ class Shape:
         """
         basis, sizes, _ = np.linalg.svd(self.member.motions.T, full_matrices=False)
         if sizes.size and sizes[-1] < 1e-9 * sizes[0]:
-            raise InputError(f"{self.member.title}: motions are linearly dependent; leave out those that are combined")
+            raise InputError(f"{self.member.title}: motions are linearly dependent; remove those that are combinations")
         stiffness = self.member.stiffness
         if np.abs(stiffness @ basis).max(initial=0.0) > _MOTIONS_ARE_FREE * np.abs(stiffness).max(initial=0.0):
             raise InputError(f"{self.member.title}: the stiffness resists the rigid motions: check them, or supports")

@@ -113,7 +113,7 @@ def _pardiso() -> str:
         with _factored_by_pardiso(sparse.csr_array(np.array([[2.0, 1.0], [0.0, 4.0]]))) as solve:
             if not np.allclose(solve(np.array([4.0, 8.0])), [1.0, 2.0]):
                 return "SuperLU (PARDISO computes wrong numbers here)"
-    except Exception as error:  # whatever a broken installation raises
+    except Exception as error:  # a broken installation raises anything
         return f"SuperLU (PARDISO does not work here: {printable(f'{type(error).__name__}: {error}')[:120]})"
     return "PARDISO"
 
@@ -215,17 +215,17 @@ class _Given:
         is_given = ~np.any(conditions.on_displacement != 0.0, axis=2)
         factor = np.einsum("nii->ni", conditions.on_traction)
         other_factor = np.stack([conditions.on_traction[:, 0, 1], conditions.on_traction[:, 1, 0]], axis=1)
-        both, alone = is_given.all(axis=1), is_given & ~is_given.all(axis=1, keepdims=True)
-        if np.any(alone & (factor == 0.0)) or np.any(np.linalg.det(conditions.on_traction[both]) == 0.0):
+        both, single = is_given.all(axis=1), is_given & ~is_given.all(axis=1, keepdims=True)
+        if np.any(single & (factor == 0.0)) or np.any(np.linalg.det(conditions.on_traction[both]) == 0.0):
             raise SingularResponse("a condition at a contact node involves neither displacement nor traction")
         at_rest = np.zeros_like(conditions.value)
-        at_rest[alone] = conditions.value[alone] / factor[alone]
+        at_rest[single] = conditions.value[single] / factor[single]
         at_rest[both] = np.linalg.solve(conditions.on_traction[both], conditions.value[both][:, :, None])[:, :, 0]
         number = (np.cumsum(~is_given) - 1).reshape(is_given.shape)
-        node, component = np.nonzero(alone)
+        node, component = np.nonzero(single)
         rows = np.append(np.flatnonzero(~is_given), 2 * node + component)
         columns = np.append(number[~is_given], number[node, 1 - component])
-        factors = np.append(np.ones(np.count_nonzero(~is_given)), -other_factor[alone] / factor[alone])
+        factors = np.append(np.ones(np.count_nonzero(~is_given)), -other_factor[single] / factor[single])
         shape = (is_given.size, np.count_nonzero(~is_given))
         by_kept = sparse.csr_array((factors, (rows, columns)), shape)
         by_kept.eliminate_zeros()

@@ -16,7 +16,7 @@ from bemkit.geometry.placement import Placement
 _DIGITS = 12
 """Decimals of distances, relative to the coordinates of the pair, to which congruent pairs agree."""
 _DIGITS_OF_SUMS = 9
-"""The same for sums that tell meshes with one array of elements and different nodes apart."""
+"""The same for sums that distinguish meshes with equal elements and different nodes."""
 _FAR = 4.0
 """Reach, in sizes of a pair, beyond which it makes no difference."""
 

@@ -5,7 +5,7 @@ carry multipliers, they are the dual basis [Wohlmuth2000]: ``int psi_i phi_j = d
 of the degree of the displacements. Their integrals are those of the displacements' basis, which at Gauss-Lobatto points
 are positive for every degree.
 
-On any other element the multipliers are integrated over the covered part alone [CichoszBischoff2011], where the dual
+On any other element the multipliers are integrated only over the covered part [CichoszBischoff2011], where the dual
 basis does not work: the integrals of quadratic and higher basis functions over a part may be negative, and a node far
 from a short part would depend on an extrapolation. Instead the nodes in the covered part that may carry a multiplier
 have hat functions: linear between these nodes, constant beyond the last of them. If there is no such node, the nearest

@@ -117,7 +117,7 @@ def mean_directions(non_mortar: ContactSide, mortar: ContactSide, reach: float) 
 
     Notes
     -----
-    With the normals of one side alone, two equal cylinders that are pressed together seem to slide by as much as the
+    With the normals of only one side, two equal cylinders that are pressed together seem to slide by as much as the
     cube of the distance from their common point, which friction resists; the mean is the same from both sides.
     """
     if non_mortar.flat_normal is not None and mortar.flat_normal is not None:
@@ -127,7 +127,7 @@ def mean_directions(non_mortar: ContactSide, mortar: ContactSide, reach: float) 
     rows, local = non_mortar.first_knots
     points = non_mortar.points(rows, non_mortar.knots)[np.arange(rows.size), local]
     normals = directions = non_mortar.normals
-    # the end of a side is met from its end, whatever small angle the first directions are off
+    # the end of a side is met from its end, however the first directions deviate by a small angle
     slack = float(max(non_mortar.lengths.mean(), mortar.lengths.mean()))
     knots, half_angle = np.arange(rows.size), np.zeros(rows.size)
     for _ in range(_MOST_PASSES):

@@ -42,7 +42,7 @@ def read_dxf(path: Path, only: Sequence[str] = ()) -> tuple[list[Stroke], str, l
     unit : str
         Unit of length that the file states; empty if none.
     notes : list of str
-        What is left out.
+        Entries that are skipped.
 
     Raises
     ------
@@ -82,10 +82,10 @@ def read_dxf(path: Path, only: Sequence[str] = ()) -> tuple[list[Stroke], str, l
         else:
             strokes += drawn
     words = ", ".join(f"{count} {kind}" for kind, count in sorted(left_out.items()))
-    notes = [f"left out, because no lines: {words}"] if words else []
+    notes = [f"skipped, because no lines: {words}"] if words else []
     if repairs := [*audit.fixes, *audit.errors]:
         notes.append(
-            f"damaged, and repaired or left out: {len(repairs)} entries, such as: {printable(repairs[0].message)}"
+            f"damaged, and repaired or skipped: {len(repairs)} entries, such as: {printable(repairs[0].message)}"
         )
     unit = _UNITS.get(int(document.header.get("$INSUNITS", 0)), "")
     return strokes, unit, notes

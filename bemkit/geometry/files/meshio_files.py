@@ -98,7 +98,7 @@ def _names(mesh: Any, number: int) -> tuple[str, ...]:
         names = _groups(mesh, number)
     except (IndexError, KeyError, TypeError, ValueError) as error:
         raise GeometryError(
-            f"it is damaged: its groups cannot be told ({printable(str(error))}): write it anew"
+            f"it is damaged: its groups cannot be read ({printable(str(error))}): write it anew"
         ) from error
     for name in dict.fromkeys(names):
         if not name.isprintable():
@@ -152,7 +152,7 @@ def read_mesh(path: str | Path, *, is_exterior: bool = False) -> BoundaryMesh:
     path = Path(path)
     try:
         if path.suffix.lower() in _SURFACES:
-            raise GeometryError("such files hold surfaces alone: export the lines, for example as .msh")
+            raise GeometryError("such files hold only surfaces: export the lines, for example as .msh")
         mesh = read_with_meshio(path)
         lines = tuple(block for block in mesh.blocks if block.n_corners == 2)
         if not lines:

@@ -110,7 +110,7 @@ def boundary_chains(mesh: PlaneMesh, only: Sequence[str] = ()) -> tuple[list[Cho
     Parameters
     ----------
     mesh : PlaneMesh
-        Sides of one triangle or quadrilateral alone are the boundary, and take names and curves from the lines of the
+        Sides of only one triangle or quadrilateral are the boundary, and take names and curves from the lines of the
         mesh that lie on them. In a mesh without such cells the lines are the boundary.
     only : sequence of str
         Names of the surfaces that are the body; all if empty.
@@ -153,7 +153,7 @@ def _edges(block: CellBlock) -> list[_Edge]:
 
 
 def _outer_edges(mesh: PlaneMesh, only: Sequence[str]) -> tuple[list[_Edge], bool]:
-    """Return the sides that one cell alone has, anticlockwise around it, and whether most cells run clockwise."""
+    """Return the sides that belong to only one cell, anticlockwise around it, and whether most cells run clockwise."""
     known = [name for name in mesh.surfaces() if name]
     for name in only:
         if name not in known:

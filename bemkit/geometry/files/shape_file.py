@@ -111,7 +111,7 @@ class MeshFile(ShapeFile):
     file : str
         Its path.
     scale : float, optional
-        Times the numbers of the file; 1 if left out.
+        Factor of all coordinates of the file; default 1.
     only : tuple of str
         Names of the surfaces that are the body (physical groups); all if empty.
     corner_angle : float [degree]
@@ -158,11 +158,11 @@ class DrawingFile(ShapeFile):
     file : str
         Its path.
     scale : float, optional
-        Times the numbers of the file; 1 if left out.
+        Factor of all coordinates of the file; default 1.
     only : tuple of str
         Layers (DXF), ids or labels (SVG) of what is the outline; all if empty.
     tolerance : float, optional
-        Gaps between lines, in the unit of the file, that are closed; 1e-5 of the size of the drawing if left out.
+        Gaps between lines, in the unit of the file, that are closed; by default 1e-5 of the size of the drawing.
 
     Raises
     ------
@@ -197,7 +197,7 @@ class DrawingFile(ShapeFile):
 
 
 def is_drawing(path: str | Path) -> bool:
-    """Tell by the ending of its name whether a file is a drawing."""
+    """Return whether a file is a drawing, by the ending of its name."""
     return Path(path).suffix.lower() in _DRAWINGS
 
 

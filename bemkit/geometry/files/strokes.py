@@ -79,7 +79,7 @@ class Stroke:
 
     @cached_property
     def points(self) -> FloatArray:
-        """(n, 2) array [m]: points along the stroke, which tell its size and its sense."""
+        """(n, 2) array [m]: points along the stroke, which define its size and its sense."""
         return self.side.curve(self.start).point(_SEEN)
 
 
@@ -134,11 +134,11 @@ def join_strokes(strokes: Sequence[Stroke], tolerance: float) -> tuple[list[list
 
 
 def _without_repeated(strokes: Sequence[Stroke], tolerance: float) -> tuple[list[Stroke], list[str]]:
-    """Leave out strokes drawn twice, and those shorter than the tolerance."""
+    """Remove strokes drawn twice, and those shorter than the tolerance."""
     long = [stroke for stroke in strokes if np.ptp(stroke.points, axis=0).max() > tolerance]
     notes = []
     if n_short := len(strokes) - len(long):
-        notes.append(f"left out, because shorter than {tolerance:.2g}: lines, {n_short}")
+        notes.append(f"skipped, because shorter than {tolerance:.2g}: lines, {n_short}")
     if not long:
         return [], notes
     from scipy.spatial import cKDTree

@@ -91,7 +91,7 @@ class Geometric:
         Length of an element over that of its larger neighbour, between 0 and 1.
     levels : int
         Number of times the length shrinks on the way to either end; the ends have elements ratio**levels times as long
-        as the middle. With fewer than 2 levels + 1 elements the largest ones are left out.
+        as the middle. With fewer than 2 levels + 1 elements the largest ones are omitted.
     """
 
     ratio: float = 0.5
@@ -140,11 +140,11 @@ def discretise(
     parts : mapping of str to Selection, optional
         Boundary parts by name; they must not overlap, and need not cover the boundary.
     grading : Grading, optional
-        Spacing of the elements on every piece. Uniform if left out, but for lengths that grow gradually next to a piece
+        Spacing of the elements on every piece. By default uniform, but for lengths that grow gradually next to a piece
         with elements of less than half the length.
     density : mapping of str to float, optional
         How densely sides are divided compared with the others, by the name of the side, or else of
-        its group; 1 where left out.
+        its group; by default 1.
     symmetry : Symmetry, optional
         Lines of which only the side x <= a, y <= b is divided, into a half or a quarter of `n_elements`.
 

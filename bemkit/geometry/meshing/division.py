@@ -82,7 +82,7 @@ class Division:
             If the body is an exterior, or a line does not cross it or runs along a side.
         """
         if self.outline.is_exterior:
-            raise GeometryError(f"symmetry ({symmetry}): the body is an exterior: leave the symmetry out")
+            raise GeometryError(f"symmetry ({symmetry}): the body is an exterior: remove the symmetry")
         pieces = self.cut(_crossings(self.outline, symmetry)).pieces
         points = np.array([self.outline.sides[piece.side].curve.point(piece.at(_INNER)) for piece in pieces])
         _check_lines(self.outline, symmetry, pieces, points)
@@ -173,7 +173,7 @@ def _check_lines(outline: Outline, symmetry: Symmetry, pieces: Sequence[Piece], 
         for k in np.flatnonzero(on_line).tolist():
             raise GeometryError(
                 f"symmetry: side {outline.side_names[pieces[k].side]!r} lies on the line {line}: describe the whole "
-                "body, or leave out the symmetry and give the side a roller"
+                "body, or remove the symmetry and give the side a roller"
             )
         is_beyond = line.is_beyond(points[:, 1])
         if is_beyond.all() or not is_beyond.any():

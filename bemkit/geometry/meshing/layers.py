@@ -152,7 +152,7 @@ def origins(old: Partition, new: Partition) -> tuple[IntArray, FloatArray]:
 
 
 def is_at_end(partition: Partition) -> BoolArray:
-    """Tell (n_elements,) which elements stand at an end of their piece that is off symmetry lines."""
+    """Return (n_elements,) which elements lie at an end of their piece that is off symmetry lines."""
     result = np.zeros(len(partition.sides), bool)
     counts = np.array([len(s) - 1 for s in partition.parameters])
     at_start, at_end = _singular_ends(partition.division)
@@ -176,7 +176,7 @@ def _fractions(piece: Piece, parameters: FloatArray) -> FloatArray:
 
 
 def _refined(fractions: FloatArray, excess: FloatArray, shortest: float, is_start: bool, is_end: bool) -> FloatArray:
-    """Cut the elements of a piece; `is_start` and `is_end` tell whether fields may be singular at its ends."""
+    """Cut the elements of a piece; fields may be singular at its ends if `is_start` and `is_end`."""
     wanted = np.ceil(np.log(np.maximum(excess, 1.0)) / -np.log(FACTOR))
     possible = np.floor(np.log(np.maximum(np.diff(fractions) / shortest, 1.0)) / -np.log(FACTOR))
     layers = np.minimum(wanted, np.minimum(possible, MOST_LAYERS)).astype(int).tolist()
@@ -254,18 +254,18 @@ def _owners(base: Division, division: Division) -> IntArray:
 
 
 def _at_cut(base: Division, division: Division) -> BoolArray:
-    """Tell (2, n_pieces) of the start and the end of each piece whether it is no end of a piece of the base."""
+    """Return (2, n_pieces) whether the start and the end of each piece are no ends of a piece of the base."""
     ends = {(piece.side, end) for piece in base.pieces for end in piece.span}
     return np.array([[(piece.side, piece.span[end]) not in ends for piece in division.pieces] for end in (0, 1)], bool)
 
 
 def _inside_sides(division: Division) -> BoolArray:
-    """Tell (2, n_pieces) of the start and the end of each piece whether it is no end of a side."""
+    """Return (2, n_pieces) whether the start and the end of each piece are no ends of a side."""
     return np.array([[piece.span[end] not in (0.0, 1.0) for piece in division.pieces] for end in (0, 1)], bool)
 
 
 def _singular_ends(division: Division) -> BoolArray:
-    """Tell (2, n_pieces) of the start and the end of each piece whether it is off symmetry lines."""
+    """Return (2, n_pieces) whether the start and the end of each piece are off symmetry lines."""
     following = division.following
     has_before = np.isin(np.arange(following.size), following)
     return np.stack([has_before, following >= 0])

@@ -20,7 +20,7 @@ EXPONENT = 2.5
 """Elements at the distance d from an end of a piece have lengths like d**(1 - 1/2.5) unless more is known. That suits
 the logarithms at load jumps and the square roots at ends of contact zones."""
 SPREAD = 0.5
-"""Part of all elements that is spread over the contact boundary whatever the error estimate says."""
+"""Part of all elements that is spread over the contact boundary for any error estimate."""
 IDLE = 0.2
 """Part of what other pieces get of these that is enough for those on which nothing happens."""
 STEEPEST = 4.0

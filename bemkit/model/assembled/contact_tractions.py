@@ -35,7 +35,7 @@ class ContactSpread:
     Notes
     -----
     The nodal forces of a side over the integrals of its basis functions: with Gauss-Lobatto nodes that is exact for
-    tractions of a degree less than the displacements, whatever the meshes. The integrals are those over all elements
+    tractions of a degree less than the displacements, for any meshes. The integrals are those over all elements
     that the partner covers at least in part: an element where a partner ends carries its whole force, spread over its
     length. Forces of all contacts of a side are added up first.
     """
@@ -111,10 +111,10 @@ class _Side:
         return values, nodes, contact_nodes
 
     def spread(self) -> _Entries:
-        """Return the tractions (n_values, n_nodes) at the local nodes of elements that stand for forces of nodes."""
+        """Return the tractions (n_values, n_nodes) at the local nodes of elements, equivalent to nodal forces."""
         is_reached = self.reached > _REACHED * self.reached.max(initial=0.0)
         is_covered = is_reached[self.local].all(axis=1)
-        # nodes that are alone: on a sliver, or beside nodes that a support holds
+        # isolated nodes: on a sliver, or beside nodes that a support holds
         is_alone = is_reached.copy()
         is_alone[self.local[is_covered]] = False
         is_covered |= is_alone[self.local].any(axis=1)

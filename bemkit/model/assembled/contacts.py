@@ -161,9 +161,9 @@ def body_rows(
 
     Notes
     -----
-    Where two contact sides of one body meet in a corner, the node there carries a multiplier of one contact alone: of
+    Where two contact sides of one body meet in a corner, the node there carries a multiplier of only one contact: of
     that with a rigid obstacle, else of the longer one, the first of equally long ones. Three bodies that meet in a
-    point would otherwise be tied in a circle, and their tractions there could not be told apart. The other contact
+    point would otherwise be tied in a circle, and their tractions there would not be unique. The other contact
     hands its share to its neighbours, as at crosspoints of mortar methods [Wohlmuth2000].
     """
     numbers = {body.name: number for number, body in enumerate(bodies)}
@@ -282,7 +282,7 @@ def obstacle_rows(
 
     Notes
     -----
-    A rigid body is measured where it stands before it moves. Its point that a node may touch lies at the gap along the
+    A rigid body is measured at its position before it moves. Its point that a node may touch lies at the gap along the
     direction of contact: this point, not the node, is what friction drags along and what the moment of the contact is
     taken at.
     """

@@ -365,7 +365,7 @@ def _offset(prepared: PreparedAssembly) -> FloatArray:
 
 
 def _is_loaded_alike(prepared: PreparedAssembly, other: PreparedAssembly, number: int) -> bool:
-    """Tell whether loads, body forces and prescribed displacements of a body are the same objects in two steps."""
+    """Return whether loads, body forces and prescribed displacements of a body are the same objects in two steps."""
     data, other_data = (
         (step.forces[number], step.insides[number], step.conditions[number].displacement) for step in (prepared, other)
     )

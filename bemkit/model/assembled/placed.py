@@ -26,13 +26,13 @@ class PlacedBody:
     """A body of an assembly on a mesh.
 
     Operators are assembled on its own mesh. That of a copy is the mesh of the shape where it was drawn, which all
-    copies share; a body that supports or rigid obstacles hold is alone, and its own mesh is the one in place.
+    copies share; a body that supports or rigid obstacles hold forms its own group, and its own mesh is in place.
 
     Parameters
     ----------
     body : Body
     scene : Scene
-        What is said of it alone; see `Assembly.scene_of`.
+        Its scene as a single body; see `Assembly.scene_of`.
     mesh : BoundaryMesh
         In its place, in physical units.
     own_mesh : BoundaryMesh

@@ -150,7 +150,7 @@ class PreparedAssembly:
         Parameters
         ----------
         assembly : Assembly
-            Differs in numbers of conditions and contacts alone.
+            Differs only in numbers of conditions and contacts.
 
         Raises
         ------

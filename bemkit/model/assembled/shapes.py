@@ -84,13 +84,13 @@ def condensed_shapes(
         return list(executor.map(Shape.condensed_elsewhere, shapes))
     except BrokenExecutor as error:
         raise NotSentError(
-            f"the executor broke down ({str(error) or type(error).__name__}): take fewer processes, or leave it out"
+            f"the executor broke down ({str(error) or type(error).__name__}): take fewer processes, or remove it"
         ) from error
     except CANNOT_BE_SENT as error:
         for shape in shapes:
             if reason := why_not_sent(shape):
                 raise NotSentError(
                     f"body {shape.name!r} cannot be sent to another process ({reason}): write its functions as "
-                    "formulas, or leave the executor out"
+                    "formulas, or remove the executor"
                 ) from error
         raise

@@ -1,7 +1,7 @@
 """Round bodies that nothing keeps from turning.
 
 A body whose contact sides are arcs around one point turns about it without changing them: without friction no contact
-resists, whatever it touches. So do several that friction joins, if those sides are round by which they touch others.
+resists, touching anything. So do several that friction joins, if those sides are round by which they touch others.
 Their elements do resist, since they interpolate the rotation: a load that turns such a body would be balanced by what
 its mesh differs from a circle, at any angle.
 """

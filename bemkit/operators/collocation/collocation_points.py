@@ -83,7 +83,7 @@ class Coefficients:
 def _folded(
     on: FloatArray | ComplexArray, on_conjugate: ComplexArray, images: Sequence[tuple[float, float]]
 ) -> tuple[ComplexArray, ComplexArray]:
-    """Add the coefficients of images: the signs (f, f) stand for v -> f v, and (f, -f) for v -> f conj(v)."""
+    """Add the coefficients of images: the signs (f, f) mean v -> f v, and (f, -f) mean v -> f conj(v)."""
     pieces = zip(images, np.split(on, len(images), axis=1), np.split(on_conjugate, len(images), axis=1), strict=True)
     total: ComplexArray = np.zeros((2, len(on), on.shape[1] // len(images)), complex)
     for (along_x, along_y), of_v, of_conjugate in pieces:

@@ -50,7 +50,7 @@ def _near(x: complex, ends: Ends, to_local: complex, is_own: bool) -> tuple[comp
     log, other_log = 0.5 * math.log(squared), 0.5 * math.log(other_squared)
     if is_own:
         return 0j, complex(log - other_log, 0.0), log + other_log, -1.0 + 0j
-    # near an end the coordinate across the element is known from there alone
+    # near an end the coordinate across the element is known only from there
     zeta = complex(0.5 * (plus.real + minus.real), plus.imag if squared < other_squared else minus.imag)
     turn = arm.conjugate() * other
     return zeta, complex(log - other_log, -math.atan2(turn.imag, turn.real)), log + other_log, plus * minus

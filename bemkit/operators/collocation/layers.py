@@ -148,7 +148,7 @@ class _Near:
         half = 0.5 * np.abs(span)
         to_start, to_end = x[point] - start[element], x[point] - end[element]
         to_local = (span / (2.0 * half)).conj() / half
-        # near an end node the coordinate across the element is known from there alone
+        # near an end node the coordinate across the element is known only from there
         plus, minus = to_start * to_local, to_end * to_local
         self.zeta = 0.5 * (plus + minus)
         squared_start = np.square(to_start.real) + np.square(to_start.imag)

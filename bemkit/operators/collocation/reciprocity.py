@@ -1,9 +1,9 @@
-"""One exact elastic field for each closed curve: what its reciprocity with the solution tells about the pressure there.
+"""One exact elastic field for each closed curve: its reciprocity with the solution determines the pressure there.
 
-The displacement equation hardly tells a uniform pressure on a closed curve: it displaces nothing but what the
+The displacement equation hardly determines a uniform pressure on a closed curve: it displaces nothing but what the
 compressibility allows, so that an error of the equation along the normals comes back as a pressure 1 / (1 - 2 nu) times
 larger, and at nu = 1/2 nothing is left of it within a hole. Betti's theorem [Betti1872] for a field w that carries
-volume through the curve tells it at every ratio. In complex notation, with t(w) the tractions of w on the boundary,
+volume through the curve gives it at every ratio. In complex notation, with t(w) the tractions of w on the boundary,
 
     around a hole     w = a / conj(z - c),        t(w) ds = 2 mu i dw,     c in the hole, a its distance from the curve
     the outer curve   w = (1 - 2 nu) (z - c),     t(w) ds = -2 mu i dz

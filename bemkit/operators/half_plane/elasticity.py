@@ -118,7 +118,7 @@ class _Condensation:
         return cls(elastic.drive, conditions, flexibility, motions.reshape(-1, 3), acting, retained, stiffness)
 
     def is_of(self, drive: FarDrive, conditions: NodalConditions) -> bool:
-        """Whether other conditions and another drive differ in numbers alone."""
+        """Whether other conditions and another drive differ only in numbers."""
         own = self.conditions
         return (
             (drive.driven, drive.centre) == (self.drive.driven, self.drive.centre)

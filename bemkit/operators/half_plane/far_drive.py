@@ -1,4 +1,4 @@
-"""How a half-plane moves far away: as it is told, or as forces drive it."""
+"""How a half-plane moves far away: by given motions, or driven by forces."""
 
 from __future__ import annotations
 

@@ -64,7 +64,7 @@ class PeriodicElasticity(SurfaceElasticity):
         if float(np.ptp(lengths)) > _EQUAL * float(lengths.mean()):
             raise InputError(
                 f"elements of a periodic half-plane have lengths from {lengths.min():.4g} to {lengths.max():.4g} of a "
-                "period: leave out the grading, and let parts end where equal elements do"
+                "period: remove the grading, and let parts end where equal elements do"
             )
 
     @cached_property

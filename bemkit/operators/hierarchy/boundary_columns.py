@@ -244,7 +244,7 @@ class BoundaryColumns:
 
 
 def counted(places: IntArray, elements: IntArray) -> IntArray:
-    """Return where places stand among some elements, ascending; `NOWHERE` if they do not."""
+    """Return the positions of places in some elements, ascending; `NOWHERE` for others."""
     if not elements.size:
         return np.full_like(places, NOWHERE)
     counted = np.searchsorted(elements, places)

@@ -6,7 +6,7 @@ those of `bemkit.operators.collocation`. With y on the arc, rho = x - y, f the d
     U f p = A sum f [(1/2 - kappa log|rho / r0|) p + (rho / conj(rho)) conj(p) / 2] ds,      A = 1 / (8 pi mu (1 - nu))
     T f v = B sum [(2 - 2 nu) Im - i (1 - 2 nu) Re](f dy / rho) v + B sum (rho / conj(rho)) Im(dy / rho) conj(f v),
 
-where f is real in the first and B = 1 / (4 pi (1 - nu)); the slope s stands for the density s p(t), p the polynomial of
+where f is real in the first and B = 1 / (4 pi (1 - nu)); the slope s means the density s p(t), p the polynomial of
 the element (`bemkit.operators.integrals.curved_panels`).
 """
 

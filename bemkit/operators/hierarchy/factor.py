@@ -49,7 +49,7 @@ class Border:
 
 
 class SingularClusterError(SingularMatrixError):
-    """A cluster of the tree whose own equations do not determine its unknowns, whatever the rest of the body does."""
+    """A cluster of the tree whose own equations do not determine its unknowns, for any rest of the body."""
 
     def __init__(self, n_elements: int) -> None:
         super().__init__(
@@ -85,25 +85,25 @@ class _Cluster:
 
     Parameters
     ----------
-    scattering, alone : (n_caused, n_felt), (n_caused, k) arrays
-        Its columns cause, and to the balances it adds, ``alone - scattering @ f``, for k different loads.
+    scattering, of_loads : (n_caused, n_felt), (n_caused, k) arrays
+        Its columns cause, and to the balances it adds, ``of_loads - scattering @ f``, for k different loads.
     response, at_rest : arrays
         The unknowns of a leaf, and what the rows of both children of another cluster feel, are
         ``at_rest - response @ f``.
     """
 
     scattering: FloatArray
-    alone: FloatArray
+    of_loads: FloatArray
     response: FloatArray
     at_rest: FloatArray
 
     def unloaded(self, k: int) -> _Cluster:
         """Return the same under k times no load."""
-        return replace(self, alone=np.zeros((len(self.alone), k)), at_rest=np.zeros((len(self.at_rest), k)))
+        return replace(self, of_loads=np.zeros((len(self.of_loads), k)), at_rest=np.zeros((len(self.at_rest), k)))
 
     @property
     def n_bytes(self) -> int:
-        return self.scattering.nbytes + self.alone.nbytes + self.response.nbytes + self.at_rest.nbytes
+        return self.scattering.nbytes + self.of_loads.nbytes + self.response.nbytes + self.at_rest.nbytes
 
 
 @dataclass(eq=False)
@@ -192,7 +192,7 @@ class HierarchicalFactor:
         self._stale, self._is_reloaded = set(), False
 
     def _above_loads(self, level: int) -> set[int]:
-        """Return the clusters of a level that stand above loads which have changed, and change by themselves."""
+        """Return the clusters of a level above loads which have changed, and change by themselves."""
         if not self._is_reloaded:
             return set()
         return {
@@ -230,7 +230,7 @@ class HierarchicalFactor:
         ----------
         leaf : int
         given : (n_of_leaf, 4, k) array
-            What stands in the place of the given part of the laws there.
+            Replaces the given part of the laws there.
         leaves : (n_leaves,) array
             Ascending.
         """
@@ -301,8 +301,8 @@ class HierarchicalFactor:
         outgoing_of_unknowns, at_rest = of_unknowns[:, rows.size :].T, np.zeros((2 * n, given.shape[1]))
         if given.any():
             at_rest = -factor.solve(both[:, : rows.size].T @ given)
-        alone = outgoing_of_unknowns @ at_rest + both[:, rows.size :].T @ given
-        return _Cluster(outgoing_of_unknowns @ response, alone, response, at_rest)
+        of_loads = outgoing_of_unknowns @ at_rest + both[:, rows.size :].T @ given
+        return _Cluster(outgoing_of_unknowns @ response, of_loads, response, at_rest)
 
     def _parent(self, level: int, cluster: int) -> _Cluster:
         changes = cluster in self._changing[level]
@@ -322,7 +322,7 @@ class HierarchicalFactor:
         n_border, n_one, n_two = self.border.errors.shape[1], len(on_one), len(on_two)
         parent = self._skeleton(level, cluster)
         n_rows = 0 if parent is None else parent.rows.size
-        n_felt, n_loads = n_rows + n_border, one.alone.shape[1]
+        n_felt, n_loads = n_rows + n_border, one.of_loads.shape[1]
         from_two, from_one = on_one @ two.scattering[: on_one.shape[1]], on_two @ one.scattering[: on_two.shape[1]]
         # columns: what the rows of the parent feel, the border, and the loads
         felt_one, felt_two = (np.zeros((n, n_felt + n_loads), order="F") for n in (n_one, n_two))
@@ -330,8 +330,8 @@ class HierarchicalFactor:
             passed = parent.row_map.matrix()
             felt_one[:, :n_rows], felt_two[:, :n_rows] = passed[:n_one], passed[n_one:]
         felt_one[:, n_rows:n_felt], felt_two[:, n_rows:n_felt] = -from_two[:, n_two:], -from_one[:, n_one:]
-        felt_one[:, n_felt:] = on_one @ two.alone[: on_one.shape[1]]
-        felt_two[:, n_felt:] = on_two @ one.alone[: on_two.shape[1]]
+        felt_one[:, n_felt:] = on_one @ two.of_loads[: on_one.shape[1]]
+        felt_two[:, n_felt:] = on_two @ one.of_loads[: on_two.shape[1]]
         felt_one -= from_two[:, :n_two] @ felt_two
         left = np.eye(n_one) - from_two[:, :n_two] @ from_one[:, :n_one]
         felt_one = _LU(left, self._singular(level, cluster), 1.0).solve(felt_one)
@@ -340,7 +340,7 @@ class HierarchicalFactor:
         for each, of_rows in ((one, felt_one), (two, felt_two)):
             causes = each.scattering[:, : len(of_rows)] @ of_rows
             causes[:, n_rows:n_felt] += each.scattering[:, len(of_rows) :]
-            causes[:, n_felt:] -= each.alone
+            causes[:, n_felt:] -= each.of_loads
             caused.append(causes)
         skeletons = np.concatenate([causes[: len(causes) - n_border] for causes in caused])
         balances = sum(causes[len(causes) - n_border :] for causes in caused)
@@ -368,7 +368,7 @@ class HierarchicalFactor:
         if cluster in self._changing[level]:
             return factored
         shares = self._loads.shares[:, None]
-        return replace(factored, alone=factored.alone @ shares, at_rest=factored.at_rest @ shares)
+        return replace(factored, of_loads=factored.of_loads @ shares, at_rest=factored.at_rest @ shares)
 
     def _skeleton(self, level: int, cluster: int) -> Skeleton | None:
         """Return the skeleton of a cluster, none of the root."""
@@ -377,4 +377,4 @@ class HierarchicalFactor:
     def _of_border(self, root: _Cluster) -> FloatArray:
         """Return the unknowns (n_border, k) of the boundary as a whole."""
         error = SingularMatrixError("the balance of forces is singular: check that supports and contacts hold the body")
-        return _LU(root.scattering - self.border.own, error).solve(root.alone)
+        return _LU(root.scattering - self.border.own, error).solve(root.of_loads)

@@ -18,7 +18,7 @@ class FoldedColumns(BoundaryColumns):
     """Elements with their images: what is said by place says the same of the places of the images behind them.
 
     In the middle of an element an unknown and its images act together. Points of no element, by which clusters are
-    seen from afar, see the unknown alone: what its images cause beyond a line is the image of what it causes, and lies
+    seen from afar, see only the unknown: what its images cause beyond a line is the image of what it causes, and lies
     as far from the cluster at least.
 
     Parameters

@@ -20,7 +20,7 @@ from bemkit.arrays import FloatArray, IntArray
 _SPARE = 10
 """Random rows beyond the rank; with fewer of them a decomposition is made anew from more."""
 _SKETCHED = 0.3
-"""Tolerance of a sketch by that asked for: LU of random combinations leaves a few times more out than pivoted QR."""
+"""Tolerance of a sketch by that asked for: the remainder of LU of random combinations is a few times that of QR."""
 _ROUND_OFF = 5e-14
 """No tolerance of a sketch is smaller: pivots below that are round-off of the sums, and would raise the rank."""
 
@@ -81,7 +81,7 @@ def interpolative(matrix: FloatArray, tolerance: float) -> Interpolation:
     matrix : (m, n) array
         Overwritten if its columns are contiguous.
     tolerance : float
-        Of what is left out of a column, relative to the largest column.
+        Size of the remainder of a column, relative to the largest column.
 
     Returns
     -------
@@ -194,7 +194,7 @@ def _compared(
 def _of_sketch(sketch: FloatArray, tolerance: float) -> Interpolation | None:
     """Interpolate the columns of random combinations (n_rows, n) by LU; None if these are too few for the rank.
 
-    Overwrites `sketch`. Each combination knows what the pivots before leave out of every column, to a factor of order
+    Overwrites `sketch`. Each combination estimates the remainder of every column after the pivots, to a factor of order
     one, so that a pivot is the largest column left. The last ones are looked at to find that all are small.
     """
     from scipy.linalg.lapack import dgetrf, dtrtrs

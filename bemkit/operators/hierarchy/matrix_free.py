@@ -25,7 +25,7 @@ _PRODUCTS = 1e-3
 """Error of a product by the tolerance of the iteration; tractions feel it by elements on which it oscillates."""
 LARGEST_RESIDUAL = 2.5
 """Largest residual of an equation, by the largest displacement and the tolerance. Where the mean of all is small enough
-it is mostly below that, but all that is left may stand on a few elements."""
+it is mostly below that, but all of it may be on a few elements."""
 _FINEST = 1e-13
 """Errors of products below that are round-off."""
 

@@ -1,7 +1,7 @@
-"""Skeletons of the clusters of a tree: a few unknowns and equations that stand for all of them.
+"""Skeletons of the clusters of a tree: a few unknowns and equations that represent all of them.
 
 Seen from afar the unknowns of a cluster are those of its column skeleton, and the equations of a cluster feel the rest
-of the boundary through its row skeleton. Whatever the conditions on the elements are, the skeletons stay what they are,
+of the boundary through its row skeleton. For all conditions on the elements, the skeletons stay the same,
 because tractions and displacements are both among the unknowns.
 """
 
@@ -27,7 +27,7 @@ _UNEVEN = 1e3
 
 @dataclass(frozen=True, eq=False)
 class Skeleton:
-    """What stands for a cluster.
+    """The skeleton of a cluster.
 
     Parameters
     ----------
@@ -93,7 +93,7 @@ class LevelView:
         return (7 if len(self.rows) <= _FEW else 6) * n_candidates // 10
 
     def proxies(self, cluster: int) -> ComplexArray:
-        """Return the points that stand for all that is far from a cluster."""
+        """Return the points that represent all that is far from a cluster."""
         return proxy_points(self.discs, cluster, n_proxies(self.tolerance))
 
     def skeleton(self, cluster: int) -> Skeleton:

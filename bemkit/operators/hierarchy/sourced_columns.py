@@ -1,8 +1,8 @@
 """Columns of the boundary equations of a body with holes: each hole is one more element, with an equation of its own.
 
-The displacement equation hardly tells a uniform pressure in a hole; the reciprocity with a source of volume there does
+The displacement equation hardly fixes a uniform pressure in a hole; the reciprocity with a source of volume there does
 (`bemkit.operators.collocation.reciprocity`), and that source makes room for it as an error of the equation. Both are
-elastic fields and so belong to a place like everything else: the element of a hole stands at the source. Its first
+elastic fields and so belong to a place like everything else: the element of a hole lies at the source. Its first
 unknown is the strength of the source, its first equation the reciprocity; the second ones say that nothing is zero.
 """
 
@@ -26,7 +26,7 @@ class SourcedColumns(BoundaryColumns):
     Parameters
     ----------
     inner : BoundaryColumns
-        The elements alone.
+        Only the elements.
     inner_place : (n_places,) array
         Where each place is among these; `NOWHERE` for holes.
     sources : dict
@@ -106,7 +106,7 @@ class SourcedColumns(BoundaryColumns):
         return felt
 
     def _inner(self, places: IntArray) -> IntArray:
-        """Return the places among the elements alone, `NOWHERE` for holes and points of no element."""
+        """Return the places among the elements, `NOWHERE` for holes and points of no element."""
         return np.where(places == NOWHERE, NOWHERE, self.inner_place[places])
 
     def _unit(self, place: int) -> float:

@@ -83,7 +83,7 @@ class HierarchicalSystem:
 
     Notes
     -----
-    Places of the tree beyond the elements, those of holes, have a traction alone.
+    Places of the tree beyond the elements, those of holes, have only a traction.
     """
 
     def __init__(

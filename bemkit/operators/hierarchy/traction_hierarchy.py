@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from scipy.sparse import csr_matrix
 
 _STRENGTH, _FINEST, _SMOOTHING = 2.1, 1.5, 0.5
-"""The multilevel sum by |xi|, on chains of 512 elements; with this weight c of the finest level, which stands for all
+"""The multilevel sum by |xi|, on chains of 512 elements; with this weight c of the finest level, which represents all
 levels that would be finer, and this damping of the Jacobi step it varies by a tenth, with 1 and 0 by a factor of two.
 """
 _HOLD = 1e-6
@@ -35,7 +35,7 @@ _COARSEST = 10
 
 @dataclass(frozen=True, eq=False)
 class TractionHierarchy:
-    """The inverse for one set of unknown tractions, in single precision, as befits what only approximates.
+    """The inverse for one set of unknown tractions, in single precision, enough for a preconditioner.
 
     Parameters
     ----------

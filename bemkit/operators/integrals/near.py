@@ -53,7 +53,7 @@ def integrate_listed(
     is_same = test == trial
     is_turned = (half[test] > half[trial]) | ((half[test] == half[trial]) & (test > trial))
     is_turned &= panels.is_straight[test] & panels.is_straight[trial]
-    # both orders of two elements share their integrals; those of elements with themselves come last and are left out
+    # both orders of two elements share their integrals; those of elements with themselves come last and are excluded
     numbers = np.where(is_turned, trial * n_elements + test, test * n_elements + trial)
     numbers[is_same] = n_elements**2
     different, places = np.unique(numbers, return_inverse=True)

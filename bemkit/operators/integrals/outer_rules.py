@@ -61,7 +61,7 @@ class OuterRule:
         Whether the start is the end node that points are measured from.
     fraction : (n, n_points) array
     weight : (n, n_points) array, optional
-        Left out, points and weights are those of Gauss on whole elements; then a single row of points serves all pairs.
+        By default points and weights are Gauss' on whole elements; then a single row of points serves all pairs.
     """
 
     item: IntArray

@@ -1,4 +1,4 @@
-"""Element-pair integrals: the one place where coincident, touching, near and far elements are told apart.
+"""Element-pair integrals: the one module that distinguishes coincident, touching, near and far elements.
 
 For a test element i and a trial element j, with local coordinates xi and t in [-1, 1] on each and the Legendre
 polynomials P_k, the scalar integrals
@@ -62,7 +62,7 @@ class PairSweep:
     degrees : Degrees
         The integrals that are wanted.
     test_elements, trial_elements : (n_test,), (n_trial,) arrays, optional
-        Element numbers of the rows and the columns; all elements if left out.
+        Element numbers of the rows and the columns; by default all elements.
     """
 
     def __init__(

@@ -42,7 +42,7 @@ class Cholesky:
     ----------
     matrix : (n, n) array
     name : str
-        What the matrix stands for, for the message.
+        Name of the matrix in the message.
     overwrite : bool
         Whether the matrix is needed no longer: a row-major one is then factored in its place.
 
@@ -109,7 +109,7 @@ class DenseLU:
     matrix : (n, n) array
         Overwritten.
     name : str
-        What the matrix stands for, for the message.
+        Name of the matrix in the message.
 
     Raises
     ------

@@ -98,7 +98,7 @@ class MatrixFree:
     """Boundary equations solved by iteration, with products by the fast multipole method: a fraction of the memory.
 
     For constant collocation on straight elements. Other equations are solved as by `Automatic`; the plan says why.
-    Every response takes up to about seventeen products, whatever the number of elements.
+    Every response takes up to about seventeen products, for any number of elements.
 
     Parameters
     ----------

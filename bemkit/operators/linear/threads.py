@@ -29,7 +29,7 @@ class _Turns:
 
     Threads that want the same setting share it, others wait for their turn, in the order in which they came. The
     first of those who share switches the setting on and the last one off again. A thread that has it already keeps
-    it, whatever it asks for: waiting for itself would never end.
+    it, in every call: waiting for itself would never end.
     """
 
     def __init__(self) -> None:

@@ -94,7 +94,7 @@ class InteriorFields:
 
     Notes
     -----
-    Every method takes points strictly inside the body; `is_inside` tells which are. At a point outside or on the
+    Every method takes points strictly inside the body; `is_inside` finds them. At a point outside or on the
     boundary they raise `PointNotInsideError`, which names it. For the body outside of a closed boundary the fields
     are those that vanish at infinity, up to the logarithm that belongs to a resultant force.
 

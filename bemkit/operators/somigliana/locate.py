@@ -51,7 +51,7 @@ class Location:
 
 
 class Locator:
-    """Tells where points are with respect to a body.
+    """Locates points with respect to a body.
 
     Parameters
     ----------
@@ -180,7 +180,7 @@ def _smallest(values: FloatArray, point: IntArray, n_points: int) -> FloatArray:
 def _boxes(clusters: Clusters, points: ComplexArray, level: int) -> tuple[ComplexArray, ComplexArray]:
     """Return the axes of boxes around the centres of the clusters of a level, and half their lengths and widths.
 
-    The axis is that of the second moment of the points (k, n): boxes along a side are thin, whatever its direction.
+    The axis is that of the second moment of the points (k, n): boxes along a side are thin, in any direction.
     """
     tree, centre = clusters.tree, clusters.levels[level].centre
     begins = tree.bounds[: -1 : 2**level]

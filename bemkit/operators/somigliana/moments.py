@@ -76,7 +76,7 @@ def local_moments(plus: ComplexArray, minus: ComplexArray, highest: int, n_order
     highest : int
         Highest degree.
     n_orders : int
-        1 for C alone, 2 for C and G, 3 for C, G and H.
+        1 for C, 2 for C and G, 3 for C, G and H.
 
     Notes
     -----
@@ -289,6 +289,6 @@ class ArcQuadrature:
 
 
 def _is_away(x: ComplexArray, middle: ComplexArray, slope: ComplexArray, length: FloatArray | float) -> BoolArray:
-    """Tell which pieces, of lengths in the local coordinate, are so far from their points that one rule serves."""
+    """Return which pieces, of lengths in the local coordinate, are so far from their points that one rule serves."""
     away: BoolArray = np.abs(x - middle) >= SEPARATION * 0.5 * length * np.abs(slope)
     return away

@@ -4,7 +4,7 @@ Scenes take `galerkin.GalerkinElasticity` or `collocation.CollocationElasticity`
 of them.
 
 On bounded bodies both maps hold their tractions in exact equilibrium of forces and moments, as the continuous map
-does. Discretisation alone would break it slightly, and with it the independence of the arbitrary constant in the
+does. Discretisation would break it slightly, and with it the independence of the arbitrary constant in the
 logarithm of the single layer.
 
 On the exterior of a body (`BoundaryMesh.is_exterior`) no motion is free of tractions, and tractions may have a

@@ -41,7 +41,7 @@ class CollocationElasticity:
     in any case; constant elements do not hold them by themselves. Plain collocation satisfies the equilibrium of
     forces and moments only up to the discretisation error: here a rigid motion c is added to the equations and the
     resultants of the tractions are set to zero; c vanishes with the mesh size. On an exterior neither c nor the
-    condition on the resultants is there. Likewise one reciprocity for each loop tells the pressure there, which the
+    condition on the resultants is there. Likewise one reciprocity for each loop gives the pressure there, which the
     displacement equation loses as Poisson's ratio approaches 1/2 (`bemkit.operators.collocation.reciprocity`).
     """
 
@@ -69,7 +69,7 @@ class CollocationElasticity:
         return system.condensed().stiffness
 
     def condense(self, conditions: NodalConditions, force: FloatArray) -> CondensedMap:
-        """Exchange columns so that all unknowns but the retained displacements stand on the left, and solve once.
+        """Exchange columns so that all unknowns but the retained displacements are on the left, and solve once.
 
         Columns of tractions and displacements that are known to be zero are neither computed nor stored.
         """

@@ -2,7 +2,7 @@
 
 With a displacement u_p and stresses sigma_p that balance the forces inside, u = u_h + u_p, and u_h obeys the map S
 without them: S (u - u_p) = f - f_p, with f the nodal forces of all tractions and f_p those of sigma_p n. At the nodes
-u_p is exact, so that whatever S holds exactly stays exact, and u_h alone has a discretisation error.
+u_p is exact, so that all that S holds exactly stays exact, and only u_h has a discretisation error.
 """
 
 from __future__ import annotations

@@ -174,7 +174,7 @@ class GalerkinElasticity:
         """The change of volume, on which the uniform pressure works.
 
         Curved elements hold normals n only by interpolation; the rest of them, which does not vanish with 1 - 2 nu as
-        V n does, would resist every change of volume of a nearly incompressible body. Exact normals stand among the
+        V n does, would resist every change of volume of a nearly incompressible body. Exact normals are among the
         tractions instead. With the dilatation x, whose tractions are n / beta, beta the compressibility, and the flux f
         of displacements, the identities V n = beta (1/2 + K) x and (1/2 + K') n = n - beta W x give
         (f - beta W x) u = beta x (f - beta W x) p. On the other tractions, <V n, t> = 0, W x is S x.
@@ -202,8 +202,8 @@ class GalerkinElasticity:
     def tractions(self, displacement: FloatArray) -> FloatArray:
         """Return the traction dofs (n_scalar, 2) [Pa] that belong to nodal displacements (n_nodes, 2) [m].
 
-        Of an incompressible body they lack the pressures, which displacements do not tell; those on curved loops of a
-        nearly incompressible one they hardly tell.
+        Of an incompressible body they lack the pressures, which displacements do not give; those on curved loops of a
+        nearly incompressible one they hardly determine.
         """
         factors = self.factors  # V^-1 (1/2 M + K) u on tractions without uniform pressures
         rest = factors.single_layer.solve_upper(factors.whitened_trace @ displacement.ravel())
@@ -223,7 +223,7 @@ class GalerkinElasticity:
         return arms, flux, float(flux @ dilatation_of(self.displacement_space))
 
     def element_tractions(self, displacement: FloatArray, force: FloatArray) -> FloatArray:
-        """Return the (n_elements, n_local, 2) tractions V^-1 (1/2 M + K) u, with the pressures that `force` tells.
+        """Return the (n_elements, n_local, 2) tractions V^-1 (1/2 M + K) u, with the pressures that `force` determines.
 
         Around a hole V n is of the order of the compressibility. What curved elements leave of it besides, which hold
         normals n only by interpolation, comes back as a pressure that is wrong by as much, and at last altogether, as
@@ -241,7 +241,7 @@ class GalerkinElasticity:
 
     @property
     def _needs_forces(self) -> bool:
-        """Whether displacements do not tell, or hardly, the pressures on the loops."""
+        """Whether displacements do not, or hardly, determine the pressures on the loops."""
         has_curved_holes = (self.mesh.is_exterior or len(self.mesh.loops) > 1) and not self.mesh.is_straight.all()
         is_nearly = self.material.effective_poisson_ratio > _NEARLY_INCOMPRESSIBLE
         return self.material.is_incompressible or bool(is_nearly and has_curved_holes)

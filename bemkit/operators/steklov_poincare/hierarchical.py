@@ -23,7 +23,7 @@ _LARGEST_RESIDUAL, _SAMPLED = 1e3, 16
 """Residual by the tolerance of the compression, found at so many elements, beyond which equations are inexact. It is
 below one on all bodies that were tried."""
 _FAR = 10.0
-"""A rigid motion so much larger than what is left of the displacements is left out."""
+"""A rigid motion so much larger than the strained displacements is subtracted."""
 
 
 class InexactEquationsError(SingularMatrixError):
@@ -158,7 +158,7 @@ class LoadedSystem:
     motions : (n_elements, 2, n_motions) array
         Rigid motions that no support resists and that cause no tractions.
     travel : (n_motions,) array
-        One of these that is left out of all displacements. The compressed equations would hold it to their tolerance
+        One that is subtracted from all displacements. The compressed equations would hold it to their tolerance
         only, which counts where a body moves by far more than it strains.
     """
 
@@ -205,7 +205,7 @@ class LoadedSystem:
 
     @property
     def motion(self) -> FloatArray:
-        """(n_elements, 2) array [m]: the rigid motion that is left out, in x and y."""
+        """(n_elements, 2) array [m]: the rigid motion that is subtracted, in x and y."""
         motion: FloatArray = self.motions @ self.travel
         return motion
 

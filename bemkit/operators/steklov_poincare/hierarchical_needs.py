@@ -1,4 +1,4 @@
-"""Whether boundary equations are compressed over a tree, and what that takes, foreseen from sizes alone.
+"""Whether boundary equations are compressed over a tree, and what that takes, predicted from sizes.
 
 Times and memory are those of a square with 1e3 to 1e6 elements (`benchmarks/large.py` measures what is estimated
 here); they hardly depend on the shape.
@@ -32,7 +32,7 @@ from bemkit.operators.steklov_poincare.needs import (
 
 _DIRECT: LinearSolver = DenseCholesky()
 _FEWEST_ELEMENTS = 200
-"""Of a tree that is worth its name."""
+"""Smallest number of leaves of a tree."""
 _MOST_LOOPS = 40
 """Each loop of a symmetric body has an equation of its own that passes through the whole tree."""
 _LEAST_COMPRESSIBILITY = 1e-8
@@ -113,7 +113,7 @@ def choose_collocation_solver(
     memory : float [bytes]
         Of the computer.
     hindrance : str, optional
-        Why the equations cannot be compressed, whatever `why_dense` says; empty if they can.
+        Why the equations cannot be compressed, before `why_dense`; empty if they can.
 
     Returns
     -------
@@ -160,14 +160,14 @@ def _options(case: BodyCase) -> Hierarchical:
 
 
 def hierarchical_needs(case: BodyCase, *, takes_slopes: bool) -> BodyNeeds:
-    """Return what the compressed equations take; nothing of them is counted, because ranks are not foreseen."""
+    """Return what the compressed equations take; nothing of them is counted, because ranks are not predicted."""
     options = _options(case)
     slopes = "rotations then cause no tractions" if takes_slopes else "the method of the source paper"
     reason = f"compressed over a tree to {options.tolerance:g}: {case.linear_solver.reason}"
     items = (
         PlanItem("boundary equations", True, f"single and double layer, {reason}"),
         PlanItem("slopes between constant elements", takes_slopes, slopes),
-        PlanItem("hypersingular operator W", False, "collocation takes the displacement equation alone"),
+        PlanItem("hypersingular operator W", False, "collocation takes only the displacement equation"),
         *_tree_items(case, options),
     )
     return replace(_needs(case, options), items=items)

@@ -59,7 +59,7 @@ def assemble_layers(
     Returns
     -------
     Layers
-        On tractions t with <V n, t> = 0, n the normals of a compressible body: those of its dilatation are n alone.
+        On tractions t with <V n, t> = 0, n the normals of a compressible body: those of its dilatation are n.
     """
     u, t, mesh = displacements, tractions, displacements.mesh
     single = SingleLayerForm(t, t, material)

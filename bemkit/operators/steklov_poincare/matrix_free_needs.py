@@ -1,4 +1,4 @@
-"""Whether the equations of collocation can be solved without storing them, and what that takes, from sizes alone.
+"""Whether the equations of collocation can be solved without storing them, and what that takes, from sizes.
 
 Times and memory are those of a square with 1e4 to 1e5 elements (`benchmarks/low_memory.py` measures what is
 estimated here).
@@ -41,7 +41,7 @@ def why_stored(case: BodyCase) -> str:
 
 
 def matrix_free_needs(case: BodyCase, options: MatrixFree, *, takes_slopes: bool) -> BodyNeeds:
-    """Return what equations take that are not stored; how many steps an iteration takes is not foreseen."""
+    """Return what equations take that are not stored; how many steps an iteration takes is not predicted."""
     n = case.mesh.n_elements
     memory = int(_BYTES * n + _BYTES_OF_GROUPS)
     is_compiled, _ = compiled.expected(n)
@@ -50,7 +50,7 @@ def matrix_free_needs(case: BodyCase, options: MatrixFree, *, takes_slopes: bool
     items = (
         PlanItem("boundary equations", True, f"products by the fast multipole method: {case.linear_solver.reason}"),
         PlanItem("slopes between constant elements", takes_slopes, slopes),
-        PlanItem("hypersingular operator W", False, "collocation takes the displacement equation alone"),
+        PlanItem("hypersingular operator W", False, "collocation takes only the displacement equation"),
         PlanItem(
             "linear solver of the body", True, f"GMRES to {options.tolerance:g}, about {_STEPS:.0f} steps from cold"
         ),

@@ -1,4 +1,4 @@
-"""What a Steklov-Poincare map takes, foreseen from sizes alone: items, counts, memory and operations.
+"""What a Steklov-Poincare map takes, predicted from sizes: items, counts, memory and operations.
 
 Counts are exact. Memory adds up the matrices that are alive at the same time and the buffers of assembly; those of
 collocation, and the evaluations of integrals, were fitted once to runs of the shipped scenes with 50 to 800 elements.
@@ -32,7 +32,7 @@ _OWN_SOLVER = ChosenLinearSolver(DenseCholesky(), "the map has a linear solver o
 
 @dataclass(frozen=True)
 class PlanItem:
-    """One thing that is needed or left out, and why.
+    """One thing that is needed or skipped, and why.
 
     Parameters
     ----------
@@ -256,7 +256,7 @@ def _collocation_items(
     given = f"{n_given} columns are multiplied by given data at once" if n_given else "all given data are zero"
     slopes = "rotations then cause no tractions" if takes_slopes else "the method of the source paper"
     volume = "collocation has it among the tractions" if case.material.is_incompressible else "the body is compressible"
-    one_equation = "collocation takes the displacement equation alone"
+    one_equation = "collocation takes only the displacement equation"
     return (
         PlanItem("single layer V", True, f"unknown tractions: held and retained directions; {u} x {n_single}"),
         _zero_columns("columns of V on the free surface", "the traction is zero there", u - n_single - n_loaded, u),
@@ -278,7 +278,7 @@ def _collocation_items(
 
 def _zero_columns(name: str, reason: str, n_columns: int, n_all: int) -> PlanItem:
     if n_columns <= 0:
-        return PlanItem(name, True, "no column can be left out")
+        return PlanItem(name, True, "no column can be skipped")
     return PlanItem(name, False, f"{reason}; {n_columns} of {n_all} columns")
 
 
@@ -301,7 +301,7 @@ def _evaluations(case: BodyCase, straight: tuple[float, float], curved: tuple[fl
 def physical_memory() -> float:
     """Return the memory of this computer, or what `ulimit -v` leaves to this process, if that is less [bytes].
 
-    It is infinite on systems that do not tell.
+    It is infinite on systems that do not report it.
     """
     try:
         page = float(os.sysconf("SC_PAGE_SIZE"))

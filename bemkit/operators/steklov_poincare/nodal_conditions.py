@@ -16,7 +16,7 @@ from bemkit.geometry.vectors import norms, turned_right
 from bemkit.operators.rigid_modes import admissible_modes, rigid_motions
 
 SMOOTH_SIDE_RATIO = 0.07
-"""Two directions of one support that differ by less than 30 degrees stand for one smooth side: the eigenvalues of
+"""Two directions of one support that differ by less than 30 degrees are one smooth side: the eigenvalues of
 their sum then differ by the factor tan(15 deg)^2."""
 CONFLICT_TOLERANCE = 1e-9
 """Relative difference of two prescribed displacements at one node that round-off may explain."""
@@ -51,8 +51,8 @@ class Support:
         k = 1 or 2 unit directions on each element (both axes of a clamp), or at each node of each element (the normal
         of a roller, which turns along curved elements).
     displacement : callable, optional
-        (n, 2) points [m] -> (n, 2) displacement [m]; its components along the directions are prescribed. Zero if left
-        out.
+        (n, 2) points [m] -> (n, 2) displacement [m]; its components along the directions are prescribed. By default
+        zero.
     """
 
     name: str
@@ -260,7 +260,7 @@ def supported(space: BoundarySpace, supports: Sequence[Support]) -> NodalConditi
 
 
 def _mirrors(space: BoundarySpace) -> list[Support]:
-    """Return the supports that stand for symmetry lines: no displacement across them."""
+    """Return the supports of symmetry lines: no displacement across them."""
     if space.mesh.symmetry is None:
         return []
     from bemkit.geometry.reflection import antisymmetric_dofs
@@ -323,5 +323,5 @@ def free_modes(space: BoundarySpace, conditions: NodalConditions) -> FloatArray:
 
 
 def turning(motions: FloatArray) -> BoolArray:
-    """Tell which rigid motions (n_motions, n_nodes, 2) of unit size turn the body."""
+    """Return which rigid motions (n_motions, n_nodes, 2) of unit size turn the body."""
     return np.asarray(np.ptp(motions, axis=1).max(axis=1, initial=0.0) > _LEAST_TURN)

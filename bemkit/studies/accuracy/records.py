@@ -67,12 +67,12 @@ class ErrorRecord:
 
     @property
     def key(self) -> tuple[str, str, str, float]:
-        """What tells records of one study apart."""
+        """Key of a record in its study."""
         return *self.series, self.size
 
 
 def by_series(records: Iterable[ErrorRecord]) -> list[list[ErrorRecord]]:
-    """Group records that follow each other and differ in their meshes alone."""
+    """Group records that follow each other and differ only in their meshes."""
     return [list(group) for _, group in groupby(records, key=lambda record: record.series)]
 
 
@@ -90,13 +90,13 @@ class Rate:
 
 
 def fitted_rate(records: Sequence[ErrorRecord], measure: str) -> Rate:
-    """Return the rate of an error over the last meshes of a series, by least squares; nan if it cannot be told.
+    """Return the rate of an error over the last meshes of a series, by least squares; nan without an estimate.
 
     With degrees that rise it is exponential where that fits the last four meshes better.
     """
     last = records[-N_EXPONENTIAL:]
     n, errors = _sizes_and_errors(last, measure)
-    # errors of a fixed degree never fall exponentially, whatever four meshes look like
+    # errors of a fixed degree never fall exponentially, even if four meshes look like it
     is_rising = all(record.discretisation == RISING for record in last)
     if is_rising and len(last) == N_EXPONENTIAL and _is_good(n, errors) and np.all(np.diff(errors) < 0.0):
         algebraic, exponential = (np.polyfit(x, np.log(errors), 1, full=True)[:2] for x in (np.log(n), np.sqrt(n)))
@@ -111,7 +111,7 @@ def orders(records: Sequence[ErrorRecord], measure: str) -> list[float]:
 
 
 def fitted_order(records: Sequence[ErrorRecord], measure: str) -> float:
-    """Return the order of an error over the last meshes of a series, by least squares; nan if it cannot be told."""
+    """Return the order of an error over the last meshes of a series, by least squares; nan without an estimate."""
     return _slope(records[-N_FITTED:], measure)
 
 

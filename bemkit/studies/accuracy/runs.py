@@ -1,6 +1,6 @@
 """The runs of an error study, element types times drivers times sequences of meshes, and what is measured of each.
 
-Measured are run times, memory and errors, or the errors alone where runs at the same time would disturb each other.
+Measured are run times, memory and errors, or only the errors where runs at the same time would disturb each other.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ class MeshSequence:
     name : str
         A word for tables and figures.
     sizes : tuple of float
-        What tells the meshes apart, from coarse to fine: numbers of elements, or accuracies.
+        Keys of the meshes, from coarse to fine: numbers of elements, or accuracies.
     options : callable (scene, size) -> MeshOptions
     needs_estimate : bool
         Whether they follow an error estimate, which some element types do not have.
@@ -85,7 +85,7 @@ def adaptive(accuracies: tuple[float, ...] = ACCURACIES, most_elements: int = MO
 
 @dataclass(frozen=True)
 class Run:
-    """One record to compute: what tells it apart, and a problem, of which mesh, elements and driver are changed.
+    """One record to compute: its key, and a problem, of which mesh, elements and driver are changed.
 
     The size is a number of elements, or the accuracy that is asked for.
     """
@@ -105,7 +105,7 @@ class Run:
 
     @property
     def key(self) -> tuple[str, str, str, float]:
-        """What tells records of one study apart."""
+        """Key of a record in its study."""
         return self.discretisation, self.meshes, self.solver, self.size
 
 
@@ -125,7 +125,7 @@ def all_runs(
     Raises
     ------
     StudyError
-        If nothing is left to run, two runs could not be told apart, the scene has no contact, or a size is no size of a
+        If nothing is left to run, two runs have one key, the scene has no contact, or a size is no size of a
         mesh.
     """
     if not scene.contact_parts:
@@ -149,7 +149,7 @@ def all_runs(
     keys = [run.key for run in runs]
     repeated = next((key for k, key in enumerate(keys) if key in keys[:k]), None)
     if repeated is not None:
-        raise StudyError(f"{', '.join(map(str, repeated[:3]))} of size {repeated[3]:g} is given twice: leave one out")
+        raise StudyError(f"{', '.join(map(str, repeated[:3]))} of size {repeated[3]:g} is given twice: remove one")
     return runs
 
 

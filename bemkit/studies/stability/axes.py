@@ -54,7 +54,7 @@ class Axis(Generic[Baseline]):
     values : tuple of float
     make : callable (baseline solution, value) -> Case
     reference : float, optional
-        Value whose row the others are compared with; the given scene if left out.
+        Value whose row the others are compared with; by default the given scene.
     reason_against : callable (scene or assembly) -> str
         Why the axis says nothing of it; empty if it does.
     """
@@ -195,7 +195,7 @@ def _pushed_half_plane(baseline: Solution, value: float) -> Case:
     scene, force = with_friction(baseline.scene, _BLOCK_FRICTION), baseline.force_normal
     far = FarField(force_x=_BLOCK_FRICTION * value * force, force_y=force, turn=0.0)
     parts = tuple(part for part in scene.parts if isinstance(part.condition, Contact))
-    # where gaps are measured along the surface's normal, friction alone acts along it
+    # where gaps are measured along the surface's normal, only friction acts along it
     is_flat = all(isinstance(part.condition, Contact) and isinstance(part.condition.obstacle, Gap) for part in parts)
     scene = replace(scene, parts=parts, far=far)
     return Case(value, scene, is_solvable=value < 1.0 if is_flat and value != 1.0 else None)
@@ -272,7 +272,7 @@ def read_axes(
     makes: Mapping[str, Callable[[Any, float], Case]],
     reasons: Mapping[str, Callable[[Any], str]],
 ) -> tuple[Axis[Any], ...]:
-    """Return the axes of a group in ``axes.toml``, with what makes their cases and what says why to leave them out."""
+    """Return the axes of a group in ``axes.toml``, with what makes their cases and the reasons to skip them."""
     text = (resources.files("bemkit") / "studies" / "stability" / "axes.toml").read_text("utf-8")
     return tuple(
         Axis(

@@ -47,7 +47,7 @@ class StabilityRecord:
 
     @property
     def key(self) -> tuple[str, float]:
-        """What tells records of one sweep apart."""
+        """Key of a record in its sweep."""
         return self.axis, self.value
 
 

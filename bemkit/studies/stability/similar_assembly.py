@@ -78,7 +78,7 @@ class AssemblySimilarity:
             If something of it has no similar one; the message names it.
         """
         if assembly.symmetry is not None and not (self.turn == 0.0 and self.shift == (0.0, 0.0)):
-            raise InputError("the assembly has a symmetry, whose bodies stay where they are drawn: leave it out")
+            raise InputError("the assembly has a symmetry, whose bodies stay where they are drawn: remove it")
         return with_changed_steps(assembly, self._applied)
 
     def _applied(self, assembly: Assembly) -> Assembly:
@@ -106,11 +106,11 @@ class AssemblySimilarity:
         return None if length is None else self.length * length
 
     def _rigid(self, body: RigidBody) -> RigidBody:
-        """Return the rigid body that moves alike; one that a force drives along one axis alone cannot be turned."""
+        """Return the rigid body that moves alike; one that a force drives along only one axis cannot be turned."""
         is_pushed = body.is_driven[:2]
         if is_pushed.any() and not is_pushed.all() and self.turn != 0.0:
             raise InputError(
-                f"rigid body {body.name!r} is driven by a force along one axis alone, which cannot be turned: give "
+                f"rigid body {body.name!r} is driven by a force along only one axis, which cannot be turned: give "
                 "both forces, or both motions"
             )
         of_turn = np.array([1.0, 1.0, self.length])

@@ -59,7 +59,7 @@ def sweep(
         raise StabilityError("the scene has no contact, which this suite is about: give one that has")
     for axis in axes:
         if reason := axis.reason_against(scene):
-            raise StabilityError(f"axis {axis.name!r} says nothing of this scene: {reason}: leave it out")
+            raise StabilityError(f"axis {axis.name!r} does not apply to this scene: {reason}; remove it")
     baseline = attempt(lambda: run(scene))
     if baseline.solution is None or not baseline.is_converged:
         raise StabilityError(f"the scene itself has no converged solution ({baseline.message}): give one that has")

@@ -103,7 +103,7 @@ def all_rows(vary: Mapping[str, Sequence[float]]) -> tuple[tuple[Key, ...], list
             raise StudyError(f"{name}: there are no values: give at least one")
         repeated = next((value for k, value in enumerate(values) if value in values[:k]), None)
         if repeated is not None:
-            raise StudyError(f"{name}: {repeated:g} is given twice: leave one out")
+            raise StudyError(f"{name}: {repeated:g} is given twice: remove one")
         columns.append(values)
     n_rows = math.prod(map(len, columns))
     if n_rows > MOST_ROWS:
@@ -134,7 +134,7 @@ def with_values(scene: Scene | Assembly, values: Mapping[Key, float]) -> Scene |
     """
     for key, value in values.items():
         check_number(scene, key)
-        # whole numbers fit where numbers of elements stand, and everywhere else
+        # whole numbers fit for numbers of elements, and everywhere else
         scene = with_value(scene, key, int(value) if float(value).is_integer() else float(value))
     return scene
 

@@ -65,7 +65,7 @@ class SweepRow:
 
     @property
     def key(self) -> tuple[float, ...]:
-        """What tells the rows of one sweep apart."""
+        """Key of a row in its sweep."""
         return self.values
 
     @property

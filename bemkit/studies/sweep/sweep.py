@@ -45,7 +45,7 @@ def sweep(
 ) -> Sweep:
     """Solve a scene under all combinations of some of its numbers, each as `bemkit.run` would.
 
-    Rows that differ in laws, loads and obstacles alone share their bodies, which are assembled and factored once.
+    Rows that differ only in laws, loads and obstacles share their bodies, which are assembled and factored once.
 
     Parameters
     ----------
@@ -66,7 +66,7 @@ def sweep(
     Returns
     -------
     Sweep
-        Rows that cannot be solved stand in `Sweep.failed`, with a message each.
+        Rows that cannot be solved are in `Sweep.failed`, with a message each.
 
     Raises
     ------

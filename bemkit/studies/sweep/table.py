@@ -45,7 +45,7 @@ class Sweep:
 
     @classmethod
     def read(cls, path: str | Path) -> Sweep:
-        """Read a file of ``bemkit sweep -o``, whatever sweeps of the scene over these keys have written into it.
+        """Read a file of ``bemkit sweep -o``, written by any sweeps of the scene over these keys.
 
         Raises
         ------

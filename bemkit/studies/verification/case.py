@@ -1,6 +1,6 @@
 """A problem with a known answer, what of it is compared, and all such problems.
 
-Their scenes and the bounds of errors stand in `cases/*.toml`. Of each case there are
+Their scenes and the bounds of errors are in `cases/*.toml`. Of each case there are
 
 * ``source``: key of ``docs/references.md``;
 * ``validity``, ``resolutions``, ``n_quick``, ``title``: see `Case`; by default the title is that of the scene;

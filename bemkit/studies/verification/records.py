@@ -26,7 +26,7 @@ class VerificationRecord:
 
     @property
     def key(self) -> tuple[str, str, float]:
-        """What tells the records of one verification apart."""
+        """Key of a record in its verification."""
         return self.case, self.quantity, self.resolution
 
 

@@ -48,7 +48,7 @@ def verify(
     names : sequence of str
         Of cases, with ``*`` for any letters; all by default.
     quick : bool
-        Leave out the finest resolutions.
+        Skip the finest resolutions.
     run : callable (tasks) -> records
         `bemkit.studies.engine.compute`, or with a progress bar `compute_with_progress`.
     file : str or Path, optional

@@ -1,4 +1,4 @@
-"""The independent check of an assembly: each body alone, each contact from both its sides, all forces together."""
+"""The independent check of an assembly: each body by itself, each contact from both its sides, all forces together."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from bemkit.testing.independent_check.verdict import COARSE_LIMIT, COARSE_SHARE,
 class AssemblyCheck(Violations):
     """Violations found in the fields of an assembly, dimensionless; zero is perfect.
 
-    Of reciprocity, with the moments, coarseness and the like the worst of all bodies is told; hidden overlap is how
+    Of reciprocity, with the moments, coarseness and the like the worst of all bodies is reported; hidden overlap is how
     deep points between nodes are in the partner, over the displacement that strains the body.
 
     Parameters
@@ -114,7 +114,7 @@ def _nodal(joints: Joints) -> FloatArray:
 
 
 def rigid_mismatch(joints: Joints) -> float:
-    """Return how far rigid bodies are from moving, and being loaded, as they are told [-].
+    """Return how far rigid bodies are from moving, and being loaded, as prescribed [-].
 
     What acts on each besides its contacts balances these, at the points that the nodes may touch.
     """
@@ -181,7 +181,7 @@ def energy_mismatch(joints: Joints) -> float:
     table = joints.solution.contact
     each = table.weight[:, None] * np.column_stack([table.sigma_n * table.u_n, table.sigma_t * table.u_t])
     work, size = work + 0.5 * float(each.sum()), size + 0.5 * float(np.abs(each).sum())
-    for found in joints.solution.rigid.values():  # relative displacements leave out how obstacles move
+    for found in joints.solution.rigid.values():  # relative displacements exclude the motion of obstacles
         of_motion = found.force_x * found.x, found.force_y * found.y, found.moment * found.turn
         work, size = work + 0.5 * sum(of_motion), size + 0.5 * float(np.abs(of_motion).sum())
     return abs(joints.solution.energy - work) / size if size > 0.0 else 0.0

@@ -136,7 +136,7 @@ def energy_mismatch(fields: Fields) -> float:
     """Return the difference of the elastic energy from half the work of all external forces, over that of their sizes.
 
     Held components without prescribed displacement do no work; where one is prescribed, the mean reactions of elements
-    tell the work up to the discretisation error only, and nothing is compared; nor is it with forces or heat inside.
+    give the work up to the discretisation error only, and nothing is compared; nor is it with forces or heat inside.
     """
     solution, _, boundary, nodes, _ = fields
     if solution.scene.body_forces or any(np.any(held.values != 0.0) for held in boundary.held):

@@ -1,4 +1,4 @@
-"""The bodies of a solved assembly, each measured alone: boundary, loads, reactions, scales, balances."""
+"""The bodies of a solved assembly, each measured by itself: boundary, loads, reactions, scales, balances."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ _NO_TABLE = ContactTable((), *(np.zeros(0),) * 9, status=np.zeros(0, np.intp), w
 
 
 @dataclass(frozen=True, eq=False)
-class Alone:
+class BodyView:
     """A body of an assembly as the check of one body reads it: what touches it is a load on free parts."""
 
     scene: Scene
@@ -66,8 +66,8 @@ class MeasuredBody:
     @classmethod
     def of(cls, result: BodyResult, touched: tuple[str, ...], before: BodyResult | None = None) -> MeasuredBody:
         """Measure a body with the names of its sides in contact, and what it was after the load step before."""
-        alone, earlier = _alone(result), None if before is None else _alone(before)
-        mesh, boundary = result.mesh, boundary_of(alone)
+        view, earlier = _view(result), None if before is None else _view(before)
+        mesh, boundary = result.mesh, boundary_of(view)
         is_touched = np.zeros(mesh.n_elements, bool)
         for name in (*touched, *_obstacles(result.scene)):
             is_touched[mesh.part(name)] = True
@@ -77,15 +77,15 @@ class MeasuredBody:
             is_known[elements] = True
         traction[is_known] = _interpolated(result)[is_known]
         boundary = replace(boundary, traction=traction)
-        nodes = contact_nodes_of(alone, boundary)
-        return cls(result, Fields(alone, earlier, boundary, nodes, scales_of(alone, earlier)), is_touched)
+        nodes = contact_nodes_of(view, boundary)
+        return cls(result, Fields(view, earlier, boundary, nodes, scales_of(view, earlier)), is_touched)
 
     @property
     def largest_stress(self) -> float:
         """The larger of its unit and of what its strains are worth [Pa]: heat strains a free body without tractions."""
-        alone = self.fields.solution
-        strain = float(np.abs(strained_displacement(alone)).max()) / self.result.mesh.diameter
-        return max(self.scales.stress, strain * alone.scene.material.plane_modulus)
+        view = self.fields.solution
+        strain = float(np.abs(strained_displacement(view)).max()) / self.result.mesh.diameter
+        return max(self.scales.stress, strain * view.scene.material.plane_modulus)
 
     def measured_by(self, least: float) -> MeasuredBody:
         """Return the body with units of a stress [Pa] at least, and of the displacement that it causes."""
@@ -144,29 +144,29 @@ class MeasuredBody:
         size : float [N/m]
             Sum of the sizes of their forces.
         """
-        alone, boundary = self.fields.solution, self.boundary
+        view, boundary = self.fields.solution, self.boundary
         is_load = ~self.is_touched
         for elements, _, _ in boundary.held:
             is_load[elements] = False
         loads, load_size = self.force_on(np.flatnonzero(is_load))
-        inside = inner_work(alone, boundary)[:2]
+        inside = inner_work(view, boundary)[:2]
         total = contact + loads + inside
         forces = boundary.traction * boundary.shares[..., None]
         size += load_size + float(np.abs(inside).sum()) + float(np.abs(forces).sum())
         size += self.scales.stress * float(boundary.lengths.min())
-        return float(np.abs(_free_translations(alone, boundary) @ total).max(initial=0.0)) / size
+        return float(np.abs(_free_translations(view, boundary) @ total).max(initial=0.0)) / size
 
     def moment(self) -> float:
         """Return the moment about the centre of all tractions and forces inside over that of their sizes.
 
         Up to the discretisation error; an exterior passes it on to infinity.
         """
-        alone, boundary = self.fields.solution, self.boundary
-        if 2 not in admissible_modes_of(alone):
+        view, boundary = self.fields.solution, self.boundary
+        if 2 not in admissible_modes_of(view):
             return 0.0
         forces = boundary.traction * boundary.shares[..., None]
-        work = np.einsum("eqc,eqcm->eqm", forces, motions_at(alone, boundary.points))
-        inside = inner_work(alone, boundary)
+        work = np.einsum("eqc,eqcm->eqm", forces, motions_at(view, boundary.points))
+        inside = inner_work(view, boundary)
         size = float(np.abs(forces).sum()) + float(np.abs(inside).sum())
         size += 1e-6 * self.scales.stress * float(boundary.shares.sum())
         return abs(float(work[..., 2].sum() + inside[2])) / size if size > 0.0 else 0.0
@@ -177,12 +177,12 @@ def _obstacles(scene: Scene) -> list[str]:
     return [part.name for part in scene.parts if isinstance(part.condition, Contact)]
 
 
-def _alone(result: BodyResult) -> Solution:
+def _view(result: BodyResult) -> Solution:
     """Return a body with free parts where rigid obstacles touch it."""
     obstacles = _obstacles(result.scene)
     parts = tuple(replace(part, condition=Free()) if part.name in obstacles else part for part in result.scene.parts)
     freed = replace(result.scene, parts=parts, law=Frictionless())
-    return cast(Solution, Alone(freed, result.mesh, result.boundary, result.energy, result.particular))
+    return cast(Solution, BodyView(freed, result.mesh, result.boundary, result.energy, result.particular))
 
 
 def _interpolated(result: BodyResult) -> FloatArray:
@@ -193,9 +193,9 @@ def _interpolated(result: BodyResult) -> FloatArray:
     return np.asarray(np.einsum("lq,elc->eqc", space.basis(places), values))
 
 
-def _free_translations(alone: Solution, boundary: Boundary) -> FloatArray:
+def _free_translations(view: Solution, boundary: Boundary) -> FloatArray:
     """Return (k, 2) unit vectors along which no support holds the body."""
-    free = _free_motions(alone, boundary)
+    free = _free_motions(view, boundary)
     if not len(free):
         return np.zeros((0, 2))
     _, sizes, combinations = np.linalg.svd(free[:, 2:].T, full_matrices=True)

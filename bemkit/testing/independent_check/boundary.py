@@ -48,7 +48,7 @@ class Boundary:
     points, normals : (n_elements, n_places, 2) arrays [m], [-]
         At the quadrature points; the normals point out of the body.
     shares : (n_elements, n_places) array [m]
-        Quadrature weights: the length of boundary that each point stands for.
+        Quadrature weights: the length of boundary of each point.
     nodes : (n_elements, n_local) int array
         Rows of ``solution.boundary.displacement`` that each element interpolates.
     node_points, node_normals : (n_elements, n_local, 2) arrays [m], [-]
@@ -84,7 +84,7 @@ def boundary_of(solution: Solution) -> Boundary:
     """Return the elements of a solution with quadrature points, normals, loads, supports and interpolation."""
     mesh = solution.mesh
     places, weights = np.polynomial.legendre.leggauss(_N_POINTS)
-    space = solution.scene.discretisation.displacement_space(mesh)  # which tells the rows of a result apart, no more
+    space = solution.scene.discretisation.displacement_space(mesh)  # only to distinguish the rows of a result
     elements = np.arange(mesh.n_elements)
     fitted = np.polynomial.legendre.leggauss(_N_FITTED)[0]
     curve = mesh.points(elements, fitted) - mesh.centre

@@ -131,7 +131,7 @@ def table_mismatch(fields: Fields) -> float:
 def traction_mismatch(fields: Fields) -> float:
     """Return the largest difference [-] of mean tractions of contact elements from those that nodes interpolate.
 
-    Elements at a corner that share a node with another contact part are left out: the node belongs to one of them.
+    Elements at a corner that share a node with another contact part are excluded: the node belongs to one of them.
     """
     solution, _, boundary, nodes, scales = fields
     nodal, owner = np.zeros_like(solution.boundary.points), np.full(len(solution.boundary.points), "", dtype=object)
@@ -191,7 +191,7 @@ def contact_violations(measured: Measured, solution: SolvedProblem, *, knows_sli
 
 
 def is_finite(solution: SolvedProblem) -> bool:
-    """Tell whether all fields are numbers; distances to obstacles out of reach may be infinite."""
+    """Return whether all fields are numbers; distances to obstacles out of reach may be infinite."""
     columns = solution.contact.columns()
     distances = [columns.pop(name) for name in ("gap", "clearance")]
     of_bodies = (

@@ -42,7 +42,7 @@ def gap_mismatch(joints: Joints) -> float:
 
 
 def _from_obstacle(joints: Joints, name: str) -> FloatArray:
-    """Return differences [m] of gaps from the distances of a rigid obstacle, where it stands before it moves."""
+    """Return differences [m] of gaps from the distances of a rigid obstacle, in its position before it moves."""
     table, rows = joints.solution.contact, joints.solution.contact.rows(name)
     points = np.column_stack([table.x, table.y])[rows]
     body, part = joints.owner[name].split(".", 1)

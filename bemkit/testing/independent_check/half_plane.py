@@ -31,9 +31,9 @@ from bemkit.testing.independent_check.boundary import trusted_stress
 from bemkit.testing.independent_check.nodes import Fields
 
 _MOST_PAIRS = 250_000
-"""Pairs of elements that are looked at: of more than 500 elements some displacements are left out, but no traction."""
+"""Pairs of elements that are looked at: of more than 500 elements some displacements are skipped, but no traction."""
 _STEP, _REACH = 0.14, 3.1
-"""Of the double exponential rule: 1e-10 of a mean logarithm, whatever the lengths of the elements."""
+"""Of the double exponential rule: 1e-10 of a mean logarithm, for any lengths of the elements."""
 _NEAR, _N_GAUSS = 3.0, 8
 """Distance, in half the sum of lengths, from which on Gauss points do, and how many: 1e-12 of a mean logarithm."""
 _IN_MOTION = 1e-6
@@ -214,7 +214,7 @@ class Surface:
         worst = [0.0]
         for k in np.flatnonzero(self.far.is_driven):
             motions, load = self.motions[:, :, k], float(self.far.load[k])
-            # by all forces: along a motion that none of them drives there is round-off alone
+            # by all forces: along a motion that none of them drives there is only round-off
             size = float(np.hypot(*self.force.T) @ np.hypot(*motions.T)) + abs(load)
             size += self.trusted_force * float(np.abs(motions).max())
             worst.append(abs(float(np.sum(self.force * motions)) + load) / size if size > 0.0 else 0.0)

@@ -41,7 +41,7 @@ def inner_work(solution: Solution, boundary: Boundary) -> FloatArray:
 def without_particular(solution: Solution, boundary: Boundary) -> tuple[FloatArray, FloatArray]:
     """Return nodal displacements (n_nodes, 2) and tractions at quadrature points (n_elements, n_places, 2) without it.
 
-    What is left belongs to a body in which nothing acts, for which Betti's theorem needs the boundary alone.
+    What is left belongs to a body in which nothing acts, for which Betti's theorem needs only the boundary.
     """
     fields, particular = solution.boundary, solution.particular
     if particular is None:

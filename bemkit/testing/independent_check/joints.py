@@ -59,12 +59,12 @@ class Joints:
             for body, part in (side.split(".", 1) for side in pair.elastic_sides):
                 touched[body].append(part)
         earlier = {} if before is None else before.bodies
-        alone = {
+        views = {
             name: MeasuredBody.of(body, tuple(touched[name]), earlier.get(name))
             for name, body in solution.bodies.items()
         }
-        most = max(body.largest_stress for body in alone.values())
-        bodies = {name: body.measured_by(LIGHTEST * most) for name, body in alone.items()}
+        most = max(body.largest_stress for body in views.values())
+        bodies = {name: body.measured_by(LIGHTEST * most) for name, body in views.items()}
         joints = cls(solution, bodies, pairs, moving, {})
         owner = {name: name for name in solution.contact.parts}
         owner |= {name: joints._owner(pairs[name]) for name in owner if name in pairs}
@@ -137,7 +137,7 @@ class Joints:
         return Measured(*(np.concatenate(entry)[order] for entry in entries))
 
     def _is_supported(self, name: str) -> BoolArray:
-        """Tell which nodes of a contact a support holds, or another obstacle of the body shares."""
+        """Return which nodes of a contact a support holds, or another obstacle of the body shares."""
         side, table = self.side(self.owner[name]), self.solution.contact
         points = np.column_stack([table.x, table.y])[table.rows(name)]
         nodes = side.body.supported_nodes()

@@ -1,4 +1,4 @@
-"""What the entries of a check together say: faults, doubts, or nothing."""
+"""What the entries of a check together say: faults, open questions, or nothing."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class Violations:
     negative_energy, energy : float
         Elastic energy below zero; against half the work of the external forces.
     elasticity : float
-        Of half-planes alone: displacements against Flamant's solution for the tractions and the motion far away.
+        Only for half-planes: displacements against Flamant's solution for the tractions and the motion far away.
     reciprocity : float
         Betti's theorem, up to the discretisation error.
     coarseness : float

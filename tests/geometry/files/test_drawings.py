@@ -43,7 +43,7 @@ def test_dxf_of_the_part(tmp_path) -> None:
     assert sum(areas(shape)) == pytest.approx(AREA, rel=1e-13)
     holes = [f"HOLE-{k}" for k in range(1, 5)]
     assert names(shape) == ["FOOT", "WALL-1", "BODY-1", "BODY-2", "WALL-2", *holes]
-    assert (shape.unit, shape.notes) == ("mm", ("left out, because no lines: 1 TEXT",))
+    assert (shape.unit, shape.notes) == ("mm", ("skipped, because no lines: 1 TEXT",))
 
 
 @needs_ezdxf
@@ -85,14 +85,14 @@ def test_lines_drawn_twice_and_specks_are_left_out(tmp_path) -> None:
     twice = (*FRAME, line("0", 9, 9, 9, 0), line("0", 5, 5, 5.00001, 5), "CIRCLE 8 0 10 4 20 4 40 1")
     shape = read(tmp_path, "twice.dxf", dxf(*twice))
     assert areas(shape) == pytest.approx([81.0, -math.pi], rel=1e-13)
-    assert shape.notes == ("left out, because shorter than 9e-05: lines, 1", "drawn twice and taken once: lines, 1")
+    assert shape.notes == ("skipped, because shorter than 9e-05: lines, 1", "drawn twice and taken once: lines, 1")
 
 
 @needs_ezdxf
 def test_damaged_entities_are_left_out_and_said(tmp_path) -> None:
     shape = read(tmp_path, "part.dxf", dxf(*FRAME, ONE_POINT))
     assert areas(shape) == [81.0]
-    assert shape.notes[0].startswith("damaged, and repaired or left out: 1 entries, such as: ")
+    assert shape.notes[0].startswith("damaged, and repaired or skipped: 1 entries, such as: ")
 
 
 @needs_ezdxf

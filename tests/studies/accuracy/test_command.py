@@ -134,7 +134,7 @@ def test_processes_find_errors_and_say_that_times_are_missing(tmp_path: Path) ->
     assert result.return_value == 0
     assert "run times and memory were not measured: the runs were spread over processes" in result.output
     assert (tmp_path / "error-against-run-time.png").exists()
-    assert "leave out --repeat" in str(call(*FAST, "--jobs", "2").exception)
+    assert "remove --repeat" in str(call(*FAST, "--jobs", "2").exception)
 
 
 def test_a_run_that_fails_shows_in_the_table_and_the_exit_code(tmp_path: Path) -> None:

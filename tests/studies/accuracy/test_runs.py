@@ -54,7 +54,7 @@ def test_nothing_to_run_and_runs_that_are_the_same() -> None:
         all_runs(scene, [CONSTANT], [adaptive()], [NEWTON])
     with pytest.raises(StudyError, match="no part of the scene is in contact: errors are measured"):
         all_runs(bk.load_scene("bending"), [LINEAR], [uniform()], [NEWTON])
-    with pytest.raises(StudyError, match="linear, uniform, semismooth-newton of size 20 is given twice: leave one out"):
+    with pytest.raises(StudyError, match="linear, uniform, semismooth-newton of size 20 is given twice: remove one"):
         all_runs(scene, [LINEAR], [uniform((20, 20))], [NEWTON])
 
 

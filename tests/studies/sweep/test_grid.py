@@ -51,13 +51,13 @@ def test_numbers_of_several_bodies_are_changed() -> None:
         (SCENE, "shape.corner", r"shape\.corner is a list: vary one number of it, such as shape\.corner\[0\]"),
         (SCENE, "shape.corner.x", "shape.corner is a list: give the number of an entry"),
         (SCENE, "shape.corner[2]", r"shape\.corner\[2\]: unknown entry: shape\.corner has 2, counted from 0"),
-        (SCENE, "law[0]", r"law is no list: leave \[0\] out"),
+        (SCENE, "law[0]", r"law is not a list: remove \[0\]"),
         (SCENE, "material.plane", "material.plane is a word: only numbers can be varied"),
-        (SCENE, "symmetry.x", "symmetry is left out in the scene: write it there first"),
+        (SCENE, "symmetry.x", "symmetry is not given in the scene: write it there first"),
         (SCENE, "law..x", "give a place in a scene file, such as law.friction_coefficient"),
         (BODIES, "bodies.uper.material.youngs_modulus", "bodies.uper: unknown key: .*did you mean 'upper'"),
         (BODIES, "contacts[1].gap", r"contacts\[1\]: unknown entry: contacts has 1"),
-        (BODIES, "contacts[0].law.friction_coefficient", "law is left out in the scene"),
+        (BODIES, "contacts[0].law.friction_coefficient", "law is not given in the scene"),
     ],
 )
 def test_keys_that_lead_to_no_number_are_named(scene: bk.Scene | bk.Assembly, key: str, message: str) -> None:
@@ -126,7 +126,7 @@ def test_wrong_words_are_named(text: str, message: str) -> None:
         ({"a": []}, "a: there are no values"),
         ({"a": [1.0, float("nan")]}, "a: nan is no finite number"),
         ({"a": ["1"]}, "a: '1' is no finite number"),
-        ({"a": [1.0, 1]}, "a: 1 is given twice: leave one out"),
+        ({"a": [1.0, 1]}, "a: 1 is given twice: remove one"),
         ({"a": range(400), "b": range(400)}, "there are 160000 rows: give fewer values"),
     ],
 )

@@ -1,0 +1,67 @@
+"""Words that bemkit does not use in prose: code, documentation and README say the same in the terms of the field."""
+
+import io
+import re
+import tokenize
+from pathlib import Path
+
+import pytest
+
+TOP = Path(__file__).parents[1]
+NEVER = re.compile(
+    r"\b(?:told|tells?|telling|left out|left over|leav(?:e|es|ing) (?:[\w`.']+ ){0,3}out\b(?! of)|doubt\w*|befits?"
+    r"|worth its name|whatever|stands|stand|alone)\b",
+    re.IGNORECASE,
+)
+"""Household words: say "known" or "report", "skip" or "exclude", "warning", "is" or "represents", "any", "only"."""
+ALLOWED = {
+    "docs/tutorials/several-bodies.md": ("the thinnest one that stands",),  # an arch, which may fall
+    "docs/large-scenes.md": ("--alone 100000", "--alone 1000000"),  # an option of a benchmark
+}
+FILES = [
+    path
+    for pattern in ("bemkit/**/*.py*", "bemkit/**/*.toml", "docs/**/*.md", "docs/**/*.py", "docs/**/*.toml", "*.md")
+    for path in sorted(TOP.glob(pattern))
+    if path.suffix in (".py", ".pyi", ".toml", ".md") and not {"_build", "generated"} & set(path.parts)
+]
+_PROSE = {tokenize.COMMENT, tokenize.STRING} | {
+    getattr(tokenize, name) for name in ("FSTRING_MIDDLE",) if hasattr(tokenize, name)
+}
+
+
+def prose_of(path: Path) -> str:
+    """Return the words of a file that people read: of code its comments and texts, of others all but code."""
+    text = path.read_text("utf-8")
+    if path.suffix in (".py", ".pyi"):
+        tokens = tokenize.generate_tokens(io.StringIO(text).readline)
+        text = "\n".join(token.string for token in tokens if token.type in _PROSE)
+    for words in ALLOWED.get(path.relative_to(TOP).as_posix(), ()):
+        text = text.replace(words, "")
+    return re.sub(r"[\s#]+", " ", text)
+
+
+def found_in(text: str) -> list[str]:
+    return [text[max(match.start() - 40, 0) : match.end() + 40] for match in NEVER.finditer(text)]
+
+
+@pytest.mark.parametrize("directory", ["bemkit", "docs", "."])
+def test_household_words_are_not_used(directory: str) -> None:
+    files = [path for path in FILES if path.relative_to(TOP).parts[0] == directory or path.parent == TOP / directory]
+    assert files
+    found = {path.relative_to(TOP).as_posix(): found_in(prose_of(path)) for path in files}
+    assert {name: words for name, words in found.items() if words} == {}
+
+
+@pytest.mark.parametrize("name", ALLOWED)
+def test_allowed_uses_exist(name: str) -> None:
+    assert all(words in (TOP / name).read_text("utf-8") for words in ALLOWED[name])
+
+
+@pytest.mark.parametrize("text", ["What is left out", "It leaves the second row out", "Whatever holds", "by V alone"])
+def test_household_words_are_found(text: str) -> None:
+    assert found_in(text)
+
+
+@pytest.mark.parametrize("text", ["It leaves the forces out of equilibrium", "a standalone file", "the left side"])
+def test_other_words_are_not_found(text: str) -> None:
+    assert not found_in(text)
