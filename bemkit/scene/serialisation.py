@@ -177,7 +177,7 @@ def _is_default(content: object, entry: Field[Any]) -> bool:
 
 @dataclass(frozen=True)
 class _Place:
-    """Where a value stands: the path of its key, the units of its scene, and the class and name of its field if any."""
+    """Position of a value: the path of its key, the units of its scene, and the class and name of its field if any."""
 
     path: str
     units: UnitNames | None
