@@ -43,6 +43,11 @@ def largest_components(motions: RigidMotions) -> FloatArray:
     return np.asarray(abs(rows).max(axis=1).toarray(), dtype=float).ravel()
 
 
+def scaled_motions(motions: RigidMotions, sizes: FloatArray) -> RigidMotions:
+    """Return motions (a row each) divided by their sizes (n_motions,)."""
+    return motions / sizes[:, None] if isinstance(motions, np.ndarray) else (motions.T / sizes).T.tocsr()
+
+
 def orthonormal(motions: FloatArray) -> FloatArray:
     """Return orthonormal motions (n_motions, n_contact, 2) that span the same as independent ones."""
     return np.asarray(np.linalg.qr(motions.reshape(len(motions), 2 * motions.shape[1]).T)[0]).T.reshape(motions.shape)

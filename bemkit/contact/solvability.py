@@ -1,18 +1,21 @@
-"""Whether contact tractions can balance the load, and the largest multiple of a load that they can balance."""
+"""Whether contact tractions can balance the load."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray
-from bemkit.contact.conditions import RigidMotions, as_rows, largest_components
+from bemkit.contact.conditions import RigidMotions, as_rows, largest_components, scaled_motions
 from bemkit.contact.problem import ContactProblem
 
 if TYPE_CHECKING:
     from scipy.sparse import csc_array, csr_array
+
+Result = TypeVar("Result")
 
 
 _RELATIVE_WORK = 1e-6
@@ -35,9 +38,6 @@ _PRESSES = 1e-9
 
 _MEETS = 1e-7
 """The same for motions that are found by linear programming, whose tolerance is larger."""
-
-_WITHOUT_BOUND = 1e6
-"""Multiple of all other forces above which the load that contact holds counts as unbounded."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,7 +104,7 @@ def find_unsolvable_load(problem: ContactProblem) -> UnsolvableLoad | None:
         return None
     unit = largest_components(motions)
     load, force_scale = _rigid_load(problem, unit)
-    motions = _scaled(motions, unit)
+    motions = scaled_motions(motions, unit)
     if force_scale == 0.0:
         return None
     touches = np.isfinite(problem.gap)
@@ -125,11 +125,6 @@ def find_unsolvable_load(problem: ContactProblem) -> UnsolvableLoad | None:
                 who, where = problem.body.moving_bodies(moved), problem.body.partners_of(moved)
                 best = UnsolvableLoad(motion, lift, work, who, where)
     return best
-
-
-def _scaled(motions: RigidMotions, unit: FloatArray) -> RigidMotions:
-    """Return motions (a row each) divided by their sizes (n_motions,)."""
-    return motions / unit[:, None] if isinstance(motions, np.ndarray) else (motions.T / unit).T.tocsr()
 
 
 def _presses(motion: FloatArray, load: FloatArray, touches: BoolArray) -> bool:
@@ -180,17 +175,34 @@ def find_long_travel(problem: ContactProblem) -> float | None:
 
 
 def friction_envelopes(problem: ContactProblem) -> list[tuple[FloatArray, FloatArray]]:
-    """Return pairs (c, s) of (n_contact,) arrays with ``bound <= c + s |sigma_n|`` for the pressures tried."""
-    none = np.zeros(problem.n_contact)
-    pressure = float(np.abs(problem.sticking_state.traction).max()) or 1.0
-    cohesion = problem.cohesion
-    slopes = [-problem.friction_slope(none)]
+    """Return pairs (c, s) of (n_contact,) arrays with ``bound <= c + s |sigma_n|``; see `envelopes_of`."""
+    pressure = float(np.abs(problem.sticking_state.traction).max())
+    slope = problem.friction_slope(np.zeros(problem.n_contact))
+    return envelopes_of(problem.friction_bound, -slope, pressure or 1.0)
+
+
+def envelopes_of(
+    bound: Callable[[FloatArray], FloatArray], slope: FloatArray, pressure: float
+) -> list[tuple[FloatArray, FloatArray]]:
+    """Return pairs (c, s) of (n,) arrays with ``bound <= c + s |sigma_n|`` for the pressures tried.
+
+    Parameters
+    ----------
+    bound : callable
+        (n,) normal tractions [Pa] -> (n,) bounds [Pa].
+    slope : (n,) array [-]
+        Growth of the bound with the pressure where this is zero.
+    pressure : float [Pa]
+        A typical one.
+    """
+    none = np.zeros(slope.size)
+    cohesion, slopes = bound(none), [slope]
     for factor in 10.0 ** np.arange(-6, 7):
-        slopes.append((problem.friction_bound(none - factor * pressure) - cohesion) / (factor * pressure))
-    slope = np.maximum(np.max(slopes, axis=0), 0.0)
-    cap = problem.friction_bound(none - 1e12 * pressure)
-    is_capped = bool(np.any(cap < 0.5 * (cohesion + 1e12 * pressure * slope)))
-    return [(cohesion, slope), *([(cap, none)] if is_capped else [])]
+        slopes.append((bound(none - factor * pressure) - cohesion) / (factor * pressure))
+    steepest = np.maximum(np.max(slopes, axis=0), 0.0)
+    cap = bound(none - 1e12 * pressure)
+    is_capped = bool(np.any(cap < 0.5 * (cohesion + 1e12 * pressure * steepest)))
+    return [(cohesion, steepest), *([(cap, none)] if is_capped else [])]
 
 
 def _largest_escape(motions: RigidMotions, load: FloatArray, resistance: FloatArray, slope: FloatArray) -> FloatArray:
@@ -205,8 +217,7 @@ def _largest_escape(motions: RigidMotions, load: FloatArray, resistance: FloatAr
     ``r = M p + load``, M the work of unit forces on the motions. The multipliers of these equations are the escape. The
     size of r is its largest component, so that absolute values of the multipliers add up to one; of many motions it is
     the sum of all components, so that no multiplier exceeds one. Forces are sums of those on both edges of the cone of
-    friction and of tangential ones that need no pressure. So all conditions on p are bounds, and M is sparse. Where two
-    bodies meet, the outermost nodes nearly always suffice; a node between them joins if the escape presses it.
+    friction and of tangential ones that need no pressure. So all conditions on p are bounds, and M is sparse.
     """
     touches = np.isfinite(slope)
     if motions.shape[0] == 1 and isinstance(motions, np.ndarray):
@@ -216,13 +227,45 @@ def _largest_escape(motions: RigidMotions, load: FloatArray, resistance: FloatAr
                 return np.array([sign])
         return np.zeros(1)
 
-    takes_part = outermost(motions, touches) if not isinstance(motions, np.ndarray) else touches
+    def escape(slope: FloatArray) -> tuple[FloatArray, FloatArray]:
+        coefficients = _escape_from(motions, load, resistance, slope)
+        return coefficients, coefficients
+
+    return with_met_nodes(motions, resistance, slope, escape)
+
+
+def with_met_nodes(
+    motions: RigidMotions,
+    resistance: FloatArray,
+    slope: FloatArray,
+    programme: Callable[[FloatArray], tuple[Result, FloatArray | None]],
+) -> Result:
+    """Return the result of a linear programme of contact forces, whose multipliers are a mechanism.
+
+    Parameters
+    ----------
+    motions : RigidMotions
+    resistance, slope : (n_contact,) arrays
+        As for `contact_forces`; the slope is nan at nodes that never touch.
+    programme : callable
+        Slopes (n_contact,), nan at nodes that take no part -> the result, and the velocities (n_motions,) of the
+        mechanism; None for velocities if there is none.
+
+    Notes
+    -----
+    Where two bodies meet, the outermost nodes nearly always suffice. Nodes between them join if the mechanism presses
+    them, all of them if there is no mechanism.
+    """
+    touches = np.isfinite(slope)
+    takes_part = touches if isinstance(motions, np.ndarray) else outermost(motions, touches)
     while True:
-        coefficients = _escape_from(motions, load, resistance, np.where(takes_part, slope, np.nan))
-        meets = touches & met(motions, coefficients, resistance, np.where(touches, slope, 0.0))
-        if not np.any(meets & ~takes_part):
-            return coefficients
-        takes_part |= meets
+        result, velocities = programme(np.where(takes_part, slope, np.nan))
+        joins = touches & ~takes_part
+        if velocities is not None and joins.any():
+            joins &= met(motions, velocities, resistance, np.where(touches, slope, 0.0))
+        if not joins.any():
+            return result
+        takes_part = takes_part | joins
 
 
 def met(motions: RigidMotions, velocities: FloatArray, resistance: FloatArray, slope: FloatArray) -> BoolArray:
@@ -309,92 +352,3 @@ def contact_forces(motions: RigidMotions, resistance: FloatArray, slope: FloatAr
     bounds = np.full((works.shape[1], 2), [0.0, np.inf])
     bounds[works.shape[1] - held.shape[1] :] = resistance[resists, None] * [-1.0, 1.0]
     return works, bounds
-
-
-def largest_factor(problem: ContactProblem, growing: FloatArray) -> float | None:
-    """Return the largest factor of a growing load that contact tractions can balance together with that of a problem.
-
-    Parameters
-    ----------
-    problem : ContactProblem
-        Under the load that is always there.
-    growing : (n_motions,) array [N]
-        Work of the growing load on each motion of `LinearBody.rigid_motions`.
-
-    Returns
-    -------
-    float or None
-        Infinite if nothing limits it, None if no factor at all does.
-
-    Notes
-    -----
-    Of all tractions with ``sigma_n <= 0`` and ``|sigma_t| <= c + s |sigma_n|``, c and s as in
-    `bemkit.contact.solvability.find_unsolvable_load`, those are sought that balance the largest factor. For Coulomb's
-    law that is an upper bound, because a sliding contact does not dilate: states of the incremental law may fail to
-    exist below it, none exists above.
-    """
-    motions = as_rows(problem.body.rigid_motions())
-    if not motions.shape[0]:
-        return np.inf
-    unit = largest_components(motions)
-    motions = _scaled(motions, unit)
-    constant, growing = problem.body.rigid_load() / unit, growing / unit
-    size = float(np.abs(growing).max())
-    if size == 0.0:
-        return np.inf
-    forces = problem.body.weights[:, None] * problem.sticking_state.traction
-    scale = max(float(np.abs(constant).max()), float(np.abs(forces).sum())) or size
-    touches = np.isfinite(problem.gap)
-    factors = [
-        _largest(motions, constant / scale, growing / size, problem.body.weights * cohesion / scale, slope, touches)
-        for cohesion, slope in friction_envelopes(problem)
-    ]
-    bounded = [scale / size * factor for factor in factors if factor is not None]
-    return min(bounded) if len(bounded) == len(factors) else None
-
-
-def _largest(
-    motions: RigidMotions,
-    constant: FloatArray,
-    growing: FloatArray,
-    resistance: FloatArray,
-    slope: FloatArray,
-    touches: BoolArray,
-) -> float | None:
-    """Return the factor for one envelope of the friction law; see `largest_factor`.
-
-    As in `find_unsolvable_load` the outermost nodes of each two bodies come first, and others as the mechanism meets
-    them: the multipliers of the equations of balance are its velocities.
-    """
-    takes_part = touches if isinstance(motions, np.ndarray) else outermost(motions, touches)
-    while True:
-        factor, velocities = _by_programme(motions, constant, growing, resistance, np.where(takes_part, slope, np.nan))
-        if velocities is None:  # none at all, or without bound
-            if factor is not None or takes_part[touches].all():
-                return factor
-            takes_part = touches
-            continue
-        meets = touches & met(motions, velocities, resistance, slope)
-        if not np.any(meets & ~takes_part):
-            return factor
-        takes_part = takes_part | meets
-
-
-def _by_programme(
-    motions: RigidMotions, constant: FloatArray, growing: FloatArray, resistance: FloatArray, slope: FloatArray
-) -> tuple[float | None, FloatArray | None]:
-    from scipy import sparse
-    from scipy.optimize import linprog
-
-    works, bounds = contact_forces(motions, np.where(np.isfinite(slope), resistance, 0.0), slope)
-    balance = sparse.hstack([works, sparse.csc_array(growing[:, None])], format="csc")
-    cost = np.append(np.zeros(works.shape[1]), -1.0)
-    bounds = np.vstack([bounds, [-_WITHOUT_BOUND, _WITHOUT_BOUND]])
-    result = linprog(  # type: ignore[call-overload]  # the stubs know no sparse arrays
-        cost, A_eq=balance, b_eq=-constant, bounds=bounds, method="highs"
-    )
-    if result.x is None:
-        return None, None
-    if result.x[-1] > 0.5 * _WITHOUT_BOUND:
-        return np.inf, None
-    return float(result.x[-1]), -np.asarray(result.eqlin.marginals, dtype=float)

@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 
-from bemkit.contact.solvability import largest_factor
+import numpy as np
+
+from bemkit.contact.limit_load import largest_factor
 from bemkit.errors import InputError
 from bemkit.geometry.mesh import BoundaryMesh
-from bemkit.model.assembled.model import build_assembled_model
-from bemkit.model.assembled.prepared import prepare_assembly_steps
-from bemkit.operators.linear.threads import blas_threads_for
+from bemkit.model.assembled.placed import place
+from bemkit.model.rigid_blocks import friction_of, joints_of, loads_of, relative_motions, rigid_blocks
 from bemkit.runs.steps import UnsolvableSceneError
 from bemkit.scene.assembly import Assembly
 from bemkit.scene.load_history import load_steps, with_scaled_loads
@@ -39,18 +40,27 @@ def largest_load_factor(assembly: Assembly, *, meshes: Mapping[str, BoundaryMesh
 
     Notes
     -----
-    The static theorem of limit analysis on the contact nodes, by one linear programme: nothing is said of stresses
-    inside the bodies. Of Coulomb friction this is a bound from above, see `bemkit.contact.solvability.largest_factor`.
+    The static theorem of limit analysis for rigid blocks, by one linear programme: stresses inside the bodies play no
+    part. Forces act at the geometric ends of straight joints, so that the factor does not depend on the mesh; curved
+    joints have forces at the ends of elements. Of Coulomb friction this is a bound from above, see
+    `bemkit.contact.limit_load.largest_factor`; a mesh holds less by the share of a joint that its last nodes take.
     """
     assembly = load_steps(replace(assembly, load_factors=(1.0,)))[-1]
-    loaded, constant = prepare_assembly_steps([assembly, with_scaled_loads(assembly, 0.0)], meshes)
-    if not loaded.n_contact:
+    bodies, unloaded = place(assembly, meshes), with_scaled_loads(assembly, 0.0)
+    joints = tuple(joints_of(assembly, bodies))
+    if not joints:
         raise InputError("no two bodies are in contact: list contacts")
-    with blas_threads_for(loaded.largest_matrix):
-        model = build_assembled_model(loaded)
-        at_rest = model.under(constant)
-        growing = model.body.rigid_load() - at_rest.body.rigid_load()
-        factor = largest_factor(at_rest.problem, growing)
+    at_rest = rigid_blocks(
+        unloaded,
+        [
+            replace(body, body=stated, scene=unloaded.scene_of(stated))
+            for body, stated in zip(bodies, unloaded.placed_bodies, strict=True)
+        ],
+    )
+    constant = loads_of(at_rest)
+    growing = loads_of(rigid_blocks(assembly, bodies)) - constant
+    typical = float(np.abs(constant).sum()) or float(np.abs(growing).sum()) or 1.0
+    factor = largest_factor(relative_motions(at_rest, joints), constant, growing, friction_of(joints, typical))
     if factor is None:
         raise UnsolvableSceneError("no contact tractions can balance the constant load, at any load factor")
     return factor

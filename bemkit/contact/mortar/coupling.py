@@ -221,6 +221,27 @@ def couple(
     only a sliver beside it is covered, hands it over like those `without` a multiplier; slivers that have no other node
     are left uncovered.
     """
+    directions, segments = facing_segments(non_mortar, mortar, reach)
+    may_carry = np.ones(non_mortar.dofs.shape, bool) if without is None else ~np.isin(non_mortar.dofs, without)
+    while may_carry[segments.row[segments.is_covered]].any():
+        coupling, slivers = _integrate(non_mortar, mortar, directions, segments, may_carry)
+        if not slivers.size:
+            return coupling
+        may_carry &= ~np.isin(non_mortar.dofs, slivers)
+    raise NotFacingError(
+        f"the sides at {format_point(non_mortar.start[0])} and {format_point(mortar.start[0])} face each other only "
+        "where no node can carry a multiplier: use more elements, or leave more nodes free"
+    )
+
+
+def facing_segments(non_mortar: ContactSide, mortar: ContactSide, reach: float) -> tuple[FloatArray, Segments]:
+    """Return the directions of contact (n_knots, 2) of a side, and its pieces that face another one.
+
+    Raises
+    ------
+    NotFacingError
+        If no piece faces the other side within the distance `reach` [m].
+    """
     directions = mean_directions(non_mortar, mortar, reach)
     segments = common_refinement(non_mortar, mortar, directions, reach)
     if not segments.is_covered.any():
@@ -232,16 +253,7 @@ def couple(
             f"the sides at {format_point(non_mortar.start[0])} and {format_point(mortar.start[0])} face each other "
             f"nowhere within the distance {reach:g}: choose sides whose outward normals point at each other{coarse}"
         )
-    may_carry = np.ones(non_mortar.dofs.shape, bool) if without is None else ~np.isin(non_mortar.dofs, without)
-    while may_carry[segments.row[segments.is_covered]].any():
-        coupling, slivers = _integrate(non_mortar, mortar, directions, segments, may_carry)
-        if not slivers.size:
-            return coupling
-        may_carry &= ~np.isin(non_mortar.dofs, slivers)
-    raise NotFacingError(
-        f"the sides at {format_point(non_mortar.start[0])} and {format_point(mortar.start[0])} face each other only "
-        "where no node can carry a multiplier: use more elements, or leave more nodes free"
-    )
+    return directions, segments
 
 
 def _integrate(

@@ -1,0 +1,84 @@
+"""The largest multiple of a load that the contact forces of rigid bodies can balance."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import partial
+
+import numpy as np
+
+from bemkit.arrays import FloatArray
+from bemkit.contact.conditions import RigidMotions, largest_components, scaled_motions
+from bemkit.contact.solvability import contact_forces, with_met_nodes
+
+_WITHOUT_BOUND = 1e6
+"""Multiple of all other forces above which the load that contact holds counts as unbounded."""
+
+
+def largest_factor(
+    motions: RigidMotions,
+    constant: FloatArray,
+    growing: FloatArray,
+    envelopes: Sequence[tuple[FloatArray, FloatArray]],
+) -> float | None:
+    """Return the largest factor of a growing load that contact forces can balance together with a constant load.
+
+    Parameters
+    ----------
+    motions : (n_motions, 2 n) array or sparse array
+        Rigid motions of the bodies that no support resists: relative velocities, normal and tangential, at n points.
+    constant, growing : (n_motions,) arrays [N]
+        Work of both loads on each motion.
+    envelopes : sequence of (n,) arrays [N], (n,) arrays [-]
+        Friction that needs no pressure, and that which grows with it; see
+        `bemkit.contact.solvability.envelopes_of`. The factor is the smallest of those under each pair.
+
+    Returns
+    -------
+    float or None
+        Infinite if nothing limits it, None if no factor at all balances the loads.
+
+    Notes
+    -----
+    The static theorem of limit analysis: of all forces at the points with ``p_n <= 0`` and ``|p_t| <= c + s |p_n|``
+    those are sought that balance the largest factor [FerrisTinLoi2001]. For Coulomb's law that is an upper bound,
+    because a sliding contact does not dilate: states of the incremental law may fail to exist below it, none exists
+    above.
+    """
+    if not motions.shape[0]:
+        return np.inf
+    unit = largest_components(motions)
+    unit = np.where(unit > 0.0, unit, 1.0)  # what touches nothing
+    motions = scaled_motions(motions, unit)
+    constant, growing = constant / unit, growing / unit
+    size = float(np.abs(growing).max())
+    if size == 0.0:
+        return np.inf
+    scale = float(np.abs(constant).max()) or size
+    factors = []
+    for cohesion, slope in envelopes:
+        programme = partial(_programme, motions, constant / scale, growing / size, cohesion / scale)
+        factors.append(with_met_nodes(motions, cohesion / scale, slope, programme))
+    bounded = [scale / size * factor for factor in factors if factor is not None]
+    return min(bounded) if len(bounded) == len(factors) else None
+
+
+def _programme(
+    motions: RigidMotions, constant: FloatArray, growing: FloatArray, resistance: FloatArray, slope: FloatArray
+) -> tuple[float | None, FloatArray | None]:
+    """Return the factor under the forces of the points whose slope is a number, and the velocities of the collapse."""
+    from scipy import sparse
+    from scipy.optimize import linprog
+
+    works, bounds = contact_forces(motions, resistance, slope)
+    balance = sparse.hstack([works, sparse.csc_array(growing[:, None])], format="csc")
+    cost = np.append(np.zeros(works.shape[1]), -1.0)
+    bounds = np.vstack([bounds, [-_WITHOUT_BOUND, _WITHOUT_BOUND]])
+    result = linprog(  # type: ignore[call-overload]  # the stubs know no sparse arrays
+        cost, A_eq=balance, b_eq=-constant, bounds=bounds, method="highs"
+    )
+    if result.x is None:
+        return None, None
+    if result.x[-1] > 0.5 * _WITHOUT_BOUND:
+        return np.inf, None
+    return float(result.x[-1]), -np.asarray(result.eqlin.marginals, dtype=float)
