@@ -75,16 +75,29 @@ def replacing(target: Path) -> Iterator[Path]:
     _remove_leftovers(target)
     temporary = hidden_beside(target, f"{uuid.uuid4().hex}.tmp")
     try:
-        with contextlib.closing(FileLock(temporary, waits=True)):
+        with named_failures(target), contextlib.closing(FileLock(temporary, waits=True)):
             yield temporary
             with temporary.open("r+b") as stream:
                 os.fsync(stream.fileno())  # the content is on the disk before the name points to it
             os.replace(temporary, target)
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+@contextmanager
+def named_failures(target: Path) -> Iterator[None]:
+    """Turn errors of the system into one line with the name of the file and the remedy.
+
+    Raises
+    ------
+    OutputFileError
+        If the system refuses.
+    """
+    try:
+        yield
     except OSError as error:
         reason = error.strerror or str(error)
         raise OutputFileError(f"{shown_path(target)}: cannot be written ({reason}): choose another place") from error
-    finally:
-        temporary.unlink(missing_ok=True)
 
 
 def write_text(path: Path, text: str) -> None:

@@ -115,11 +115,11 @@ class Table:
 
     def to_hdf5(self, path: str | Path) -> None:
         """Write a dataset for each column, with its unit and meaning as attributes."""
-        from bemkit.hdf5 import FileFormat, write_table
+        from bemkit.hdf5 import FileFormat, write_array
 
         with FileFormat("bemkit-table", 1, "bemkit table", "-o FILE.h5").created(path) as file:
-            write_table(file, {name: _array(self.values(name)) for name in self.names})
             for head in self.columns:
+                write_array(file, head.name, _array(self.values(head.name)))
                 file[head.name].attrs.update({"unit": head.unit, "meaning": head.meaning})
 
     def to_pandas(self) -> Any:

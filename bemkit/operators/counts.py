@@ -6,7 +6,7 @@ The code that does the work counts it and returns the count with its result; not
 from __future__ import annotations
 
 import enum
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Any
 
 
@@ -98,4 +98,5 @@ class OperationCounts:
     def as_dict(self) -> dict[str, Any]:
         """Return the counts as JSON can hold them."""
         factorisations = [{"kind": one.kind.value, "order": one.order} for one in self.factorisations]
-        return {**asdict(self), "factorisations": factorisations}
+        operators = {name: dict(vars(value)) for name, value in vars(self).items() if isinstance(value, Entries)}
+        return {**vars(self), **operators, "factorisations": factorisations}

@@ -88,13 +88,15 @@ def assembling() -> Iterator[None]:
 
 
 class Stage(enum.Enum):
-    """The parts of a run, by their names in `Solution.timings`; writing outputs comes after it."""
+    """The parts of a run, by their names in `Solution.timings`; outputs of the whole result come after it."""
 
     MESH = "mesh"
     ASSEMBLE = "assemble"
     CONDENSE = "condense"
     SOLVE = "solve"
     RECOVER = "recover"
+    WRITE = "write"
+    """Of the step before into a result file that grows with the steps."""
 
 
 _FOLLOWING = {Stage.MESH: Stage.ASSEMBLE, Stage.CONDENSE: Stage.SOLVE, Stage.SOLVE: Stage.RECOVER}

@@ -1,88 +1,84 @@
-"""Result files: HDF5 with a versioned layout, written atomically, safe to read.
+"""Result files: HDF5 with a versioned layout, written step by step, safe to read.
 
 A result file holds plain arrays, texts and numbers only, so any HDF5 program can read it, and reading one from a
-stranger runs no code. The layout, version 3 (files of other versions are refused):
+stranger runs no code. The layout, version 4 (files of other versions are refused):
 
     /                attributes format = "bemkit-result" and schema_version
-    /scene           text, the scene as TOML
-    /provenance, /summary, /certificate, /timings, /memory     attributes
-    /between_nodes   attributes, with contact; for other programs, since it follows from the fields
-    /mesh            nodes, elements, part_elements, table parts; attribute is_exterior,
+    /provenance      attributes
+    /scene           text, the scene or assembly as TOML, with all its load steps
+    /assembly        text, the assembly as TOML with all its contacts listed, if a load history found them by `touching`
+    /plan            text: linear solver, sizes and counts as JSON
+    /bodies          table: name of each body, and its numbers of rows in the arrays that follow
+    /meshes/N        mesh of body N: nodes, elements, part_elements, table parts; attribute is_exterior,
                      with a symmetry also symmetry_x, symmetry_y;
                      with curved elements also element_curve and element_span
-    /boundary        points, displacement, centres, traction, traction_dofs, reaction
-    /parts, /contacts    tables: resultants of the tractions on each part, what each contact part feels; for other
-                     programs, since they follow from the fields
-    /contact, /transitions, /history    tables: one dataset per column, all of one length
-    /plan, /work     texts: linear solver, sizes and counts as JSON
-    /warnings        JSON: kind, subject, text and number of each
+    /points, /centres    of displacements and elements, one body after the other
+    /contact_nodes   table: part, place and weight of each contact node
+    /steps/0001      a group for each step of a load history, one for a single load:
+        contact          table: displacement, traction, clearance and status of each contact node; of an assembly also
+                         its direction and friction bound; of a load history also what has slipped, and the
+                         dimensionless state from which a run goes on
+        displacement, traction, traction_dofs, reaction    one body after the other
+        outcome          of a load history: text, all else of the step as JSON
+    /last            the group of the last step
+    /outcome         text: status, certificate, transitions, history, timings, warnings ... of the whole run as JSON;
+                     there is none until the last step is finished
+    /derived         text, for other programs: violations between the nodes, resultants of contacts and parts as JSON
 
-Every array has an attribute `meaning` and, where the scene names its units, `unit`; see `bemkit.results.file_meanings`.
-
-Of an assembly these groups differ:
-
-    /assembly        text, the assembly as TOML, instead of /scene
-    /bodies/N        mesh and boundary of body N, as /mesh and /boundary of a scene; attributes name, energy
-    /contact         with columns direction_x, direction_y and, with friction, friction_bound
-    /contacts        table: what each contact transmits
-    /rigid           table: how each rigid body moved, and what acts on it; absent without rigid bodies
-
-Of a load history there are also /asked and /steps; see `bemkit.results.history_file`.
+A table is a dataset of rows with named columns. Arrays of /last and of the groups above it have an attribute `meaning`
+and, where the scene names its units, `unit`, tables `meanings` and `units`; see `bemkit.results.file_meanings`.
 """
 
 from __future__ import annotations
 
 import json
-from dataclasses import fields, replace
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
-from bemkit.arrays import FloatArray
 from bemkit.atomic_files import OutputFileError
-from bemkit.contact.certificate import Certificate
 from bemkit.errors import InputError
 from bemkit.geometry.curves import Curve
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.surface import Surface
 from bemkit.geometry.symmetry import Symmetry
-from bemkit.hdf5 import FileFormat, Reader, ResultFileError, rows_of, write_table, write_text
-from bemkit.operators.counts import OperationCounts
+from bemkit.hdf5 import FileFormat, Reader, ResultFileError, write_array, write_table
 from bemkit.plan import Plan
-from bemkit.result_warning import ResultWarning
-from bemkit.results.assembly_solution import AssemblySolution, BodyResult
-from bemkit.results.contact_table import ContactTable, Transition
+from bemkit.results.assembly_solution import AssemblySolution
 from bemkit.results.file_meanings import annotate
-from bemkit.results.history_file import TRANSITION_COLUMNS, read_history, write_history
-from bemkit.results.part_forces import ContactForce, PartForce, RigidResult
-from bemkit.results.solution import BoundaryFields, Solution
-from bemkit.results.tables import CERTIFICATE_ENTRIES, RECORD_COUNTS, columns_of, history_columns
+from bemkit.results.load_history import LoadHistory, LoadStep
+from bemkit.results.solution import Solution
+from bemkit.results.solved_problem import following
+from bemkit.results.step_group import (
+    NODES,
+    BodyLayout,
+    StepLayout,
+    read_load_step,
+    read_outcome,
+    read_step,
+    write_outcome,
+    write_step,
+)
 from bemkit.scene.assembly import Assembly
-from bemkit.scene.body import Body
+from bemkit.scene.load_history import load_steps
 from bemkit.scene.scene import Scene
 from bemkit.scene.serialisation import structure, unstructure
 from bemkit.scene.toml import MAX_BYTES, SceneError, scene_from_toml, scene_to_toml
-from bemkit.solvers.base import Status, StepRecord
+from bemkit.sealed_file import GrowingFile
+from bemkit.solvers.base import Status
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
+    from typing import Self
 
     import h5py
 
+__all__ = ["OutputFileError", "ResultFileError", "ResultWriter", "check_result_target", "read_result", "write_result"]
+
+FORMAT = FileFormat("bemkit-result", 4, "bemkit result", "bemkit run -o")
 _MAX_PLAN = 1_000_000
-_COUNTS = ("linear_solves", "outer_steps")
-_NUMBERS = ("x", "y", "s", "u_n", "u_t", "sigma_n", "sigma_t", "gap", "clearance", "weight")
-_BOUNDARY = ("points", "displacement", "centres", "traction", "traction_dofs", "reaction")
-
-
-__all__ = ["OutputFileError", "ResultFileError", "check_result_target", "read_result", "write_result"]
-
-FORMAT = FileFormat("bemkit-result", 3, "bemkit result", "bemkit run -o")
-_FORCES = ("force_normal", "force_tangential", "energy")
-_CONTACT_NUMBERS = tuple(entry.name for entry in fields(ContactForce) if entry.name != "name")
-_RIGID_NUMBERS = tuple(entry.name for entry in fields(RigidResult) if entry.name != "name")
-_DIRECTIONS, _BOUND = ("direction_x", "direction_y"), "friction_bound"
 
 
 def check_result_target(path: str | Path) -> Path:
@@ -114,20 +110,88 @@ def write_result(path: str | Path, solution: Solution | AssemblySolution) -> Non
     SceneError
         If the scene holds a Python function, which a file cannot hold.
     """
-    text = scene_to_toml(solution.assembly if isinstance(solution, AssemblySolution) else solution.scene)
-    with FORMAT.created(path) as file:
-        if isinstance(solution, AssemblySolution):
-            write_text(file, "assembly", text)
-            _write_assembly(file, solution)
-        else:
-            write_text(file, "scene", text)
-            _write_outcome(file, solution, {name: getattr(solution, name) for name in _FORCES}, {})
-            _write_forces(file, "parts", solution.part_forces)
-            _write_forces(file, "contacts", solution.contacts)
-            _write_fields(file, solution.mesh, solution.boundary)
+    with ResultWriter(path) as writer:
+        writer.finish(solution)
+
+
+class ResultWriter:
+    """Writes a result file that grows by one group for each finished step of a load history.
+
+    Parameters
+    ----------
+    path : str or Path
+        Of the file; a result that is there is replaced when the first step is written.
+
+    Raises
+    ------
+    OutputFileError
+        If the file cannot be written, or the name belongs to a file that is not a bemkit result.
+    """
+
+    def __init__(self, path: str | Path) -> None:
+        self._target = check_result_target(path)
+        self._growing: GrowingFile | None = None
+        self._written: tuple[LoadStep, ...] = ()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *reason: object) -> None:
+        if self._growing is not None:
+            self._growing.close()
+
+    def append(self, solution: Solution | AssemblySolution) -> None:
+        """Bring the file on the disk up to the last step of the load history of a solution.
+
+        Another history than before, on a finer mesh for example, begins the file anew.
+
+        Raises
+        ------
+        OutputFileError
+            If the file cannot be written.
+        SceneError
+            If the scene holds a Python function, which a file cannot hold.
+        """
+        self._grown(solution).commit()
+
+    def finish(self, solution: Solution | AssemblySolution) -> None:
+        """Replace the file on the disk by the whole result; errors as for `append`."""
+        growing = self._grown(solution)
+        write_outcome(growing.file, solution)
+        write_array(growing.file, "derived", json.dumps(_derived(solution)))
+        growing.file["last"] = growing.file[_group(max(len(self._written), 1))]
+        annotate(growing.file, solution.units)
+        growing.finish()
+
+    def _grown(self, solution: Solution | AssemblySolution) -> GrowingFile:
+        """Return the open file with all steps of a solution."""
+        steps = () if solution.loading is None else solution.loading.steps
+        n_written = len(self._written)
+        if self._growing is None or steps[:n_written] != self._written:
+            self._growing, n_written = self._begun(solution), 0
+        file = self._growing.file
+        for number, step in enumerate(steps[n_written:], start=n_written + 1):
+            write_step(file.create_group(_group(number)), cast(Any, step.end), step)
+        if not steps:
+            write_step(file.create_group(_group(1)), solution, None)
+        self._written = steps
+        return self._growing
+
+    def _begun(self, solution: Solution | AssemblySolution) -> GrowingFile:
+        """Return a new file with all that steps have in common."""
+        texts = {"scene": scene_to_toml(solution.stated), "plan": json.dumps(unstructure(solution.plan))}
+        if isinstance(solution, AssemblySolution) and solution.stated.touching:
+            texts["assembly"] = scene_to_toml(solution.assembly)
+        if self._growing is not None:
+            self._growing.close()
+        growing = GrowingFile(self._target)
+        FORMAT.mark(growing.file)
+        for name, text in texts.items():
+            write_array(growing.file, name, text)
         if solution.loading is not None:
-            write_history(file, solution.loading)
-        annotate(file, solution.units)
+            growing.file.create_group("steps").attrs["n_steps"] = solution.loading.n_steps
+        _write_layout(growing.file, solution)
+        return growing
 
 
 def read_result(path: str | Path) -> Solution | AssemblySolution:
@@ -141,7 +205,7 @@ def read_result(path: str | Path) -> Solution | AssemblySolution:
     Returns
     -------
     Solution or AssemblySolution
-        Of an assembly if the file holds one.
+        Of an assembly if the file holds one. Its status is UNFINISHED if the file ends before its load history.
 
     Raises
     ------
@@ -149,138 +213,111 @@ def read_result(path: str | Path) -> Solution | AssemblySolution:
         If the file is not a complete bemkit result of a known version.
     """
     with FORMAT.opened(path) as reader:
-        name = "assembly" if reader.has("assembly") else "scene"
         try:
-            scene = scene_from_toml(reader.text(name, MAX_BYTES), name="scene inside")
+            problem = _read_problem(reader, "scene")
+            listed = _read_problem(reader, "assembly") if reader.has("assembly") else problem
         except SceneError as error:
             raise reader.error(str(error)) from error
         try:
-            solution = _read_assembly(reader, scene) if isinstance(scene, Assembly) else _read_solution(reader, scene)
-            return replace(solution, loading=read_history(reader, solution))
-        except (ValueError, KeyError, OverflowError, RecursionError) as error:
+            layout = _read_layout(reader, listed)
+            if "n_steps" not in reader.attributes("steps"):
+                return read_step(reader, _group(1), "outcome", problem, layout)
+            return _read_history(reader, problem, listed, layout)
+        except (ValueError, LookupError, TypeError, AttributeError, OverflowError, RecursionError) as error:
             raise reader.error(f"inconsistent content ({error})") from error
 
 
-def _read_solution(reader: Reader, scene: Scene) -> Solution:
-    summary = reader.attributes("summary")
-    outcome, _ = _read_outcome(reader)
-    mesh, boundary = _read_fields(reader, "", lambda: scene.build_mesh().curves)
-    forces: dict[str, Any] = {name: float(summary[name]) for name in _FORCES}
-    return Solution(scene=scene, mesh=mesh, boundary=boundary, **forces, **outcome)
-
-
-def _write_assembly(file: h5py.File, solution: AssemblySolution) -> None:
-    """Write a solution into an open file, all but the text of the assembly."""
-    columns = dict(zip(_DIRECTIONS, solution.contact_directions.T, strict=True))
-    if solution.friction_bound is not None:
-        columns[_BOUND] = solution.friction_bound
-    _write_outcome(file, solution, {"n_bodies": len(solution.bodies)}, columns)
-    _write_forces(file, "contacts", solution.contacts)
-    if solution.rigid:
-        _write_forces(file, "rigid", tuple(solution.rigid.values()))
-    for number, body in enumerate(solution.bodies.values()):
-        group = file.create_group(f"bodies/{number}")
-        group.attrs.update({"name": body.name, "energy": body.energy})
-        _write_fields(group, body.mesh, body.boundary)
-
-
-def _read_assembly(reader: Reader, assembly: Assembly) -> AssemblySolution:
-    """Read a solution of an assembly."""
-    has_bound = reader.has(f"contact/{_BOUND}")
-    outcome, columns = _read_outcome(reader, (*_DIRECTIONS, _BOUND) if has_bound else _DIRECTIONS)
-    contacts = rows_of(reader.table("contacts", texts=("name",), floats=_CONTACT_NUMBERS))
-    rigid = rows_of(reader.table("rigid", texts=("name",), floats=_RIGID_NUMBERS)) if reader.has("rigid") else []
-    bodies = [_read_body(reader, number, body, assembly) for number, body in enumerate(assembly.placed_bodies)]
-    return AssemblySolution(
-        assembly=assembly,
-        bodies={body.name: body for body in bodies},
-        contact_directions=np.stack([columns[name] for name in _DIRECTIONS], axis=1),
-        friction_bound=columns.get(_BOUND),
-        contacts=tuple(ContactForce(**row) for row in contacts),
-        rigid={row["name"]: RigidResult(**row) for row in rigid},
-        **outcome,
-    )
-
-
-def _read_body(reader: Reader, number: int, body: Body, assembly: Assembly) -> BodyResult:
-    scene = assembly.scene_of(body)
-    mesh, boundary = _read_fields(reader, f"bodies/{number}/", lambda: body.placement.mesh(scene.build_mesh()).curves)
-    energy = float(reader.attributes(f"bodies/{number}")["energy"])
-    return BodyResult(body.name, scene, mesh, boundary, energy)
-
-
-def _write_outcome(
-    file: h5py.File,
-    solution: Solution | AssemblySolution,
-    numbers: Mapping[str, float],
-    columns: Mapping[str, FloatArray],
-) -> None:
-    """Write what every solution has, further numbers of the summary and further columns of the contact table."""
-    counts = {name: getattr(solution, name) for name in _COUNTS}
-    summary = {"status": solution.status.name, "message": solution.message, **counts, **numbers}
-    file.create_group("summary").attrs.update(summary)
-    file.create_group("certificate").attrs.update(solution.certificate.as_dict())
-    if solution.between_nodes is not None:
-        file.create_group("between_nodes").attrs.update(solution.between_nodes.as_dict())
-    file.create_group("timings", track_order=True).attrs.update(solution.timings)
-    contact = {"part": list(solution.contact.part), **solution.contact.columns(), **columns}
-    write_table(file.create_group("contact"), contact)
-    rows = [transition.as_dict() for transition in solution.transitions]
-    write_table(file.create_group("transitions"), columns_of(rows, **TRANSITION_COLUMNS))
-    write_table(file.create_group("history"), history_columns(solution.history))
-    for name in ("plan", "work"):
-        write_text(file, name, json.dumps(unstructure(getattr(solution, name))))
-    file.create_group("memory").attrs.update(solution.memory)
-    file["provenance"].attrs.update(solution.provenance)
-    write_text(file, "warnings", json.dumps([unstructure(warning) for warning in solution.warnings]))
-
-
-def _read_outcome(reader: Reader, columns: tuple[str, ...] = ()) -> tuple[dict[str, Any], dict[str, FloatArray]]:
-    """Read what `_write_outcome` wrote: arguments of a solution by name, and the further columns asked for."""
-    summary, certificate = reader.attributes("summary"), reader.attributes("certificate")
-    table = reader.table("contact", texts=("part",), floats=(*_NUMBERS, *columns), integers=("status",))
-    further = {name: table.pop(name) for name in columns}
-    outcome: dict[str, Any] = {name: int(summary[name]) for name in _COUNTS}
-    outcome |= {
-        "status": Status[str(summary["status"])],
-        "message": str(summary["message"]),
-        "certificate": Certificate(**{name: float(certificate[name]) for name in CERTIFICATE_ENTRIES}),
-        "contact": ContactTable(**{**table, "part": tuple(table["part"])}),
-        "history": _read_history(reader),
-        "transitions": tuple(map(Transition.of, rows_of(reader.table("transitions", **TRANSITION_COLUMNS)))),
-        "timings": {name: float(value) for name, value in reader.attributes("timings").items()},
-        "plan": structure(json.loads(reader.text("plan", _MAX_PLAN)), Plan),
-        "work": structure(json.loads(reader.text("work", _MAX_PLAN)), OperationCounts),
-        "memory": {name: int(value) for name, value in reader.attributes("memory").items()},
-        "provenance": {name: str(value) for name, value in reader.attributes("provenance").items()},
-        "warnings": structure(json.loads(reader.text("warnings", _MAX_PLAN)), tuple[ResultWarning, ...]),
+def _derived(solution: Solution | AssemblySolution) -> dict[str, Any]:
+    """Return results that follow from the fields."""
+    between, contacts = solution.between_nodes, [contact.as_dict() for contact in solution.contacts]
+    return {
+        "between_nodes": None if between is None else between.as_dict(),
+        "contacts": contacts,
+        "bodies": [[force.as_dict() for force in body.part_forces] for body in solution.solved_bodies],
     }
-    return outcome, further
 
 
-def _write_forces(file: h5py.File, name: str, forces: Sequence[PartForce]) -> None:
-    """Write resultants of parts or contacts as a table with their entries as columns."""
-    rows = [force.as_dict() for force in forces]
-    numbers = list(rows[0])[1:] if rows else ()
-    write_table(file.create_group(name), columns_of(rows, texts=("name",), floats=numbers))
+def _group(number: int) -> str:
+    """Return the path of the group of a step, counted from 1."""
+    return f"steps/{number:04d}"
 
 
-def _write_fields(group: h5py.Group, mesh: BoundaryMesh, boundary: BoundaryFields) -> None:
-    """Write the mesh of a body, and displacement and traction on it, into a group."""
-    _write_mesh(group.create_group("mesh"), mesh)
-    for name in _BOUNDARY:
-        group.create_dataset(f"boundary/{name}", data=getattr(boundary, name))
+def _read_problem(reader: Reader, name: str) -> Scene | Assembly:
+    return scene_from_toml(reader.text(name, MAX_BYTES), name="scene inside")
 
 
-def _read_fields(
-    reader: Reader, prefix: str, curves: Callable[[], tuple[Curve, ...]]
-) -> tuple[BoundaryMesh, BoundaryFields]:
-    """Read the mesh of a body and its fields; `curves` gives the curves that the file names by their numbers."""
-    mesh = _read_mesh(reader, f"{prefix}mesh", curves)
-    boundary = BoundaryFields(**{name: reader.floats(f"{prefix}boundary/{name}") for name in _BOUNDARY})
-    if len(boundary.centres) != mesh.n_elements:
-        raise InputError(f"{len(boundary.centres)} tractions for {mesh.n_elements} elements")
-    return mesh, boundary
+def _read_history(
+    reader: Reader, asked: Scene | Assembly, listed: Scene | Assembly, layout: StepLayout
+) -> Solution | AssemblySolution:
+    """Return the result of the steps in the file; `listed` has all contacts of an assembly."""
+    n_steps = int(reader.attributes("steps")["n_steps"])
+    groups = [f"steps/{name}" for name in reader.names("steps")]
+    problems = cast("Sequence[Scene | Assembly]", load_steps(cast(Any, asked)))
+    if not 0 < len(groups) <= len(problems) == n_steps:
+        raise InputError(f"{len(groups)} of {n_steps} steps, where {len(problems)} were asked")
+    steps: list[LoadStep] = []
+    whole: Any = None
+    for number, (group, problem) in enumerate(zip(groups, problems, strict=False), start=1):
+        if isinstance(problem, Assembly) and isinstance(listed, Assembly) and problem.touching:
+            problem = problem.with_contacts(listed.contacts)
+        end: Any = read_step(reader, group, f"{group}/outcome", problem, layout)
+        steps.append(read_load_step(reader, group, end))
+        whole = following(whole, end, asked, number, n_steps)
+    loading = LoadHistory(asked, n_steps, tuple(steps))
+    if not reader.has("outcome"):
+        return cast("Solution | AssemblySolution", replace(whole, status=Status.UNFINISHED, loading=loading))
+    return cast("Solution | AssemblySolution", replace(end, **read_outcome(reader, "outcome"), loading=loading))
+
+
+def _write_layout(file: h5py.File, solution: Solution | AssemblySolution) -> None:
+    """Write what all steps have in common: meshes, points, contact nodes."""
+    bodies = solution.solved_bodies
+    fields = [body.boundary for body in bodies]
+    names = list(solution.bodies) if isinstance(solution, AssemblySolution) else [""]
+    counts = {name: [len(getattr(each, name)) for each in fields] for name in _COUNTED}
+    columns = {f"n_{name}": np.array(count, dtype=np.int64) for name, count in counts.items()}
+    write_table(file, "bodies", {"name": names, **columns})
+    for number, body in enumerate(bodies):
+        _write_mesh(file.create_group(f"meshes/{number}"), body.mesh)
+    for name in ("points", "centres"):
+        write_array(file, name, np.concatenate([getattr(each, name) for each in fields]))
+    table = solution.contact
+    write_table(file, "contact_nodes", {"part": list(table.part), **{name: getattr(table, name) for name in NODES}})
+
+
+def _read_layout(reader: Reader, problem: Scene | Assembly) -> StepLayout:
+    """Read what `_write_layout` wrote."""
+    counted = [f"n_{name}" for name in _COUNTED]
+    table = reader.table("bodies", texts=("name",), integers=counted)
+    n_points, n_centres = table["n_points"], table["n_centres"]
+    points = np.split(reader.rows("points", int(n_points.sum())), np.cumsum(n_points)[:-1])
+    centres = np.split(reader.rows("centres", int(n_centres.sum())), np.cumsum(n_centres)[:-1])
+    bodies = tuple(
+        BodyLayout(name, _read_mesh(reader, f"meshes/{k}", curves), points[k], centres[k], *map(int, counts))
+        for k, (name, curves, *counts) in enumerate(
+            zip(table["name"], _curves(problem), table["n_traction_dofs"], table["n_reaction"], strict=True)
+        )
+    )
+    for body in bodies:
+        if len(body.centres) != body.mesh.n_elements:
+            raise InputError(f"{len(body.centres)} tractions for {body.mesh.n_elements} elements")
+    nodes = reader.table("contact_nodes", texts=("part",), floats=NODES)
+    plan = structure(reader.json("plan", _MAX_PLAN), Plan)
+    provenance = {name: str(value) for name, value in reader.attributes("provenance").items()}
+    return StepLayout(bodies, nodes | {"part": tuple(nodes["part"])}, plan, provenance)
+
+
+_COUNTED = ("points", "centres", "traction_dofs", "reaction")
+
+
+def _curves(problem: Scene | Assembly) -> list[Callable[[], tuple[Curve, ...]]]:
+    """Return for each body the function that gives its curves, which the file names by their numbers."""
+    if isinstance(problem, Scene):
+        return [lambda: problem.build_mesh().curves]
+    return [
+        lambda body=body: body.placement.mesh(problem.scene_of(body).build_mesh()).curves  # type: ignore[misc]
+        for body in problem.placed_bodies
+    ]
 
 
 def _write_mesh(group: h5py.Group, mesh: BoundaryMesh) -> None:
@@ -288,14 +325,15 @@ def _write_mesh(group: h5py.Group, mesh: BoundaryMesh) -> None:
     lines = {name: place for name, place in lines.items() if place is not None}
     strip = {} if mesh.surface is None else {"is_periodic": int(mesh.surface.is_periodic)}
     group.attrs.update({"is_exterior": int(mesh.is_exterior), **lines, **strip})
-    group["nodes"] = mesh.nodes
-    group["elements"] = mesh.elements.astype(np.int64)
+    write_array(group, "nodes", mesh.nodes)
+    write_array(group, "elements", mesh.elements.astype(np.int64))
     if mesh.element_curve is not None and mesh.element_span is not None:
-        group["element_curve"] = mesh.element_curve.astype(np.int64)
-        group["element_span"] = mesh.element_span
+        write_array(group, "element_curve", mesh.element_curve.astype(np.int64))
+        write_array(group, "element_span", mesh.element_span)
     counts = np.array([len(elements) for elements in mesh.parts.values()], dtype=np.int64)
-    write_table(group.create_group("parts"), {"name": list(mesh.parts), "n_elements": counts})
-    group["part_elements"] = np.concatenate([np.zeros(0, np.int64), *mesh.parts.values()]).astype(np.int64)
+    write_table(group, "parts", {"name": list(mesh.parts), "n_elements": counts})
+    elements = np.concatenate([np.zeros(0, np.int64), *mesh.parts.values()]).astype(np.int64)
+    write_array(group, "part_elements", elements)
 
 
 def _read_mesh(reader: Reader, place: str, curves: Callable[[], tuple[Curve, ...]]) -> BoundaryMesh:
@@ -317,10 +355,3 @@ def _read_mesh(reader: Reader, place: str, curves: Callable[[], tuple[Curve, ...
         symmetry=None if x is None and y is None else Symmetry(x=x, y=y),
         surface=Surface(bool(marks["is_periodic"])) if "is_periodic" in marks else None,
     )
-
-
-def _read_history(reader: Reader) -> tuple[StepRecord, ...]:
-    floats = ("relative_change", *CERTIFICATE_ENTRIES)
-    rows = rows_of(reader.table("history", texts=("message",), floats=floats, integers=RECORD_COUNTS))
-    certificates = [Certificate(**{name: row.pop(name) for name in CERTIFICATE_ENTRIES}) for row in rows]
-    return tuple(StepRecord(**row, certificate=each) for row, each in zip(rows, certificates, strict=True))

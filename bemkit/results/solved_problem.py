@@ -136,8 +136,7 @@ class SolvedProblem(ShownInNotebooks):
         Returns
         -------
         Solution or AssemblySolution
-            Its `loading` ends there, too. If it comes from a file, linear solves, history, timings and warnings are
-            those of the whole run.
+            Its `loading` ends there, too.
 
         Raises
         ------

@@ -1,4 +1,4 @@
-"""Load histories that are written step by step, and go on from the last step in the file."""
+"""Load histories that are written step by step, and resume from the last step in the file."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import overload
 
 from bemkit.results.assembly_solution import AssemblySolution
-from bemkit.results.result_file import check_result_target, read_result, write_result
+from bemkit.results.result_file import ResultWriter, check_result_target, read_result
 from bemkit.results.solution import Solution
 from bemkit.runs.adaptive import run_adaptive, run_assembly_adaptive
 from bemkit.runs.assembly import SEVERAL_BODIES
@@ -64,22 +64,20 @@ def run_to_file(
     is_begun = known is not None and known.status is Status.UNFINISHED and scene_to_toml(known.stated) == text
     done = known if is_begun else None
 
-    def write(solution: Solution | AssemblySolution) -> None:
-        write_result(target, solution)
-
     solution: Solution | AssemblySolution
     is_adaptive = scene.mesh.accuracy is not None
-    if isinstance(scene, Assembly):
-        several = done if isinstance(done, AssemblySolution) else None
-        if is_adaptive:
-            solution = run_assembly_adaptive(scene, callback=callback, done=several, finished=write)[-1]
+    with ResultWriter(target) as writer:
+        if isinstance(scene, Assembly):
+            several = done if isinstance(done, AssemblySolution) else None
+            if is_adaptive:
+                solution = run_assembly_adaptive(scene, callback=callback, done=several, finished=writer.append)[-1]
+            else:
+                solution = joined(*solved_history(SEVERAL_BODIES, [scene], None, callback, several, writer.append))
         else:
-            solution = joined(*solved_history(SEVERAL_BODIES, [scene], None, callback, several, write))
-    else:
-        one = done if isinstance(done, Solution) else None
-        if is_adaptive:
-            solution = run_adaptive(scene, callback=callback, done=one, finished=write)[-1]
-        else:
-            solution = joined(*solved_history(ONE_BODY, [scene], None, callback, one, write))
-    write_result(target, solution)
+            one = done if isinstance(done, Solution) else None
+            if is_adaptive:
+                solution = run_adaptive(scene, callback=callback, done=one, finished=writer.append)[-1]
+            else:
+                solution = joined(*solved_history(ONE_BODY, [scene], None, callback, one, writer.append))
+        writer.finish(solution)
     return solution

@@ -28,7 +28,7 @@ class EarlierSteps(Generic[AnySolution]):
     done : Solution or AssemblySolution, optional
         Some steps on one of the meshes; meshes before that one are solved again, unheard.
     finished : callable, optional
-        Receives the result of all steps so far on a mesh after each of them but the last.
+        Receives the solution of each step on a mesh but the last; see `bemkit.runs.steps.History`.
     """
 
     done: AnySolution | None = None

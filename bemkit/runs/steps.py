@@ -94,7 +94,7 @@ class History(Generic[AnySolution]):
     done : Solution or AssemblySolution, optional
         Up to some step, with its `loading`: that is where to go on.
     finished : callable, optional
-        Receives the result of all steps so far after each of them but the last.
+        Receives the solution of each step but the last, with the steps up to it as its load history.
     """
 
     asked: Scene | Assembly
@@ -204,8 +204,8 @@ def solve_steps(
         If nothing can balance the first load.
     """
     solutions: list[AnySolution] = []
-    whole, before, end = history.done, None, Standing.at_rest(model)
-    done = None if whole is None else whole.loading
+    before, end = None, Standing.at_rest(model)
+    done = None if history.done is None else history.done.loading
     n_done = 0 if done is None else len(done.steps)
     for number, step in enumerate(steps):
         if number:
@@ -224,7 +224,8 @@ def solve_steps(
             words, why = result.message, kind.why_not(model, result)
             if why != words:
                 words = f"{result.status.value} {why}."
-            solutions.append(_not_reached(solutions[-1] if solutions else whole, replace(result, message=words), clock))
+            former = solutions[-1] if solutions else history.done
+            solutions.append(_not_reached(former, replace(result, message=words), clock))
             break
         with np.errstate(over="ignore", invalid="ignore"):  # the status says what is not finite
             solution = kind.solution(model, result, plan, clock, reached.end.motion)
@@ -236,10 +237,9 @@ def solve_steps(
         clock, end = StageClock.start(), reached.end
         if not solution.is_converged:
             break
-        if history.finished is not None:
-            whole = following(whole, solution, history.asked, number + 1, len(steps))
-            if number + 1 < len(steps):
-                history.finished(replace(whole, status=Status.UNFINISHED))
+        if history.finished is not None and number + 1 < len(steps):
+            history.finished(solution)
+            clock = clock.closed(Stage.WRITE)
     return tuple(solutions)
 
 

@@ -10,8 +10,8 @@ import pytest
 
 import bemkit as bk
 from bemkit.cli.main import main
-from bemkit.hdf5 import MARK, seal
 from bemkit.reference import find_reference
+from bemkit.sealed_file import seal
 
 SMALL = ("--elements", "24", "--discretisation", "linear")
 
@@ -62,7 +62,7 @@ def test_a_report_shows_the_versions_in_its_file() -> None:
     call("run", "paper-1", *SMALL, "-q", "-o", "r.h5")
     with h5py.File("r.h5", "r+") as file:
         file["provenance"].attrs["numpy"] = "0.9.8"
-    seal(Path("r.h5"), MARK)
+    seal(Path("r.h5"))
     assert call("report", "r.h5", "-o", "r.html", "-q") == 0
     assert "0.9.8" in Path("r.html").read_text("utf-8")
 

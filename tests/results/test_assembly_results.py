@@ -18,6 +18,7 @@ from bemkit.plan.assembly_plan import make_assembly_plan
 from bemkit.results.assembly_solution import AssemblySolution
 from bemkit.results.tables import to_csv, to_json
 from bemkit.scene.toml import with_overrides
+from bemkit.sealed_file import seal
 
 pytest.importorskip("matplotlib")
 
@@ -67,16 +68,20 @@ def test_a_file_gives_everything_back(name: str, tmp_path: Path, request: pytest
 def test_any_program_reads_the_bodies_by_number(solution: AssemblySolution, tmp_path: Path) -> None:
     bk.write_result(tmp_path / "r.h5", solution)
     with h5py.File(tmp_path / "r.h5") as file:
-        assert [file[f"bodies/{k}"].attrs["name"] for k in range(2)] == ["upper", "lower"]
-        assert file["bodies/0/boundary/displacement"].shape == (len(solution.bodies["upper"].boundary.points), 2)
-        assert file["contacts/force_normal"][0] == solution.contacts[0].force_normal
+        assert file["bodies"]["name"].tolist() == [b"upper", b"lower"]
+        upper = solution.bodies["upper"].boundary
+        n_points = file["bodies"]["n_points"][0]
+        assert n_points == len(upper.points)
+        assert np.array_equal(file["last/displacement"][:n_points], upper.displacement)
+        assert json.loads(file["derived"][()])["contacts"][0]["force_normal"] == solution.contacts[0].force_normal
 
 
 def test_a_file_without_a_body_is_damaged(solution: AssemblySolution, tmp_path: Path) -> None:
     bk.write_result(tmp_path / "r.h5", solution)
     with h5py.File(tmp_path / "r.h5", "r+") as file:
-        del file["bodies/1"]
-    with pytest.raises(ResultFileError):
+        del file["meshes/1"]
+    seal(tmp_path / "r.h5")
+    with pytest.raises(ResultFileError, match="meshes/1/parts is missing"):
         bk.read_result(tmp_path / "r.h5")
 
 

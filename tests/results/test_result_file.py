@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
+import json
 import os
 import time
 import warnings
@@ -15,12 +16,13 @@ import numpy as np
 import pytest
 
 import bemkit.results.result_file
-from bemkit.hdf5 import MARK, Reader, seal
+from bemkit.hdf5 import Reader
 from bemkit.results.result_file import OutputFileError, ResultFileError, read_result, write_result
 from bemkit.results.solution import Solution
 from bemkit.runs.run import run
 from bemkit.scene.conditions import Part, Traction
 from bemkit.scene.toml import SceneError, load_scene, scene_from_toml, scene_to_toml, with_overrides
+from bemkit.sealed_file import seal
 from bemkit.solvers.base import Status
 
 DISC = """
@@ -90,7 +92,7 @@ def test_a_failed_solution_comes_back_as_failed(tmp_path: Path, solution: Soluti
 def test_provenance_names_versions_but_neither_people_nor_places(file: Path) -> None:
     with h5py.File(file) as stored:
         provenance = dict(stored["provenance"].attrs)
-        assert stored.attrs["schema_version"] == 3
+        assert stored.attrs["schema_version"] == 4
     assert set(provenance) == {"bemkit", "python", "numpy", "scipy", "h5py", "platform", "created"}
     text = " ".join(map(str, provenance.values()))
     assert str(Path.home()) not in text
@@ -119,7 +121,7 @@ def test_an_interrupt_while_writing_leaves_the_old_result(
     def interrupted(*arguments: object) -> None:
         raise error
 
-    monkeypatch.setattr(bemkit.results.result_file, "write_text", interrupted)
+    monkeypatch.setattr(bemkit.results.result_file, "write_array", interrupted)
     with pytest.raises(error):
         write_result(file, dataclasses.replace(solution, message="never"))
     assert os.listdir(file.parent) == ["result.h5"]
@@ -237,19 +239,42 @@ def attribute(group: str, name: str, value: object) -> Callable[[h5py.File], Non
     return change
 
 
+def changed(name: str, column: str, values: object) -> Callable[[h5py.File], None]:
+    """Return the change of a column of a table."""
+
+    def change(stored: h5py.File) -> None:
+        table = stored[name][()]
+        table[column] = values
+        stored[name][...] = table
+
+    return change
+
+
+def said(name: str, key: str, value: object) -> Callable[[h5py.File], None]:
+    """Return the change of an entry of a text in JSON."""
+
+    def change(stored: h5py.File) -> None:
+        entries = json.loads(stored[name][()]) | {key: value}
+        del stored[name]
+        stored[name] = np.bytes_(json.dumps(entries).encode())
+
+    return change
+
+
 def linked(link: object) -> Callable[[h5py.File], None]:
     def change(stored: h5py.File) -> None:
-        del stored["contact/x"]
-        stored["contact/x"] = link
+        del stored["points"]
+        stored["points"] = link
 
     return change
 
 
 def virtual(stored: h5py.File) -> None:
-    del stored["contact/x"]
-    layout = h5py.VirtualLayout(shape=(11,), dtype="f8")
-    layout[:] = h5py.VirtualSource("other.h5", "x", shape=(11,))
-    stored.create_virtual_dataset("contact/x", layout)
+    shape = stored["points"].shape
+    del stored["points"]
+    layout = h5py.VirtualLayout(shape=shape, dtype="f8")
+    layout[:] = h5py.VirtualSource("other.h5", "x", shape=shape)
+    stored.create_virtual_dataset("points", layout)
 
 
 def test_a_damaged_list_of_contents_is_named() -> None:
@@ -265,45 +290,52 @@ def test_a_damaged_list_of_contents_is_named() -> None:
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        (attribute("/", "schema_version", 2), "has layout version 2, this bemkit .* reads version 3: use the bemkit"),
+        (attribute("/", "schema_version", 3), "has layout version 3, this bemkit .* reads version 4: use the bemkit"),
         (attribute("/", "format", "other"), "not a bemkit result"),
-        (attribute("summary", "status", "GREAT"), "inconsistent content .*GREAT"),
-        (attribute("summary", "energy", "much"), "inconsistent content"),
-        (attribute("summary", "energy", np.zeros(3)), "'energy' of summary is not a single text or number"),
-        (deleted("contact/x"), "contact/x is missing"),
+        (said("outcome", "status", "GREAT"), "inconsistent content .*GREAT"),
+        (said("outcome", "energy", "much"), "inconsistent content"),
+        (said("outcome", "certificate", 3.0), "inconsistent content"),
+        (said("outcome", "work", {"element_pairs": "many"}), "'many' is not a whole number"),
+        (attribute("steps", "n_steps", np.zeros(3)), "'n_steps' of steps is not a single text or number"),
+        (attribute("steps", "n_steps", 3), "inconsistent content .*1 of 3 steps, where 1 were asked"),
+        (deleted("points"), "points is missing"),
+        (deleted("steps/0001"), "steps/0001/contact is missing"),
         (deleted("plan"), "plan is missing"),
         (replaced("plan", data=np.bytes_(b"{")), "inconsistent content"),
         (replaced("plan", data=np.bytes_(b"[" * 100_000)), "inconsistent content"),
         (replaced("plan", data=np.bytes_(b'{"items": 3}')), "inconsistent content .*linear_solver: missing"),
-        (deleted("work"), "work is missing"),
-        (replaced("work", data=np.bytes_(b'{"element_pairs": "many"}')), "'many' is not a whole number"),
-        (deleted("summary"), "summary is missing"),
-        (replaced("contact/x", data=np.zeros(3)), "columns of contact differ in length"),
-        (replaced("contact/x", data=np.zeros(11, "i8")), "contact/x holds .*int64"),
-        (replaced("contact/x", data=np.zeros((11, 1, 1))), "contact/x holds 3-dimensional"),
-        (replaced("contact/status", data=np.full(11, 9)), r"status\[0\] is 9"),
-        (replaced("boundary/centres", data=np.zeros((3, 2))), "inconsistent content"),
-        (replaced("mesh/nodes", data=np.zeros((40, 2))), "inconsistent content"),
-        (replaced("mesh/elements", data=np.full((40, 2), 10**12)), "inconsistent content"),
-        (replaced("mesh/part_elements", data=np.full(3, -5)), "inconsistent content"),
+        (deleted("outcome"), "outcome is missing"),
+        (replaced("contact_nodes", data=np.zeros(11, [("x", "f8")])), "column part of contact_nodes is missing"),
+        (replaced("contact_nodes", data=np.zeros(11)), "contact_nodes holds .*float64"),
+        (replaced("steps/0001/contact", data=np.zeros(11, [("u_n", "f4")])), "contact holds .*f4"),
+        (replaced("steps/0001/contact", data=np.zeros(11, [("u_n", "i8")])), "column .* is missing|holds int64"),
+        (replaced("points", data=np.zeros((3, 2))), r"points has the shape \(3, 2\), not"),
+        (replaced("points", data=np.zeros((40, 2), "i8")), "points holds .*int64"),
+        (replaced("points", data=np.zeros((40, 1, 1))), "points holds 3-dimensional"),
+        (changed("steps/0001/contact", "status", 9), r"status\[0\] is 9"),
+        (changed("bodies", "n_points", -1), "inconsistent content|points has the shape"),
+        (changed("bodies", "n_traction_dofs", 10**15), "traction_dofs has the shape"),
+        (replaced("meshes/0/nodes", data=np.zeros((40, 2))), "inconsistent content"),
+        (replaced("meshes/0/elements", data=np.full((40, 2), 10**12)), "inconsistent content"),
+        (replaced("meshes/0/part_elements", data=np.full(3, -5)), "inconsistent content"),
         (replaced("scene", data=np.bytes_(b"title = 3")), "scene inside: 4 mistakes.*title: 3 does not fit"),
         (replaced("scene", data=np.bytes_(b"\xff\xfe")), "scene is not UTF-8"),
         (replaced("scene", data=np.bytes_(b"x" * 1_000_001)), "scene is not a text of at most"),
         (replaced("scene", data="text of variable length"), "scene holds .*object"),
         # bombs: huge but compressed, huge but never stored
-        (replaced("contact/x", shape=(10**9,), dtype="f8", compression="gzip"), "contact/x is not stored plainly"),
-        (replaced("contact/x", shape=(10**9,), dtype="f8"), "contact/x is not stored plainly"),
+        (replaced("points", shape=(10**9,), dtype="f8", compression="gzip"), "points is not stored plainly"),
+        (replaced("points", shape=(10**9,), dtype="f8"), "points is not stored plainly"),
         # ways out of the file
-        (linked(h5py.ExternalLink("other.h5", "/x")), "contact/x is missing"),
-        (linked(h5py.SoftLink("/contact/y")), "contact/x is missing"),
-        (virtual, "contact/x is not stored plainly"),
-        (replaced("contact/x", shape=(11,), dtype="f8", external="other.bin"), "contact/x is not stored plainly"),
+        (linked(h5py.ExternalLink("other.h5", "/x")), "points is missing"),
+        (linked(h5py.SoftLink("/centres")), "points is missing"),
+        (virtual, "points is not stored plainly"),
+        (replaced("points", shape=(40, 2), dtype="f8", external="other.bin"), "points is not stored plainly"),
     ],
 )
 def test_wrong_and_hostile_files_are_refused(file: Path, change: Callable[[h5py.File], None], message: str) -> None:
     with h5py.File(file, "a") as stored:
         change(stored)
-    seal(file, MARK)  # as an attacker would
+    seal(file)  # as an attacker would
     with pytest.raises(ResultFileError, match=message) as caught:
         read_result(file)
     assert str(caught.value).isprintable()

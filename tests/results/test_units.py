@@ -10,7 +10,6 @@ import pytest
 
 import bemkit as bk
 from bemkit.cli.console import print_summary
-from bemkit.results.file_meanings import MEANINGS
 
 SCENE = replace(bk.load_scene("paper-1"), mesh=bk.MeshOptions(elements=40))
 NAMES = bk.UnitNames("mm", "MPa", "N/mm")
@@ -50,17 +49,22 @@ def test_they_come_back_from_text_and_files(solution: bk.Solution, tmp_path: Pat
 def test_every_array_of_a_file_says_what_it_is(solution: bk.Solution, tmp_path: Path) -> None:
     bk.write_result(tmp_path / "r.h5", bk.run(replace(solution.scene, load_factors=(0.5, 1.0))))
     with h5py.File(tmp_path / "r.h5") as file:
-        assert file["contact/sigma_n"].attrs["unit"] == "MPa"
-        assert file["parts/moment"].attrs["unit"] == "N mm/mm"
-        assert "unit" not in file["contact/status"].attrs
-        for group in MEANINGS:
-            for name in file[group]:
-                if isinstance(file[group][name], h5py.Dataset):
-                    assert file[group][name].attrs["meaning"] == MEANINGS[group][name][1], (group, name)
+        table = file["last/contact"]
+        units = dict(zip(table.dtype.names, table.attrs["units"], strict=True))
+        assert (units["sigma_n"], units["u_t"], units["status"]) == ("MPa", "mm", "")
+        assert file["last/reaction"].attrs["unit"] == "N/mm"
+        assert "unit" not in file["meshes/0/elements"].attrs
+        for group in (file, file["meshes/0"], file["last"]):
+            for name, item in group.items():
+                if isinstance(item, h5py.Dataset) and item.dtype.kind in "fi":
+                    assert item.attrs["meaning"], name
+        for item in (table, file["contact_nodes"]):
+            assert len(item.attrs["meanings"]) == len(item.dtype.names)
     plain = bk.run(SCENE)
     bk.write_result(tmp_path / "p.h5", plain)
     with h5py.File(tmp_path / "p.h5") as file:
-        assert "unit" not in file["contact/sigma_n"].attrs
+        assert "units" not in file["last/contact"].attrs
+        assert "unit" not in file["last/reaction"].attrs
 
 
 def test_the_summary_and_the_pictures_show_them(solution: bk.Solution, capsys: pytest.CaptureFixture[str]) -> None:

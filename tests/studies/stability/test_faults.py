@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import json
 import os
 import random
 import signal
@@ -133,7 +134,9 @@ def test_any_flipped_bit_is_noticed(result: Path) -> None:
 
 def test_a_changed_number_is_noticed(result: Path) -> None:
     with h5py.File(result, "r+") as file:
-        file["contact/sigma_n"][3] *= 1.0 + 1e-15
+        table = file["last/contact"][()]
+        table["sigma_n"][3] *= 1.0 + 1e-15
+        file["last/contact"][...] = table
     with pytest.raises(ResultFileError, match="does not match its checksum: the file is damaged, run its scene again"):
         read_result(result)
 
@@ -204,4 +207,8 @@ def test_a_load_history_that_is_killed_goes_on_to_the_same_bits(tmp_path: Path) 
         arrays = [name for name in names if isinstance(one[name], h5py.Dataset)]
         assert len(arrays) > 60
         for name in arrays:
-            assert one[name][()].tobytes() == other[name][()].tobytes(), name
+            if name.endswith("outcome"):
+                entries, others = (json.loads(file[name][()]) | {"timings": None} for file in (one, other))
+                assert entries == others, name
+            else:
+                assert one[name][()].tobytes() == other[name][()].tobytes(), name

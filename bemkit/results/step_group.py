@@ -1,0 +1,232 @@
+"""One step in a result file: what its group holds, written and read by one pair of functions.
+
+A result of a single load is one step, a load history several. See `bemkit.results.result_file` for the layout.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, fields
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from bemkit.arrays import FloatArray
+from bemkit.contact.body import ContactState, SlipHistory
+from bemkit.contact.certificate import Certificate
+from bemkit.geometry.mesh import BoundaryMesh
+from bemkit.hdf5 import Reader, write_array, write_table
+from bemkit.operators.counts import OperationCounts
+from bemkit.plan import Plan
+from bemkit.result_warning import ResultWarning
+from bemkit.results.assembly_solution import AssemblySolution, BodyResult
+from bemkit.results.contact_table import ContactTable, Transition
+from bemkit.results.load_history import LoadStep, StepWork
+from bemkit.results.part_forces import ContactForce, RigidResult
+from bemkit.results.solution import BoundaryFields, Solution
+from bemkit.scene.assembly import Assembly
+from bemkit.scene.scene import Scene
+from bemkit.scene.serialisation import structure
+from bemkit.solvers.base import Status, StepRecord
+
+if TYPE_CHECKING:
+    import h5py
+
+NODES = ("x", "y", "s", "weight")
+"""Columns of the contact table that all steps share, with the part."""
+_CONTACT = ("u_n", "u_t", "sigma_n", "sigma_t", "gap", "clearance")
+_STATE = ("state_u_n", "state_u_t", "state_sigma_n", "state_sigma_t")
+_SLIP = ("slip", "last_slip")
+_ASSEMBLY = ("direction_x", "direction_y", "friction_bound")
+_FIELDS = ("displacement", "traction", "traction_dofs", "reaction")
+_FORCES = ("force_normal", "force_tangential", "energy")
+
+
+@dataclass(frozen=True)
+class BodyLayout:
+    """What all steps have in common on one body.
+
+    Parameters
+    ----------
+    name : str
+    mesh : BoundaryMesh
+    points, centres : (n_points, 2), (n_elements, 2) arrays [m]
+    n_traction_dofs, n_reactions : int
+        Rows of the body in the arrays of these names.
+    """
+
+    name: str
+    mesh: BoundaryMesh
+    points: FloatArray
+    centres: FloatArray
+    n_traction_dofs: int
+    n_reactions: int
+
+
+@dataclass(frozen=True)
+class StepLayout:
+    """What all steps of a file have in common.
+
+    Parameters
+    ----------
+    bodies : tuple of BodyLayout
+    nodes : mapping of str to array
+        The columns `NODES` of the contact table, and its parts.
+    plan : Plan
+    provenance : mapping of str to str
+    """
+
+    bodies: tuple[BodyLayout, ...]
+    nodes: Mapping[str, Any]
+    plan: Plan
+    provenance: Mapping[str, str]
+
+
+def write_step(group: h5py.Group, solution: Solution | AssemblySolution, step: LoadStep | None) -> None:
+    """Write the fields of a solution into a group; with a step of a load history also its outcome and what slipped."""
+    table = solution.contact
+    columns: dict[str, Any] = {name: getattr(table, name) for name in _CONTACT} | {"status": table.status}
+    if isinstance(solution, AssemblySolution):
+        bound = solution.friction_bound
+        bounds = np.full(table.n_contact, np.nan) if bound is None else bound
+        columns |= dict(zip(_ASSEMBLY, (*solution.contact_directions.T, bounds), strict=True))
+    if step is not None:
+        state = np.hstack([step.state.displacement, step.state.traction])
+        columns |= dict(zip(_STATE, state.T, strict=True)) | {name: getattr(step.motion, name) for name in _SLIP}
+        write_outcome(group, solution, step)
+    write_table(group, "contact", columns)
+    for name in _FIELDS:
+        write_array(group, name, np.concatenate([getattr(body.boundary, name) for body in solution.solved_bodies]))
+
+
+def read_step(
+    reader: Reader, group: str, outcome: str, problem: Scene | Assembly, layout: StepLayout
+) -> Solution | AssemblySolution:
+    """Read the fields that `write_step` wrote, and the outcome at a path, as the solution of a scene or an assembly."""
+    is_assembly = isinstance(problem, Assembly)
+    names = (*_CONTACT, *_ASSEMBLY) if is_assembly else _CONTACT
+    columns = reader.table(f"{group}/contact", floats=names, integers=("status",))
+    entries = reader.json(outcome)
+    table = {name: columns[name] for name in (*_CONTACT, "status")}
+    common = _outcome(entries) | {
+        "contact": ContactTable(**layout.nodes, **table),
+        "plan": layout.plan,
+        "provenance": layout.provenance,
+    }
+    boundaries = _read_boundaries(reader, group, layout.bodies)
+    if not isinstance(problem, Assembly):
+        forces: dict[str, Any] = {name: float(entries[name]) for name in _FORCES}
+        return Solution(scene=problem, mesh=layout.bodies[0].mesh, boundary=boundaries[0], **forces, **common)
+    placed = [problem.scene_of(body) for body in problem.placed_bodies]
+    energies = map(float, entries["energies"])
+    bodies = [
+        BodyResult(body.name, scene, body.mesh, boundary, energy)
+        for body, scene, boundary, energy in zip(layout.bodies, placed, boundaries, energies, strict=True)
+    ]
+    bound = columns["friction_bound"]
+    return AssemblySolution(
+        assembly=problem,
+        bodies={body.name: body for body in bodies},
+        contact_directions=np.stack([columns[name] for name in _ASSEMBLY[:2]], axis=1),
+        friction_bound=bound if entries["has_friction"] else None,
+        contacts=tuple(_rows(entries["contacts"], ContactForce)),
+        rigid={row.name: row for row in _rows(entries["rigid"], RigidResult)},
+        **common,
+    )
+
+
+def write_outcome(group: h5py.Group, solution: Solution | AssemblySolution, step: LoadStep | None = None) -> None:
+    """Write all of a solution but its arrays as a text in JSON, of a step also what it adds to its load history."""
+    entries: dict[str, Any] = {
+        "status": solution.status.name,
+        **{name: getattr(solution, name) for name in ("message", "linear_solves", "outer_steps")},
+        "certificate": solution.certificate.as_dict(),
+        "transitions": [transition.as_dict() for transition in solution.transitions],
+        "timings": dict(solution.timings),
+        "memory": dict(solution.memory),
+        "work": solution.work.as_dict(),
+        "warnings": [warning.as_dict() for warning in solution.warnings],
+        "history": [vars(record) | {"certificate": record.certificate.as_dict()} for record in solution.history],
+    }
+    if isinstance(solution, AssemblySolution):
+        entries |= {
+            "energies": [body.energy for body in solution.solved_bodies],
+            "has_friction": solution.friction_bound is not None,
+            "contacts": [asdict(contact) for contact in solution.contacts],
+            "rigid": [asdict(body) for body in solution.rigid.values()],
+        }
+    else:
+        entries |= {name: getattr(solution, name) for name in _FORCES}
+    if step is not None:
+        counts = {"n_increments": step.n_increments, "linear_solves": step.linear_solves}
+        times = {"time": step.time, "time_step": step.motion.time_step}
+        entries["step"] = {**times, **counts, "work": vars(step.work)}
+    write_array(group, "outcome", json.dumps(entries, default=lambda number: number.item()))
+
+
+def read_load_step(reader: Reader, group: str, end: Solution | AssemblySolution) -> LoadStep:
+    """Read what `write_step` wrote of a step of a load history, whose fields at its end are given."""
+    columns = reader.table(f"{group}/contact", floats=(*_STATE, *_SLIP))
+    entries = reader.json(f"{group}/outcome")["step"]
+    state = np.stack([columns[name] for name in _STATE], axis=1)
+    return LoadStep(
+        work=StepWork(**{name: float(value) for name, value in entries["work"].items()}),
+        n_increments=int(entries["n_increments"]),
+        linear_solves=int(entries["linear_solves"]),
+        end=end,
+        state=ContactState(state[:, :2].copy(), state[:, 2:].copy()),
+        motion=SlipHistory(float(entries["time"]), float(entries["time_step"]), *(columns[name] for name in _SLIP)),
+    )
+
+
+def read_outcome(reader: Reader, path: str) -> dict[str, Any]:
+    """Return the entries of a solution that `write_outcome` wrote at a path, by name."""
+    return _outcome(reader.json(path))
+
+
+def _outcome(entries: Mapping[str, Any]) -> dict[str, Any]:
+    return {
+        "status": Status[entries["status"]],
+        "message": str(entries["message"]),
+        "linear_solves": int(entries["linear_solves"]),
+        "outer_steps": int(entries["outer_steps"]),
+        "certificate": _certificate(entries["certificate"]),
+        "transitions": tuple(map(Transition.of, entries["transitions"])),
+        "timings": {name: float(seconds) for name, seconds in entries["timings"].items()},
+        "memory": {name: int(size) for name, size in entries["memory"].items()},
+        "work": structure(entries["work"], OperationCounts),
+        "warnings": tuple(ResultWarning(**warning) for warning in entries["warnings"]),
+        "history": tuple(
+            StepRecord(**{**record, "certificate": _certificate(record["certificate"])})
+            for record in entries["history"]
+        ),
+    }
+
+
+def _certificate(entries: Mapping[str, Any]) -> Certificate:
+    return Certificate(**{name: float(value) for name, value in entries.items()})
+
+
+def _rows(rows: Sequence[Mapping[str, Any]], kind: type[Any]) -> list[Any]:
+    """Return resultants from tables of a name and numbers."""
+    names = [entry.name for entry in fields(kind)][1:]
+    return [kind(str(row["name"]), *(float(row[name]) for name in names)) for row in rows]
+
+
+def _read_boundaries(reader: Reader, group: str, bodies: Sequence[BodyLayout]) -> list[BoundaryFields]:
+    """Return the fields of each body; in the file they follow each other."""
+    n_rows = {
+        "displacement": [len(body.points) for body in bodies],
+        "traction": [len(body.centres) for body in bodies],
+        "traction_dofs": [body.n_traction_dofs for body in bodies],
+        "reaction": [body.n_reactions for body in bodies],
+    }
+    pieces = {
+        name: np.split(reader.rows(f"{group}/{name}", sum(counts)), np.cumsum(counts)[:-1])
+        for name, counts in n_rows.items()
+    }
+    return [
+        BoundaryFields(body.points, centres=body.centres, **{name: pieces[name][k].copy() for name in _FIELDS})
+        for k, body in enumerate(bodies)
+    ]
