@@ -39,13 +39,13 @@ from bemkit.solvers.base import ContactSolver
 
 if TYPE_CHECKING:
     from bemkit.contact.condensation.hierarchical_body import HierarchicalBody
-    from bemkit.contact.periodic_body import PeriodicBody
+    from bemkit.contact.half_plane.surface_body import SurfaceBody
     from bemkit.model.untouched_body import UntouchedBody
 
 _MORE_POINTS = 4
 """Gauss points of an element at which given loads are evaluated, beyond the degree of the tractions."""
 
-ContactBody: TypeAlias = "DirectBody | HierarchicalBody | PeriodicBody | UntouchedBody"
+ContactBody: TypeAlias = "DirectBody | HierarchicalBody | SurfaceBody | UntouchedBody"
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,7 +57,7 @@ class Model:
     prepared : Prepared
     elastic : SteklovPoincare
         Dimensionless.
-    body : DirectBody, HierarchicalBody, PeriodicBody or UntouchedBody
+    body : DirectBody, HierarchicalBody, SurfaceBody or UntouchedBody
     problem : ContactProblem
     """
 
@@ -282,12 +282,14 @@ def build_model(prepared: Prepared) -> Model:
 
 def contact_body(elastic: SteklovPoincare, prepared: Prepared) -> ContactBody:
     """Return a body as contact sees it: condensed onto its contact nodes or compressed, if there are any."""
-    if prepared.mesh.surface is not None and prepared.mesh.surface.is_periodic:
-        from bemkit.contact.periodic_body import PeriodicBody
-        from bemkit.operators.half_plane.periodic import PeriodicElasticity
+    if isinstance(elastic, SurfaceElasticity):
+        if not prepared.scene.contact_parts:
+            from bemkit.model.free_motion import check_held
 
-        assert isinstance(elastic, PeriodicElasticity)
-        return PeriodicBody(elastic, prepared.conditions, prepared.contact.nodes, prepared.force)
+            check_held(prepared)
+        from bemkit.contact.half_plane.bodies import surface_body
+
+        return surface_body(elastic, prepared.conditions, prepared.contact.nodes, prepared.force)
     if prepared.scene.contact_parts:
         data = prepared.conditions, prepared.contact.nodes, prepared.force
         if prepared.linear_solver.hierarchical is not None and not prepared.is_condensed:

@@ -139,7 +139,7 @@ def test_fields_inside_are_refused_and_no_stiffness_has_no_condition_number() ->
     with pytest.raises(bk.InputError, match="half-plane, of which only the surface is known"):
         bk.interior_fields(bk.run(PUNCH))
     assert np.isnan(condition_number(ROUGH, Case(0.0, ROUGH)))
-    assert condition_number(PUNCH, Case(0.0, PUNCH)) > 1.0
+    assert np.isnan(condition_number(PUNCH, Case(0.0, PUNCH)))
 
 
 @pytest.mark.parametrize(

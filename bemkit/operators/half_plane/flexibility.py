@@ -13,42 +13,16 @@ from __future__ import annotations
 
 import numpy as np
 
-from bemkit.arrays import FloatArray
-from bemkit.geometry.mesh import BoundaryMesh
+from bemkit.arrays import FloatArray, IntArray
 from bemkit.geometry.quadrature import gauss_legendre
-from bemkit.operators.material import Material
 
 _FAR = 20.0
 """Distance of two centres, in lengths of the longer element, from which on a series has all digits."""
 _APART = 2.0
 """Distance of the shorter element from the ends of the longer one, in its own lengths, from which Gauss points do."""
 _N_POINTS = 8
-
-
-def strip_flexibility(mesh: BoundaryMesh, material: Material) -> FloatArray:
-    """Return what unit forces, spread evenly over an element each, displace the elements by in the mean.
-
-    Parameters
-    ----------
-    mesh : BoundaryMesh
-        The surface of a half-plane in units of its length, at whose distance the surface rests.
-    material : Material
-
-    Returns
-    -------
-    (2 n_elements, 2 n_elements) array [1/Pa]
-        Symmetric, index ``2 element + component`` in x and y; positive definite.
-    """
-    place = np.concatenate([[0.0], np.cumsum(mesh.lengths)])
-    n = mesh.n_elements
-    order = np.arange(n)
-    along = -2.0 / (np.pi * material.plane_modulus) * mean_logarithms(place)
-    across = 0.5 * material.plane_compressibility * np.sign(order[:, None] - order)
-    local = np.array([np.stack([along, across]), np.stack([-across, along])])  # by components t and n
-    axes = np.stack([mesh.tangents[0], mesh.normals[0]])
-    turned = np.einsum("ka,klij,lb->iajb", axes, local, axes, optimize=True)
-    flexibility = turned.reshape(2 * n, 2 * n)
-    return np.asarray(0.5 * (flexibility + flexibility.T))
+_EQUAL = 4.0 * float(np.finfo(float).eps)
+"""Share of the extent by which ends of equal intervals lie off: their round-off."""
 
 
 def mean_logarithms(place: FloatArray) -> FloatArray:
@@ -68,9 +42,31 @@ def mean_logarithms(place: FloatArray) -> FloatArray:
     In closed form between neighbours; by Gauss points on the shorter interval at some distance; far away by the moments
     of s - r about the distance of the centres, since differences of large terms would lose their digits there.
     """
+    n, extent = place.size - 1, float(place[-1] - place[0])
+    order = np.arange(n)
+    if np.abs(place - place[0] - np.linspace(0.0, extent, n + 1)).max() <= _EQUAL * extent:
+        return np.asarray(logarithms_between(place, np.zeros(n, int), order)[np.abs(order[:, None] - order)])
+    result = np.empty((n, n))
+    first, second = np.triu_indices(n)
+    result[first, second] = result[second, first] = logarithms_between(place, first, second)
+    return result
+
+
+def logarithms_between(place: FloatArray, first: IntArray, second: IntArray) -> FloatArray:
+    """Return the means of log|s - r| over pairs of intervals, the first of which do not come after the second ones.
+
+    Parameters
+    ----------
+    place : (n + 1,) array
+        As for `mean_logarithms`.
+    first, second : (k,) arrays
+        Indices of intervals.
+
+    Returns
+    -------
+    (k,) array
+    """
     length, centre = np.diff(place), 0.5 * (place[:-1] + place[1:])
-    result = np.empty((length.size, length.size))
-    first, second = np.triu_indices(length.size)
     h, k = length[first], length[second]
     distance, longer, shorter = centre[second] - centre[first], np.maximum(h, k), np.minimum(h, k)
     is_far = distance > _FAR * longer
@@ -81,8 +77,7 @@ def mean_logarithms(place: FloatArray) -> FloatArray:
     values[is_apart] = _by_points(distance[is_apart], longer[is_apart], shorter[is_apart])
     begin, end = place[:-1], place[1:]
     values[is_near] = _closed(begin[first[is_near]], end[first[is_near]], begin[second[is_near]], end[second[is_near]])
-    result[first, second] = result[second, first] = values
-    return result
+    return values
 
 
 def _by_moments(distance: FloatArray, h: FloatArray, k: FloatArray) -> FloatArray:

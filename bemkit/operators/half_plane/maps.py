@@ -6,7 +6,7 @@ from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.operators.half_plane.elasticity import HalfPlaneElasticity, half_plane_work
 from bemkit.operators.half_plane.periodic import PeriodicElasticity
 from bemkit.operators.material import Material
-from bemkit.operators.steklov_poincare.needs import BodyCase, BodyNeeds, PlanItem
+from bemkit.operators.steklov_poincare.needs import CONTACT_STEPS, BodyCase, BodyNeeds, PlanItem
 
 _BYTES = 8
 _BASIS = 120
@@ -25,22 +25,34 @@ def half_plane_needs(case: BodyCase) -> BodyNeeds:
     """Return what the map of a half-plane takes."""
     if case.mesh.surface is not None and case.mesh.surface.is_periodic:
         return _periodic_needs(case)
-    n_dofs, n_acting = case.n_displacements, case.n_retained + case.n_fixed
-    of_surface = f"closed form: {n_dofs} x {n_dofs} means of logarithms and signs"
+    n, n_acting = case.mesh.n_elements, case.n_retained + case.n_fixed
     items = (
-        PlanItem("flexibility of the surface", True, of_surface),
+        PlanItem("flexibility of the surface", True, f"closed form: {n} x {n} means of logarithms"),
         PlanItem("elements inside, around or below", False, "the surface beyond the strip is free in closed form"),
         PlanItem("double layer, hypersingular operator", False, "they vanish on a straight free surface"),
         PlanItem("supports", case.n_fixed > 0, "the half-plane is held or driven far away"),
     )
-    square = _BYTES * n_acting * n_acting
+    square, matrix = _BYTES * n_acting * n_acting, _BYTES * n * n
+    if case.is_condensed:  # both components of the whole strip, and the inverse
+        return BodyNeeds(
+            items=items,
+            work=half_plane_work(n, n_acting),
+            memory=32 * matrix,
+            kept=8 * matrix + 2 * square,
+            evaluations=4.0 * n**2,
+            flops=4.0 / 3.0 * float(n_acting) ** 3,
+        )
+    kept = matrix + 3 * square  # the equations of closed nodes, at most all, and their factor
+    flops = CONTACT_STEPS * 2.0 / 3.0 * float(n_acting) ** 3
+    memory = max(4 * matrix, kept)
     return BodyNeeds(
         items=items,
-        work=half_plane_work(case.mesh.n_elements, n_acting),
-        memory=8 * _BYTES * n_dofs * n_dofs,
-        kept=2 * _BYTES * n_dofs * n_dofs + 2 * square,
-        evaluations=4.0 * case.mesh.n_elements**2,
-        flops=float(n_acting) ** 3 * 4.0 / 3.0,
+        work=half_plane_work(n),
+        memory=memory,
+        kept=kept,
+        evaluations=float(n) ** 2,
+        flops=flops,
+        is_matrix_free=True,
     )
 
 

@@ -17,8 +17,6 @@ from bemkit.arrays import ComplexArray, FloatArray
 from bemkit.errors import InputError
 from bemkit.operators.half_plane.surface import SurfaceElasticity
 from bemkit.operators.material import Material
-from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions
-from bemkit.operators.steklov_poincare.protocol import CondensedMap
 
 _EQUAL = 1e-6
 """Relative difference of the lengths of equal elements: numbers hold those of a million elements to 1e-10."""
@@ -72,11 +70,6 @@ class PeriodicElasticity(SurfaceElasticity):
         """(n_elements,) array [m/Pa], that of each wave; see `wave_flexibility`."""
         return wave_flexibility(self.mesh.n_elements, float(self.mesh.lengths.sum()), self.material)
 
-    @cached_property
-    def axes(self) -> ComplexArray:
-        """(2,) array: the directions x and y as complex numbers."""
-        return np.asarray(self.mesh.tangents[0] + 1j * self.mesh.normals[0])
-
     def displaced(self, traction: ComplexArray) -> ComplexArray:
         """Return the displacements (n_elements,) [m] that tractions (n_elements,) [Pa] cause."""
         from scipy.fft import fft, ifft
@@ -88,19 +81,3 @@ class PeriodicElasticity(SurfaceElasticity):
         from scipy.fft import fft, ifft
 
         return np.asarray(ifft(fft(displacement) / self.flexibility))
-
-    def to_complex(self, vectors: FloatArray) -> ComplexArray:
-        """Return vectors (n, 2) in x and y as complex numbers (n,)."""
-        return np.asarray(vectors @ self.axes)
-
-    def to_vectors(self, numbers: ComplexArray) -> FloatArray:
-        """Return complex numbers (n,) as vectors (n, 2) in x and y."""
-        return np.asarray((numbers[:, None] * self.axes.conj()).real)
-
-    def strain_displacement(self, force: FloatArray) -> FloatArray:
-        """Return the displacements (n_nodes, 2) that nodal forces (n_nodes, 2) cause, without those of the drive."""
-        return self.to_vectors(self.displaced(self.to_complex(force / self.mesh.lengths[:, None])))
-
-    def condense(self, conditions: NodalConditions, force: FloatArray) -> CondensedMap:
-        """Refuse to form a matrix; see `bemkit.contact.periodic_body`."""
-        raise InputError("a periodic half-plane is no body of an assembly: give it a scene of its own")

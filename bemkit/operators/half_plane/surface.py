@@ -1,4 +1,7 @@
-"""What the elastic maps of all half-planes have in common."""
+"""What the elastic maps of all half-planes have in common.
+
+Tractions and displacements are complex numbers, along the tangent and, as the imaginary part, along the normal.
+"""
 
 from __future__ import annotations
 
@@ -9,9 +12,11 @@ from typing import Self
 
 import numpy as np
 
-from bemkit.arrays import FloatArray
+from bemkit.arrays import ComplexArray, FloatArray
+from bemkit.errors import InputError
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.spaces import ConstantSpace
+from bemkit.operators.counts import OperationCounts
 from bemkit.operators.half_plane.far_drive import FarDrive
 from bemkit.operators.material import Material
 from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions
@@ -50,6 +55,11 @@ class SurfaceElasticity(ABC):
     def flexibility(self) -> FloatArray:
         """What tractions displace, without the motion far away; computed once."""
 
+    @property
+    def work(self) -> OperationCounts:
+        """What the flexibility took."""
+        return OperationCounts()
+
     def driven_by(self, drive: FarDrive) -> Self:
         """Return the same half-plane under another drive; nothing is integrated again."""
         other = replace(self, drive=drive)
@@ -58,12 +68,29 @@ class SurfaceElasticity(ABC):
         return other
 
     @abstractmethod
+    def displaced(self, traction: ComplexArray) -> ComplexArray:
+        """Return the displacements (n_elements,) [m] that tractions (n_elements,) [Pa] cause."""
+
+    @cached_property
+    def axes(self) -> ComplexArray:
+        """(2,) array: the directions x and y as complex numbers."""
+        return np.asarray(self.mesh.tangents[0] + 1j * self.mesh.normals[0])
+
+    def to_complex(self, vectors: FloatArray) -> ComplexArray:
+        """Return vectors (..., 2) in x and y as complex numbers (...)."""
+        return np.asarray(vectors @ self.axes)
+
+    def to_vectors(self, numbers: ComplexArray) -> FloatArray:
+        """Return complex numbers (n,) as vectors (n, 2) in x and y."""
+        return np.asarray((numbers[:, None] * self.axes.conj()).real)
+
     def strain_displacement(self, force: FloatArray) -> FloatArray:
         """Return the displacements (n_nodes, 2) that nodal forces (n_nodes, 2) cause, without those of the drive."""
+        return self.to_vectors(self.displaced(self.to_complex(force / self.mesh.lengths[:, None])))
 
-    @abstractmethod
     def condense(self, conditions: NodalConditions, force: FloatArray) -> CondensedMap:
-        """Eliminate every direction that is not retained; see `SteklovPoincare.condense`."""
+        """Refuse to form a matrix; see `bemkit.contact.half_plane`."""
+        raise InputError("a periodic half-plane is no body of an assembly: give it a scene of its own")
 
     def element_tractions(self, displacement: FloatArray, force: FloatArray) -> FloatArray:
         """Return the tractions (n_elements, 1, 2) [Pa], which are the forces per length."""
