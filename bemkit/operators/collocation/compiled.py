@@ -12,7 +12,7 @@ from functools import cache
 import numpy as np
 
 from bemkit.errors import printable
-from bemkit.operators.collocation.layers import Constants, Layer, straight_layer
+from bemkit.operators.collocation.layers import Constants, Layer, Unknowns, straight_layer
 from bemkit.operators.stopwatch import announce
 
 MANY_ELEMENTS = 1000
@@ -47,9 +47,10 @@ def loaded() -> tuple[Layer, str]:
 
         announce("load compiled kernels")
         x, start, end = np.array([0.5 + 1.0j]), np.array([0.0j]), np.array([1.0 + 0.0j])
-        constants = Constants(1.0, 1.0, 0.3, 1.0)
+        constants, one = Constants(1.0, 1.0, 0.3, 1.0), np.zeros(1, np.intp)
         for is_double in (False, True):
-            values = compiled_layer(constants, is_double, x, np.array([-1]), start, end)
+            unknown = Unknowns(one[None], np.ones((1, 1, 1 + is_double), complex), one)
+            values = compiled_layer(constants, is_double, x, np.array([-1]), (start, end), unknown)
             if not np.isfinite(values).all():
                 return straight_layer, "numba computes wrong numbers here: the kernels run in numpy"
     except Exception as error:  # a broken installation raises anything

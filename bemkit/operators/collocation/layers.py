@@ -24,6 +24,8 @@ from bemkit.arrays import ComplexArray, FloatArray, IntArray
 from bemkit.operators.material import Material
 
 Values = TypeVar("Values", FloatArray, ComplexArray)
+_PAIRS = 16384
+"""Pairs of points and elements that are evaluated at a time, so that they stay in the cache."""
 FAR = 16.0
 """Half lengths of the element from which on the series is taken."""
 _ORDERS = range(7, 0, -1)
@@ -61,11 +63,78 @@ class Constants(NamedTuple):
         return cls(0.5 * double / material.shear_modulus, double, nu, log_length)
 
 
-Layer: TypeAlias = Callable[[Constants, bool, ComplexArray, IntArray, ComplexArray, ComplexArray], ComplexArray]
+class Unknowns(NamedTuple):
+    """Complex unknowns, each a density on k elements, and the components of them that are columns.
+
+    Parameters
+    ----------
+    elements : (n, k) array
+        The elements on which each unknown acts.
+    weights : (n, k, 1 or 2) complex array
+        The density that a unit of the unknown is there: a constant and, in the double layer, a slope.
+    columns : (n_columns,) array
+        2 * unknown + component.
+    """
+
+    elements: IntArray
+    weights: ComplexArray
+    columns: IntArray
+
+
+Elements: TypeAlias = tuple[ComplexArray, ComplexArray]
+"""Where (n_elements,) straight elements start and end."""
+Layer: TypeAlias = Callable[[Constants, bool, ComplexArray, IntArray, Elements, Unknowns], ComplexArray]
 """The signature of `straight_layer` and of its compiled version."""
 
 
 def straight_layer(
+    constants: Constants, is_double: bool, x: ComplexArray, own: IntArray, elements: Elements, unknowns: Unknowns
+) -> ComplexArray:
+    """Return the displacements (n_columns, n_points), complex, that unit unknowns on straight elements cause at points.
+
+    Parameters
+    ----------
+    constants, is_double, x, own, elements
+        As of `straight_factors`.
+    unknowns : Unknowns
+    """
+    return combined(
+        lambda some: straight_factors(constants, is_double, x[some], own[some], *elements),
+        (elements[0].size, x.size),
+        unknowns,
+    )
+
+
+def combined(factors: Callable[[slice], ComplexArray], shape: tuple[int, int], unknowns: Unknowns) -> ComplexArray:
+    """Return the displacements (n_columns, n_points) that unknowns cause, from the factors of elements.
+
+    Parameters
+    ----------
+    factors : callable
+        Some of the points to the factors (n_elements, 2 or 4, n_some) of `straight_factors`.
+    shape : (n_elements, n_points)
+    unknowns : Unknowns
+    """
+    from scipy.sparse import csr_array
+
+    n_elements, n_points = shape
+    n, k, n_densities = unknowns.weights.shape
+    indices = 2 * n_densities * unknowns.elements[:, :, None] + np.arange(n_densities)
+    starts, size = np.arange(0, n * k * n_densities + 1, k * n_densities), 2 * n_densities * n_elements
+    on = csr_array((unknowns.weights.ravel(), indices.ravel(), starts), (n, size))
+    on_conjugate = csr_array((unknowns.weights.conj().ravel(), indices.ravel() + n_densities, starts), (n, size))
+    of_column, is_x = unknowns.columns // 2, unknowns.columns[:, None] % 2 == 0
+    result = np.empty((of_column.size, n_points), complex)
+    step = max(1, _PAIRS // max(n_elements, 1))
+    for some in (slice(begin, begin + step) for begin in range(0, n_points, step)):
+        values = factors(some).reshape(size, -1)
+        one, conjugate = (on @ values)[of_column], (on_conjugate @ values)[of_column]
+        # a unit along y is the number i
+        result[:, some] = np.where(is_x, one + conjugate, 1j * (one - conjugate))
+    return result
+
+
+def straight_factors(
     constants: Constants, is_double: bool, x: ComplexArray, own: IntArray, start: ComplexArray, end: ComplexArray
 ) -> ComplexArray:
     """Return the factors of the densities on straight elements in the displacements at points.
@@ -175,19 +244,13 @@ def displaced(
     layer: Layer,
     constants: Constants,
     at: tuple[ComplexArray, IntArray],
-    ends: tuple[ComplexArray, ComplexArray],
+    elements: Elements,
     densities: tuple[ComplexArray, ComplexArray, ComplexArray],
 ) -> ComplexArray:
     """Return T (u + s t) - U t, complex (n_points,), at points of tractions t, displacements u and slopes s."""
     t, u, s = densities
-    single, double = layer(constants, False, *at, *ends), layer(constants, True, *at, *ends)
-    return sums(single, double, t, u, s)
-
-
-def sums(single: ComplexArray, double: ComplexArray, t: ComplexArray, u: ComplexArray, s: ComplexArray) -> ComplexArray:
-    """Return T (u + s t) - U t, complex (n_points,), from the factors of both layers."""
-    on_single, on_double = np.stack([-t, -t.conj()], axis=1), np.stack([u, s, u.conj(), s.conj()], axis=1)
-    n_points = single.shape[2]
-    total: ComplexArray = on_double.ravel() @ double.reshape(-1, n_points)
-    total += on_single.ravel() @ single.reshape(-1, n_points)
+    every, one = np.arange(t.size)[None], np.zeros(1, np.intp)
+    single, double = Unknowns(every, -t[None, :, None], one), Unknowns(every, np.stack([u, s], axis=1)[None], one)
+    total: ComplexArray = layer(constants, False, *at, elements, single)[0]
+    total += layer(constants, True, *at, elements, double)[0]
     return total

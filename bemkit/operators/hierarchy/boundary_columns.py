@@ -12,19 +12,18 @@ from functools import cached_property
 from typing import TypeAlias
 
 import numpy as np
-from scipy.sparse import csr_array
 
 from bemkit.arrays import ComplexArray, FloatArray, IntArray
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.operators.collocation.compiled import layer_for
 from bemkit.operators.collocation.gradient_reconstruction import GradientReconstruction
-from bemkit.operators.collocation.layers import Constants, Layer, sums
+from bemkit.operators.collocation.layers import Constants, Layer, Unknowns, combined
 from bemkit.operators.hierarchy.curved_elements import CurvedElements
 from bemkit.operators.integrals.panels import Panels
 from bemkit.operators.material import Material
 
-_PAIRS = 16384
-"""Pairs of points and elements that are evaluated at a time, so that they stay in the cache."""
+_ELEMENTS = 512
+"""Elements whose sums are evaluated at a time, so that they stay in the cache."""
 NOWHERE = -1
 """Element of a point that is the middle of none."""
 Densities: TypeAlias = tuple[ComplexArray, ComplexArray, ComplexArray]
@@ -122,8 +121,8 @@ class BoundaryColumns:
         return self.neighbours[1:2] if self.slopes is None else self.neighbours
 
     def entries(self, rows: IntArray, columns: IntArray) -> FloatArray:
-        """Return entries (n_rows, n_columns) of the equations; rows are 2 * place + component."""
-        points, number = np.unique(rows // 2, return_inverse=True)
+        """Return entries (n_rows, n_columns) of the equations; rows are 2 * place + component; both are ascending."""
+        points, number = distinct(rows // 2)
         by_column = self.fields(self.centre[points], points, columns).T
         chosen = 2 * number + rows % 2
         if chosen.size < by_column.shape[1] or np.any(np.diff(chosen) != 1):
@@ -139,23 +138,28 @@ class BoundaryColumns:
         places : (n_points,) array
             The element in whose middle the point is, or `NOWHERE`.
         columns : (n_columns,) array
-            Those of an element that follow each other are evaluated at once.
+            Ascending.
         """
+        is_double = (columns // 2) % 2 == 1
+        if is_double.any() == is_double.all():
+            return self._of_kind(x, places, columns, bool(is_double.any())).view(float).T
         result = np.empty((columns.size, x.size), complex)
-        for is_double in (False, True):
-            chosen = np.flatnonzero((columns // 2) % 2 == is_double)
-            if not chosen.size:
-                continue
-            touched, weights = self._weights(columns[chosen], is_double)
-            step = max(1, _PAIRS // touched.size)
-            for begin in range(0, x.size, step):
-                some = slice(begin, begin + step)
-                factors = self._layer(is_double, x[some], places[some], touched)
-                result[chosen, some] = weights @ factors.reshape(weights.shape[1], -1)
-            if is_double:
-                column, point = np.nonzero(columns[chosen, None] // 4 == places)
-                result[chosen[column], point] += np.where(columns[chosen[column]] % 2 == 0, 0.5, 0.5j)
+        for of_kind, chosen in ((False, ~is_double), (True, is_double)):
+            result[chosen] = self._of_kind(x, places, columns[chosen], of_kind)
         return result.view(float).T
+
+    def _of_kind(self, x: ComplexArray, places: IntArray, columns: IntArray, is_double: bool) -> ComplexArray:
+        """Return displacements (n_columns, n_points) that columns of tractions, or of displacements, cause."""
+        elements, number = distinct(columns // 4)
+        numbered = 2 * number + columns % 2
+        touched, unknowns = self._unknowns(elements, numbered, is_double)
+        result = self._layer(is_double, x, places, touched, unknowns)
+        own = counted(places, elements) if is_double else np.zeros(0, np.intp)
+        points = np.flatnonzero(own >= 0)
+        for component, jump in enumerate((0.5, 0.5j)):
+            column = counted(2 * own[points] + component, numbered)
+            result[column[column >= 0], points[column >= 0]] += jump
+        return result
 
     def of_forces(self, felt: FloatArray, places: IntArray, forces: ComplexArray) -> FloatArray:
         """Return what the equations in the middle of elements feel of point forces.
@@ -181,10 +185,14 @@ class BoundaryColumns:
         """
         x, densities = self.centre[places], self.densities(traction, displacement)
         result = np.zeros(x.size, complex)
-        every, step = np.arange(self.start.size), max(1, _PAIRS // max(places.size, 1))
-        for elements in (every[begin : begin + step] for begin in range(0, every.size, step)):
-            layers = (self._layer(is_double, x, places, elements) for is_double in (False, True))
-            result += sums(*layers, *(each[elements] for each in densities))
+        every = np.arange(self.start.size)
+        for elements in (every[begin : begin + _ELEMENTS] for begin in range(0, every.size, _ELEMENTS)):
+            t, u, s = (each[elements] for each in densities)
+            itself, one = np.arange(elements.size)[None], np.zeros(1, np.intp)
+            weights = -t[None, :, None], np.stack([u, s], axis=1)[None]
+            for is_double, weight in enumerate(weights):
+                unknowns = Unknowns(itself, weight, one)
+                result += self._layer(bool(is_double), x, places, elements, unknowns)[0]
         return np.stack([result.real, result.imag], axis=1) + 0.5 * displacement[places]
 
     def densities(self, traction: FloatArray, displacement: FloatArray) -> Densities:
@@ -198,13 +206,19 @@ class BoundaryColumns:
             slope += self.slopes[k] * u[places]
         return t, mean, slope
 
-    def _layer(self, is_double: bool, x: ComplexArray, places: IntArray, elements: IntArray) -> ComplexArray:
-        """Return the factors of the densities on some elements, ascending; see `layers.straight_layer`."""
-        if self.curved is not None:
-            return self.curved.layer(is_double, x, places, elements)
-        return self.layer(
-            self.constants, is_double, x, counted(places, elements), self.start[elements], self.end[elements]
-        )
+    def _layer(
+        self, is_double: bool, x: ComplexArray, places: IntArray, elements: IntArray, unknowns: Unknowns
+    ) -> ComplexArray:
+        """Return what unknowns on some elements, ascending, cause, (n_columns, n_points); see `layers.Layer`."""
+        curved = self.curved
+        if curved is not None:
+            return combined(
+                lambda some: curved.factors(is_double, x[some], places[some], elements),
+                (elements.size, x.size),
+                unknowns,
+            )
+        ends = self.start[elements], self.end[elements]
+        return self.layer(self.constants, is_double, x, counted(places, elements), ends, unknowns)
 
     @property
     def acted_on(self) -> IntArray:
@@ -212,40 +226,44 @@ class BoundaryColumns:
         return self.neighbours[1:2] if self.slopes is None else self.neighbours
 
     @cached_property
-    def reconstruction(self) -> tuple[ComplexArray, ComplexArray]:
-        """(k, n) constant parts, and slopes, that a unit displacement of each element makes on those it acts on."""
+    def reconstruction(self) -> ComplexArray:
+        """(n, k, 2) array: constant part and slope that a unit displacement makes on each element it acts on."""
         if self.slopes is None or self.means is None:
-            return np.ones((1, self.order.size), complex), np.zeros((1, self.order.size), complex)
+            return np.broadcast_to(np.array([1.0 + 0j, 0.0]), (self.order.size, 1, 2))
         # an element is the one after its predecessor, itself, and the one before its successor
         roles = np.array([[2], [1], [0]])
         means, slopes = self.means[roles, self.neighbours], self.slopes[roles, self.neighbours]
         means[1] += 1.0
-        return means, slopes
+        return np.ascontiguousarray(np.stack([means, slopes], axis=2).transpose(1, 0, 2))
 
-    def _weights(self, columns: IntArray, is_double: bool) -> tuple[IntArray, csr_array]:
-        """Return the elements that some columns of one kind act on, and the weights of their factors in each column.
+    def _unknowns(self, elements: IntArray, columns: IntArray, is_double: bool) -> tuple[IntArray, Unknowns]:
+        """Return the elements that unknowns of one kind act on, ascending, and the unknowns on these.
 
-        The weights are (n_columns, n_touched n_factors), the factors of an element side by side. A unit along y is the
-        number i: i times the factor of a density, and -i times that of its conjugate.
+        Parameters
+        ----------
+        elements : (n,) array
+            Those of the unknowns.
+        columns : (n_columns,) array
+            As of `Unknowns`.
+        is_double : bool
         """
-        elements, turn = columns // 4, np.where(columns % 2 == 0, 1.0, 1j)
-        if is_double:
-            acted_on = self.acted_on[:, elements]
-            values = np.stack([of[:, elements] * turn for of in self.reconstruction])
-        else:
-            acted_on, values = elements[None], -turn[None, None]
-        _, k, n = values.shape
-        values = np.concatenate([values, values.conj()])
-        touched, at = np.unique(acted_on, return_inverse=True)
-        indices = len(values) * at.reshape(k, n) + np.arange(len(values))[:, None, None]
-        by_column = values.transpose(2, 0, 1).ravel(), indices.transpose(2, 0, 1).ravel()
-        starts = np.arange(0, values.size + 1, len(values) * k)
-        return touched, csr_array((*by_column, starts), shape=(n, len(values) * touched.size))
+        if not is_double:
+            return elements, Unknowns(
+                np.arange(elements.size)[:, None], np.full((elements.size, 1, 1), -1.0 + 0j), columns
+            )
+        touched, at = np.unique(self.acted_on[:, elements].T, return_inverse=True)
+        return touched, Unknowns(at.reshape(elements.size, -1), self.reconstruction[elements], columns)
+
+
+def distinct(numbers: IntArray) -> tuple[IntArray, IntArray]:
+    """Return the distinct ones of some numbers, ascending, and which of them each number is."""
+    is_first = np.append(True, numbers[1:] != numbers[:-1])[: numbers.size]
+    return numbers[is_first], np.cumsum(is_first) - 1
 
 
 def counted(places: IntArray, elements: IntArray) -> IntArray:
     """Return the positions of places in some elements, ascending; `NOWHERE` for others."""
     if not elements.size:
         return np.full_like(places, NOWHERE)
-    counted = np.searchsorted(elements, places)
-    return np.where(elements[np.minimum(counted, elements.size - 1)] == places, counted, NOWHERE)
+    found = np.searchsorted(elements, places)
+    return np.where(elements[np.minimum(found, elements.size - 1)] == places, found, NOWHERE)

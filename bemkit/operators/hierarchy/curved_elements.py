@@ -70,8 +70,8 @@ class CurvedElements:
         rules = (_rule(panels, order, n_points) for n_points in (CURVED_POINTS, _FEW_POINTS))
         return cls(constants, points, order, near, far, *rules)
 
-    def layer(self, is_double: bool, x: ComplexArray, places: IntArray, elements: IntArray) -> ComplexArray:
-        """Return the factors (n, 2 or 4, n_points) of the densities on some elements; see `layers.straight_layer`.
+    def factors(self, is_double: bool, x: ComplexArray, places: IntArray, elements: IntArray) -> ComplexArray:
+        """Return the factors (n, 2 or 4, n_points) of the densities on some elements; see `layers.straight_factors`.
 
         Parameters
         ----------

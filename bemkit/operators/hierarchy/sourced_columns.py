@@ -126,7 +126,7 @@ class SourcedColumns(BoundaryColumns):
         arcs = self.arcs.take(touched)
         traction, displacement, gradient = self.sources[place].work(arcs, self.material)
         on_slope = gradient / (0.5 * inner.lengths * _tangents(inner))[touched]
-        means, slopes = (of[:, elements] for of in inner.reconstruction)
+        means, slopes = inner.reconstruction[elements].T
         on_displacement = np.sum(means * displacement[at] + slopes * on_slope[at], axis=0)
         own = np.searchsorted(touched, elements)
         # Re(factor v) of v = 1 and v = i

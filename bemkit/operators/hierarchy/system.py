@@ -190,9 +190,10 @@ class HierarchicalSystem:
             As `everywhere` has returned them.
         """
         places, border = self._place[elements], self.factor.border
-        of_all = self._states()
-        is_element = self._order < self.n_elements
+        of_all, is_element = np.empty((self._order.size, 4)), self._order < self.n_elements
         of_all[is_element] = np.concatenate([traction, displacement], axis=1)[self._order[is_element]]
+        if not is_element.all():
+            of_all[~is_element] = self._states()[~is_element]
         left = self._columns.applied(places, of_all[:, :2], of_all[:, 2:])
         errors = border.errors.reshape(self._order.size, 2, -1)[places] @ self.factor.errors()
         residual: FloatArray = left + errors

@@ -12,7 +12,7 @@ import pytest
 from bemkit.arrays import ComplexArray, IntArray
 from bemkit.geometry import BoundaryMesh, PlateWithHole, Rectangle, Symmetry, discretise
 from bemkit.operators.collocation import compiled
-from bemkit.operators.collocation.layers import Constants, straight_layer
+from bemkit.operators.collocation.layers import Constants, Layer, Unknowns, straight_layer
 from bemkit.operators.hierarchy.boundary_columns import NOWHERE, BoundaryColumns
 from bemkit.operators.hierarchy.curved_elements import CurvedElements
 from bemkit.operators.hierarchy.folded_columns import boundary_columns
@@ -38,8 +38,24 @@ def fields_of(
 ) -> ComplexArray:
     """Return the factors (6, n_points, n_elements) of p, conj(p), v, conj(v), s, conj(s)."""
     layer = straight_layer if backend == "numpy" else compiled.loaded()[0]
-    single, double = (layer(constants, is_double, x, places, start, end) for is_double in (False, True))
-    return stacked(single, double)
+    return stacked(*(factors_of(layer, constants, is_double, (x, places), (start, end)) for is_double in (False, True)))
+
+
+def factors_of(
+    layer: Layer,
+    constants: Constants,
+    is_double: bool,
+    at: tuple[ComplexArray, IntArray],
+    elements: tuple[ComplexArray, ComplexArray],
+) -> ComplexArray:
+    """Return the factors of `straight_factors` from units along x and y of each density of its own."""
+    n, n_densities = elements[0].size, 1 + is_double
+    weights = np.tile(np.eye(n_densities, dtype=complex), (n, 1))[:, None]
+    unknowns = Unknowns(np.repeat(np.arange(n), n_densities)[:, None], weights, np.arange(2 * n * n_densities))
+    along = layer(constants, is_double, *at, elements, unknowns).reshape(n, n_densities, 2, -1)
+    # f v + g conj(v) of v = 1 and of v = i
+    factor, conjugate = (0.5 * (along[:, :, 0] + sign * 1j * along[:, :, 1]) for sign in (-1, 1))
+    return np.concatenate([factor, conjugate], axis=1)
 
 
 def stacked(single: ComplexArray, double: ComplexArray) -> ComplexArray:
@@ -139,7 +155,7 @@ def test_quadrature_gives_the_closed_forms_where_elements_are_straight(backend: 
     x = np.append(centre[0] + np.array([1e-3, 0.03j, 0.06, 0.07j, 0.3 + 0.2j, 2.0]), centre[2])
     places = np.append(np.full(6, NOWHERE), 47)
     expected = fields_of(backend, constants, x, np.where(places == 47, 2, NOWHERE), start, end)
-    layers = (elements.layer(is_double, x, places, chosen) for is_double in (False, True))
+    layers = (elements.factors(is_double, x, places, chosen) for is_double in (False, True))
     np.testing.assert_allclose(stacked(*layers), expected, atol=1e-14)
 
 
