@@ -30,7 +30,7 @@ import bemkit as bk
 from bemkit.contact.condensation.hierarchical_body import HierarchicalBody
 from bemkit.operators.collocation import compiled
 from bemkit.operators.hierarchy.compression import Compression
-from bemkit.operators.hierarchy.factor import HierarchicalFactor
+from bemkit.operators.hierarchy.factor import Factor
 from bemkit.runs.history import run_on_mesh
 
 REFERENCE = (0.2575701, 0.4676382)
@@ -74,7 +74,7 @@ class Parts:
 
     def listen(self) -> None:
         """Measure whatever is compressed, factored and certified from now on."""
-        compress, update, certify = Compression.of.__func__, HierarchicalFactor.update, HierarchicalBody.imbalance  # type: ignore[attr-defined]
+        compress, update, certify = Compression.of.__func__, Factor.update, HierarchicalBody.imbalance  # type: ignore[attr-defined]
 
         def timed(work: Callable[..., Any], *arguments: Any) -> tuple[Any, float]:
             begin = time.process_time()
@@ -86,7 +86,7 @@ class Parts:
             self.rank, self.updates, self.certificates = result.largest_rank, [], []
             return result
 
-        def updated(factor: HierarchicalFactor, *arguments: Any) -> None:
+        def updated(factor: Factor, *arguments: Any) -> None:
             _, seconds = timed(update, factor, *arguments)
             self.updates.append((factor.n_factored, seconds))
             self.n_bytes = factor.n_bytes + factor.compression.n_bytes
@@ -97,7 +97,7 @@ class Parts:
             return result
 
         Compression.of = classmethod(compressed)  # type: ignore[assignment,method-assign]
-        HierarchicalFactor.update = updated  # type: ignore[method-assign]
+        Factor.update = updated  # type: ignore[method-assign]
         HierarchicalBody.imbalance = certified  # type: ignore[method-assign]
 
 

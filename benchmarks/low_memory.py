@@ -26,9 +26,9 @@ from rich.table import Table
 
 import bemkit as bk
 from bemkit.operators.collocation import compiled
-from bemkit.operators.hierarchy.fast_multipole import FastMultipole
-from bemkit.operators.hierarchy.matrix_free import MatrixFreeSystem
-from bemkit.operators.hierarchy.straight_elements import StraightElements
+from bemkit.operators.matrix_free.fast_multipole import FastMultipole
+from bemkit.operators.matrix_free.straight_elements import StraightElements
+from bemkit.operators.matrix_free.system import MatrixFreeSystem
 from bemkit.operators.steklov_poincare.hierarchical import HierarchicalCollocation
 
 SOLVERS = {"direct": bk.Hierarchical(), "matrix-free": bk.MatrixFree()}

@@ -445,7 +445,7 @@ try:
 except SystemExit as end:
     assert end.code == 0
 wanted = {"matplotlib", "meshio", "h5py", "rich", "pyamg", "distributed", "scipy.sparse"}
-names = ("operators.somigliana.fields", "operators.somigliana.moments", "operators.hierarchy.matrix_free",
+names = ("operators.somigliana.fields", "operators.somigliana.moments", "operators.matrix_free.system",
     "results.interior", "pictures.files", "results.result_file", "hdf5", "cli.console",
     "runs.adaptive", "scene.assembly", "geometry.drawn", "operators.forms", "solvers.homotopy")
 wanted |= {f"bemkit.{name}" for name in names}

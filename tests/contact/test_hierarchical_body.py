@@ -19,7 +19,7 @@ from bemkit.model.contact_model import Model, build_model
 from bemkit.model.prepared import prepare
 from bemkit.operators.hierarchy.compression import Compression
 from bemkit.operators.hierarchy.element_laws import ElementLaws
-from bemkit.operators.hierarchy.factor import HierarchicalFactor
+from bemkit.operators.hierarchy.factor import Factor
 from bemkit.operators.hierarchy.system import HierarchicalSystem
 from bemkit.operators.linear import threads
 from bemkit.operators.linear.solvers import DenseCholesky, Hierarchical
@@ -94,13 +94,7 @@ SCENES = {
     "disc": bk.load_scene("disc-between-plates"),
     "plate with a round hole": replace(loose_block(), shape=bk.PlateWithHole(2.0, 1.5, 0.4)),
     "incompressible": replace(paper(1), material=bk.Material(1.0, 0.5)),
-    "incompressible with a hole": replace(
-        loose_block(), shape=bk.PlateWithHole(2.0, 1.5, 0.4), material=bk.Material(1.0, 0.5)
-    ),
     "twelve holes": replace(loose_block(0.0), shape=Perforated(4, 3), parts=on_floor()),
-    "twelve holes, incompressible": replace(
-        loose_block(), shape=Perforated(4, 3), parts=on_floor(), material=bk.Material(1.0, 0.5)
-    ),
     "half of a plate with a hole": squeezed(bk.PlateWithHole(2.0, 2.0, 0.4, (-1.0, -1.0)), symmetry=bk.Symmetry(x=0.0)),
     "quarter of a disc": squeezed(bk.Disk(1.0), symmetry=bk.Symmetry(x=0.0, y=0.0)),
     "strip": replace(loose_block(), shape=bk.Rectangle(20.0, 1.0), solver=bk.AugmentedLagrangian()),
@@ -175,19 +169,19 @@ def test_a_response_factors_what_has_changed_alone() -> None:
 
 def test_a_body_is_compressed_and_factored_once_for_all_load_steps(monkeypatch: pytest.MonkeyPatch) -> None:
     compressed, factored = [], []
-    compress, update = Compression.of.__func__, HierarchicalFactor.update  # type: ignore[attr-defined]
+    compress, update = Compression.of.__func__, Factor.update  # type: ignore[attr-defined]
 
     def of(cls: type, *arguments: object) -> Compression:
         compressed.append(compress(cls, *arguments))
         result: Compression = compressed[-1]
         return result
 
-    def updated(factor: HierarchicalFactor, laws: ElementLaws) -> None:
+    def updated(factor: Factor, laws: ElementLaws) -> None:
         update(factor, laws)
         factored.append(factor.n_factored)
 
     monkeypatch.setattr(Compression, "of", classmethod(of))
-    monkeypatch.setattr(HierarchicalFactor, "update", updated)
+    monkeypatch.setattr(Factor, "update", updated)
     place = "parts.left-load.condition.x"
     steps = bk.Step(1.0, {place: 0.0}), bk.Step(3.0, {place: "0.5*(t - 1)"}, increments=2)
     scenes = [replace(scene, steps=steps) for scene in in_both_ways(paper(1), 960)]

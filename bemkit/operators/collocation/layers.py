@@ -128,7 +128,7 @@ def combined(factors: Callable[[slice], ComplexArray], shape: tuple[int, int], u
     step = max(1, _PAIRS // max(n_elements, 1))
     for some in (slice(begin, begin + step) for begin in range(0, n_points, step)):
         values = factors(some).reshape(size, -1)
-        one, conjugate = (on @ values)[of_column], (on_conjugate @ values)[of_column]
+        one, conjugate = (np.asarray(each @ values)[of_column] for each in (on, on_conjugate))
         # a unit along y is the number i
         result[:, some] = np.where(is_x, one + conjugate, 1j * (one - conjugate))
     return result

@@ -51,7 +51,7 @@ class Reciprocity:
     fields: FloatArray
 
     @classmethod
-    def of(cls, mesh: BoundaryMesh, material: Material, *, takes_slopes: bool, has_holes: bool = True) -> Reciprocity:
+    def of(cls, mesh: BoundaryMesh, material: Material, *, takes_slopes: bool) -> Reciprocity:
         """Return the equations of constant tractions, and of displacements with or without slopes.
 
         Parameters
@@ -61,16 +61,12 @@ class Reciprocity:
         material : Material
         takes_slopes : bool
             Whether displacements have slopes; see `bemkit.operators.collocation.gradient_reconstruction`.
-        has_holes : bool
-            Whether those of holes are among them.
         """
         whole = mesh.whole
         panels, centres = Panels(whole), _plane(whole.centres)
         reconstruction = GradientReconstruction.of(whole, panels) if takes_slopes else None
         on_tractions, on_displacements, fields = [], [], []
         for loop, area in zip(mesh.loops, mesh.loop_areas, strict=True):
-            if area <= 0.0 and not has_holes:
-                continue
             images = reciprocal_fields(mesh, loop, area)
             arcs = Arcs.of(whole, _POINTS_OF_LINES if area > 0.0 and whole.is_straight.all() else _POINTS)
             works = zip(*(field.work(arcs, material) for field in images), strict=True)
@@ -233,10 +229,6 @@ class Arcs:
         half = 0.5 * (end - start)[:, None]
         arm = half * xi
         return cls(start, end, (start + 0.5 * (end - start))[:, None] + arm, arm, half * weights)
-
-    def take(self, elements: IntArray) -> Arcs:
-        """Return some of them."""
-        return Arcs(*(of[elements] for of in (self.start, self.end, self.z, self.arm, self.dz)))
 
 
 def _plane(vectors: FloatArray) -> ComplexArray:

@@ -29,18 +29,8 @@ class Discs:
     radius: FloatArray
 
     @classmethod
-    def around(cls, tree: ClusterTree, level: int, points: ComplexArray, held: ComplexArray | None = None) -> Discs:
-        """Return discs about the middles of the boxes around points of each cluster.
-
-        Parameters
-        ----------
-        tree : ClusterTree
-        level : int
-        points : (k, n) complex array [m]
-            Of the element at each place.
-        held : (m, n) complex array, optional [m]
-            The points that the discs hold; by default the same.
-        """
+    def around(cls, tree: ClusterTree, level: int, points: ComplexArray) -> Discs:
+        """Return discs about the middles of the boxes around points (k, n) of the nodes of each cluster."""
         begins = tree.bounds[: -1 : 2**level]
         counts = np.diff(np.append(begins, points.shape[1]))
         low, high = (
@@ -48,7 +38,7 @@ class Discs:
             for of in (np.minimum, np.maximum)
         )
         centre = 0.5 * (low + high)
-        farthest = np.abs((points if held is None else held) - np.repeat(centre, counts)).max(axis=0)
+        farthest = np.abs(points - np.repeat(centre, counts)).max(axis=0)
         return cls(centre, np.maximum.reduceat(farthest, begins))
 
 

@@ -11,8 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray, IntArray
-from bemkit.operators.hierarchy.boundary_columns import BoundaryColumns
-from bemkit.operators.hierarchy.proxies import discs_of, extents, n_proxies
+from bemkit.operators.hierarchy.clusters import Discs
+from bemkit.operators.hierarchy.equations import BoundaryEquations
+from bemkit.operators.hierarchy.proxies import n_proxies
 from bemkit.operators.hierarchy.skeletons import LevelView, Skeleton
 from bemkit.operators.hierarchy.tree import ClusterTree
 from bemkit.operators.linear.threads import for_each_chunk
@@ -24,7 +25,7 @@ class Compression:
 
     Parameters
     ----------
-    columns : BoundaryColumns
+    equations : BoundaryEquations
     tree : ClusterTree
     unknowns : tuple of arrays
         The columns of each leaf that may have a value: those of tractions and displacements that are not always zero.
@@ -32,18 +33,20 @@ class Compression:
         By level from the leaves up to below the root, and by cluster.
     """
 
-    columns: BoundaryColumns
+    equations: BoundaryEquations
     tree: ClusterTree
     unknowns: tuple[IntArray, ...]
     skeletons: tuple[tuple[Skeleton, ...], ...]
 
     @classmethod
-    def of(cls, columns: BoundaryColumns, tree: ClusterTree, may_differ: BoolArray, tolerance: float) -> Compression:
+    def of(
+        cls, equations: BoundaryEquations, tree: ClusterTree, may_differ: BoolArray, tolerance: float
+    ) -> Compression:
         """Compress the equations.
 
         Parameters
         ----------
-        columns : BoundaryColumns
+        equations : BoundaryEquations
             In the order of the tree.
         tree : ClusterTree
         may_differ : (n_elements, 4) bool array
@@ -51,23 +54,24 @@ class Compression:
         tolerance : float
             Of the skeletons of leaves; those above are finer, so that errors do not grow with the number of elements.
         """
-        every = np.arange(4 * columns.n_elements).reshape(-1, 4)
+        n, supports = equations.points.size, equations.supports
+        every = np.arange(4 * n).reshape(-1, 4)
         leaves = [tree.places(0, leaf) for leaf in range(tree.n_leaves)]
         unknowns = tuple(every[places][may_differ[places]] for places in leaves)
         rows = [np.arange(2 * places.start, 2 * places.stop) for places in leaves]
         candidates = list(unknowns)
-        extent = extents(columns)
+        extent = np.abs(supports - equations.points).max(axis=0)
         levels: list[tuple[Skeleton, ...]] = []
         for level in range(tree.n_levels):
-            discs = discs_of(columns, tree, level)
-            view = LevelView(columns, discs, rows, candidates, extent, tolerance, is_lowest=level == 0)
-            n_integrals = columns.n_elements * n_proxies(tolerance)
+            discs = Discs.around(tree, level, supports)
+            view = LevelView(equations, discs, rows, candidates, extent, tolerance, is_lowest=level == 0)
+            n_integrals = n * n_proxies(tolerance)
             skeletons = tuple(for_each_chunk(view.skeleton, range(len(rows)), n_integrals=n_integrals))
             levels.append(skeletons)
             pairs = list(zip(skeletons[::2], skeletons[1::2], strict=True))
             rows = [np.concatenate([one.rows, two.rows]) for one, two in pairs]
             candidates = [np.concatenate([one.columns, two.columns]) for one, two in pairs]
-        return cls(columns, tree, unknowns, tuple(levels))
+        return cls(equations, tree, unknowns, tuple(levels))
 
     def couplings(self, level: int, pair: int) -> tuple[FloatArray, FloatArray]:
         """Return what columns of two siblings of a level cause at the rows of the other, at the first one first.
@@ -75,7 +79,7 @@ class Compression:
         They are evaluated anew each time: that takes less than what follows, and no memory.
         """
         one, two = self.skeletons[level][2 * pair : 2 * pair + 2]
-        return self.columns.entries(one.rows, two.columns), self.columns.entries(two.rows, one.columns)
+        return self.equations.block(one.rows, two.columns), self.equations.block(two.rows, one.columns)
 
     @property
     def largest_rank(self) -> int:

@@ -13,7 +13,7 @@ tractions). They are passed through all clusters beside the skeletons and solved
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -21,31 +21,15 @@ import numpy as np
 from bemkit.arrays import BoolArray, FloatArray, IntArray
 from bemkit.operators.hierarchy.compression import Compression
 from bemkit.operators.hierarchy.element_laws import ElementLaws
+from bemkit.operators.hierarchy.equations import BoundaryEquations
 from bemkit.operators.hierarchy.known_loads import KnownLoads
 from bemkit.operators.hierarchy.skeletons import Skeleton
+from bemkit.operators.hierarchy.tree import ClusterTree
 from bemkit.operators.linear.dense import SingularMatrixError
 from bemkit.operators.linear.threads import for_each_chunk
 
 _SMALLEST_PIVOT = 1e-13
 """Pivots below this share of the largest entry of their column are round-off."""
-
-
-@dataclass(frozen=True, eq=False)
-class Border:
-    """Unknowns and equations of the boundary as a whole.
-
-    Parameters
-    ----------
-    errors : (2 n_elements, n_border) array
-        Columns of the additional unknowns in the equations.
-    balances : (n_border, 4 n_elements) array
-        Additional equations: balances @ (t_x, t_y, u_x, u_y of all elements) + own @ errors = 0.
-    own : (n_border, n_border) array
-    """
-
-    errors: FloatArray
-    balances: FloatArray
-    own: FloatArray
 
 
 class SingularClusterError(SingularMatrixError):
@@ -106,46 +90,76 @@ class _Cluster:
         return self.scattering.nbytes + self.of_loads.nbytes + self.response.nbytes + self.at_rest.nbytes
 
 
-@dataclass(eq=False)
-class HierarchicalFactor:
-    """Compressed equations under conditions that may change.
+@dataclass(frozen=True, eq=False)
+class _Leaf:
+    """The equations of a leaf under laws, factored.
 
     Parameters
     ----------
-    compression : Compression
-    border : Border
-    may_change : frozenset of int
-        Leaves whose conditions change by themselves. Clusters without any are merged once, and keep no scattering
-        matrices: if something changes there all the same, the whole cluster is factored again, but for loads that were
-        expected, and sums of them.
+    factors : (n, 4, 2) array
+        Those of the laws.
+    of_quantities : (4 n, n_rows + n_caused + n_border) array
+        What tractions and displacements do to the equations, cause outside and add to the balances.
+    of_unknowns : (2 n, n_rows + n_caused + n_border) array
+        The same of the unknowns z.
+    inverse : _LU
+    """
+
+    factors: FloatArray
+    of_quantities: FloatArray
+    of_unknowns: FloatArray
+    inverse: _LU
+
+
+class Factor:
+    """Boundary equations over a tree, factored under conditions that may change.
+
+    Parameters
+    ----------
+    equations : BoundaryEquations
+        Numbered in the order of the tree.
+    tree : ClusterTree
+        With a single leaf the equations are dense, and the LU factors of that leaf are kept.
+    tolerance : float
+        Of the compression between clusters.
+    may_differ : (n_nodes, 4) bool array, optional
+        Which tractions and displacements may ever differ from zero; by default all.
+    may_change : (n_nodes,) bool array, optional
+        Nodes whose conditions change by themselves, by default all. Clusters without any are merged once, and keep no
+        scattering matrices: if something changes there all the same, the whole cluster is factored again, but for loads
+        that were expected, and sums of them.
 
     Notes
     -----
     The one mutable object of the solver: it keeps the factors of the conditions it has met last.
     """
 
-    compression: Compression
-    border: Border
-    may_change: frozenset[int]
-    laws: ElementLaws | None = None
-    n_updates: int = 0
-    n_factored: int = 0
-    _levels: list[list[_Cluster | None]] = field(default_factory=list)
-    _stale: set[int] = field(default_factory=set)
-    _changing: list[set[int]] = field(default_factory=list)
-    _loads: KnownLoads = field(init=False)
-    _stays: BoolArray = field(init=False)
-    _is_reloaded: bool = False
-
-    def __post_init__(self) -> None:
-        tree = self.compression.tree
+    def __init__(
+        self,
+        equations: BoundaryEquations,
+        tree: ClusterTree,
+        tolerance: float,
+        *,
+        may_differ: BoolArray | None = None,
+        may_change: BoolArray | None = None,
+    ) -> None:
+        n = equations.points.size
+        may_differ = np.ones((n, 4), bool) if may_differ is None else may_differ
+        self.equations, self.tree = equations, tree
+        self.compression = Compression.of(equations, tree, may_differ, tolerance)
+        self.laws: ElementLaws | None = None
+        self.n_updates = self.n_factored = 0
+        changing = tree.leaves_of(np.arange(n) if may_change is None else np.flatnonzero(may_change))
+        self.may_change = frozenset(changing.tolist())
+        self._levels: list[list[_Cluster | None]]
         self._levels = [[None] * 2 ** (tree.n_levels - level) for level in range(tree.n_levels + 1)]
         self._stale = set(range(tree.n_leaves))
         self._changing = [{leaf >> level for leaf in self.may_change} for level in range(tree.n_levels + 1)]
-        self._stays = np.ones(self.compression.columns.n_elements, bool)
+        self._stays = np.ones(n, bool)
         for leaf in self.may_change:
             self._stays[tree.places(0, leaf)] = False
-        self._loads = KnownLoads(self._stays)
+        self._loads, self._is_reloaded = KnownLoads(self._stays), False
+        self._only_leaf: _Leaf | None = None
 
     def expect(self, given: Iterable[FloatArray]) -> None:
         """Say, before the first `update`, what laws will give; see `KnownLoads`."""
@@ -161,7 +175,7 @@ class HierarchicalFactor:
         SingularMatrixError
             If the conditions do not determine the unknowns.
         """
-        tree = self.compression.tree
+        tree = self.tree
         before = ElementLaws(np.full((1, 4, 2), np.nan), np.zeros((1, 4))) if self.laws is None else self.laws
         is_other_load = np.any(laws.given != before.given, axis=1)
         differs = np.any(laws.factors != before.factors, axis=(1, 2)) | (is_other_load & ~self._stays)
@@ -206,7 +220,7 @@ class HierarchicalFactor:
             if leaf in found:
                 continue
             level = 0
-            while level < self.compression.tree.n_levels and leaf >> (level + 1) not in self._changing[level + 1]:
+            while level < self.tree.n_levels and leaf >> (level + 1) not in self._changing[level + 1]:
                 level += 1
             begin = leaf >> level << level
             found.update(range(begin, begin + 2**level))
@@ -235,8 +249,8 @@ class HierarchicalFactor:
             Ascending.
         """
         assert self.laws is not None  # `update` comes first
-        k, n_levels = given.shape[2], self.compression.tree.n_levels
-        places = self.compression.tree.places(0, leaf)
+        k, n_levels = given.shape[2], self.tree.n_levels
+        places = self.tree.places(0, leaf)
         path = [self._leaf(leaf, self.laws.factors[places], given.reshape(-1, k))]
         for level in range(1, n_levels + 1):
             below = leaf >> (level - 1)
@@ -254,7 +268,7 @@ class HierarchicalFactor:
     ) -> list[FloatArray]:
         """Return the unknowns (2 n_elements, k) of some leaves from those of the border (n_border, k)."""
         felt = {0: errors}
-        for level in range(self.compression.tree.n_levels, 0, -1):
+        for level in range(self.tree.n_levels, 0, -1):
             wanted, below = set((leaves >> (level - 1)).tolist()), {}
             for number, of_cluster in felt.items():
                 cluster = cluster_at(level, number)
@@ -282,27 +296,39 @@ class HierarchicalFactor:
         return sum(each.n_bytes for level in self._levels for each in level if each is not None)
 
     def _leaf(self, number: int, factors: FloatArray, given: FloatArray) -> _Cluster:
-        """Factor a leaf under laws (n, 4, 2) and k loads (4 n, k)."""
-        compression = self.compression
-        places, columns = compression.tree.places(0, number), compression.unknowns[number]
-        rows = np.arange(2 * places.start, 2 * places.stop)
-        n, n_border = places.stop - places.start, self.border.errors.shape[1]
-        skeleton = compression.skeletons[0][number]
-        own = columns - 4 * places.start
-        n_caused = rows.size + skeleton.columns.size
-        # columns: the equations, then what is caused and added to the balances
-        both = np.zeros((4 * n, n_caused + n_border))
-        both[columns - 4 * places.start, : rows.size] = compression.columns.entries(rows, columns).T
-        both[own, rows.size : n_caused] = skeleton.column_map.matrix()
-        both[:, n_caused:] = self.border.balances[:, 4 * places.start : 4 * places.stop].T
-        of_unknowns = (factors.transpose(0, 2, 1) @ both.reshape(n, 4, -1)).reshape(2 * n, -1)
-        factor = _LU(of_unknowns[:, : rows.size].T, SingularClusterError(n))
-        response = factor.solve(np.concatenate([skeleton.row_map.matrix(), self.border.errors[rows]], axis=1))
-        outgoing_of_unknowns, at_rest = of_unknowns[:, rows.size :].T, np.zeros((2 * n, given.shape[1]))
+        """Return a leaf under laws (n, 4, 2) and k loads (4 n, k)."""
+        leaf, border = self._factored_leaf(number, factors), self.equations.border
+        places, skeleton, n_rows = self.tree.places(0, number), self._skeleton(0, number), 2 * len(factors)
+        felt = border.errors[2 * places.start : 2 * places.stop]
+        if skeleton is not None:
+            felt = np.concatenate([skeleton.row_map.matrix(), felt], axis=1)
+        response = leaf.inverse.solve(felt)
+        outgoing, at_rest = leaf.of_unknowns[:, n_rows:].T, np.zeros((n_rows, given.shape[1]))
         if given.any():
-            at_rest = -factor.solve(both[:, : rows.size].T @ given)
-        of_loads = outgoing_of_unknowns @ at_rest + both[:, rows.size :].T @ given
-        return _Cluster(outgoing_of_unknowns @ response, of_loads, response, at_rest)
+            at_rest = -leaf.inverse.solve(leaf.of_quantities[:, :n_rows].T @ given)
+        alone = outgoing @ at_rest + leaf.of_quantities[:, n_rows:].T @ given
+        return _Cluster(outgoing @ response, alone, response, at_rest)
+
+    def _factored_leaf(self, number: int, factors: FloatArray) -> _Leaf:
+        """Factor the equations of a leaf under laws (n, 4, 2); those of the only one are kept."""
+        if self._only_leaf is not None and np.array_equal(self._only_leaf.factors, factors):
+            return self._only_leaf
+        self._only_leaf = None  # its memory is for the new one
+        places, columns = self.tree.places(0, number), self.compression.unknowns[number]
+        rows = np.arange(2 * places.start, 2 * places.stop)
+        n, n_border, skeleton = len(factors), self.equations.border.errors.shape[1], self._skeleton(0, number)
+        n_caused = 0 if skeleton is None else skeleton.columns.size
+        # columns: the equations, then what is caused and added to the balances
+        both = np.zeros((4 * n, rows.size + n_caused + n_border))
+        both[columns - 4 * places.start, : rows.size] = self.equations.block(rows, columns).T
+        if skeleton is not None:
+            both[columns - 4 * places.start, rows.size : rows.size + n_caused] = skeleton.column_map.matrix()
+        both[:, rows.size + n_caused :] = self.equations.border.balances[:, 4 * places.start : 4 * places.stop].T
+        of_unknowns = (factors.transpose(0, 2, 1) @ both.reshape(n, 4, -1)).reshape(2 * n, -1)
+        leaf = _Leaf(factors, both, of_unknowns, _LU(of_unknowns[:, : rows.size].T, SingularClusterError(n)))
+        if self.tree.n_leaves == 1:
+            self._only_leaf = leaf
+        return leaf
 
     def _parent(self, level: int, cluster: int) -> _Cluster:
         changes = cluster in self._changing[level]
@@ -319,7 +345,7 @@ class HierarchicalFactor:
         f1 + S12 W2 (f2, e) = R1 f + S12 a2 and the same with 1 and 2 exchanged. The second is put into the first.
         """
         on_one, on_two = self.compression.couplings(level - 1, cluster)
-        n_border, n_one, n_two = self.border.errors.shape[1], len(on_one), len(on_two)
+        n_border, n_one, n_two = self.equations.border.errors.shape[1], len(on_one), len(on_two)
         parent = self._skeleton(level, cluster)
         n_rows = 0 if parent is None else parent.rows.size
         n_felt, n_loads = n_rows + n_border, one.of_loads.shape[1]
@@ -354,7 +380,7 @@ class HierarchicalFactor:
         )
 
     def _singular(self, level: int, cluster: int) -> SingularClusterError:
-        places = self.compression.tree.places(level, cluster)
+        places = self.tree.places(level, cluster)
         return SingularClusterError(places.stop - places.start)
 
     def _cluster(self, level: int, cluster: int) -> _Cluster:
@@ -372,9 +398,9 @@ class HierarchicalFactor:
 
     def _skeleton(self, level: int, cluster: int) -> Skeleton | None:
         """Return the skeleton of a cluster, none of the root."""
-        return None if level == self.compression.tree.n_levels else self.compression.skeletons[level][cluster]
+        return None if level == self.tree.n_levels else self.compression.skeletons[level][cluster]
 
     def _of_border(self, root: _Cluster) -> FloatArray:
         """Return the unknowns (n_border, k) of the boundary as a whole."""
         error = SingularMatrixError("the balance of forces is singular: check that supports and contacts hold the body")
-        return _LU(root.scattering - self.border.own, error).solve(root.of_loads)
+        return _LU(root.scattering - self.equations.border.own, error).solve(root.of_loads)

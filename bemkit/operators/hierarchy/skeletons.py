@@ -12,10 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from bemkit.arrays import ComplexArray, FloatArray, IntArray
-from bemkit.operators.hierarchy.boundary_columns import NOWHERE, BoundaryColumns
 from bemkit.operators.hierarchy.clusters import Discs
+from bemkit.operators.hierarchy.equations import BoundaryEquations
 from bemkit.operators.hierarchy.interpolative import Block, Interpolation, sketched
-from bemkit.operators.hierarchy.proxies import PROXY_RATIO, n_proxies, near_clusters, point_forces, proxy_points
+from bemkit.operators.hierarchy.proxies import PROXY_RATIO, n_proxies, near_clusters, proxy_points
 
 _FLOOR = 2e-13
 """No tolerance of a level is smaller: below, round-off of the entries would be compressed."""
@@ -51,7 +51,7 @@ class Skeleton:
 class LevelView:
     """The clusters of one level with the rows and columns that are candidates for their skeletons."""
 
-    columns: BoundaryColumns
+    equations: BoundaryEquations
     discs: Discs
     rows: list[IntArray]
     candidates: list[IntArray]
@@ -67,14 +67,14 @@ class LevelView:
         rows = np.concatenate([self.rows[other] for other in near])
         columns = np.concatenate([self.candidates[other] for other in near])
         middle, circle = self.discs.centre[cluster], PROXY_RATIO * self.discs.radius[cluster]
-        of_rows, of_columns = (np.abs(self.columns.centre[each] - middle) for each in (rows // 2, columns // 4))
+        of_rows, of_columns = (np.abs(self.equations.points[each] - middle) for each in (rows // 2, columns // 4))
         return rows[of_rows < circle], columns[of_columns < circle + self.extent[columns // 4]]
 
     def tolerance_at(self, cluster: int, elements: IntArray) -> float:
         """Return the tolerance of a cluster: errors of large clusters with small elements count more."""
         share = (
             4.0
-            * float(self.columns.lengths[elements].min(initial=np.inf))
+            * float(self.equations.lengths[elements].min(initial=np.inf))
             / (PROXY_RATIO * float(self.discs.radius[cluster]))
         )
         return max(self.tolerance * float(np.sqrt(min(1.0, share))), _FLOOR)
@@ -85,7 +85,7 @@ class LevelView:
         That of a leaf hardly depends on its size, but on whether tractions and displacements are two kinds of columns;
         most of the few clusters below the root have corners or others all around.
         """
-        lengths = self.columns.lengths[elements]
+        lengths = self.equations.lengths[elements]
         if lengths.max(initial=0.0) > _UNEVEN * lengths.min(initial=np.inf):
             return None
         if self.is_lowest:
@@ -105,16 +105,16 @@ class LevelView:
 
     def _column_map(self, cluster: int, near_rows: IntArray) -> Interpolation:
         """Interpolate the columns of a cluster, seen from near rows and from the proxy circle."""
-        candidates, of = self.candidates[cluster], self.columns
-        points, proxies = np.unique(near_rows // 2), self.proxies(cluster)
-        places = np.append(np.full(proxies.size, NOWHERE), points)
-        fields = of.fields(np.append(proxies, of.centre[points]), places, candidates)
+        candidates, of = self.candidates[cluster], self.equations
+        proxies, points = self.proxies(cluster), np.unique(near_rows // 2)
+        near = of.block((2 * points[:, None] + np.arange(2)).ravel(), candidates)
+        entries = np.concatenate([of.fields(proxies, candidates), near])
         spacing = 2.0 * np.pi * PROXY_RATIO * self.discs.radius[cluster] / proxies.size
         weights = np.repeat(np.sqrt(np.append(np.full(proxies.size, spacing), of.lengths[points])), 2)
         elements, kinds = candidates // 4, (candidates // 2) % 2
         tolerance, n_kinds = self.tolerance_at(cluster, elements), 1 + int(np.ptp(kinds)) if kinds.size else 1
         return sketched(
-            [Block(fields, weights)],
+            [Block(entries, weights)],
             1.0 / np.sqrt(of.lengths[elements]),
             tolerance,
             self.guess(candidates.size, np.append(points, elements), tolerance, n_kinds),
@@ -123,15 +123,14 @@ class LevelView:
 
     def _row_map(self, cluster: int, near_columns: IntArray) -> Interpolation:
         """Interpolate the rows of a cluster under near columns and under forces on the proxy circle."""
-        rows, of = self.rows[cluster], self.columns
+        rows, of = self.rows[cluster], self.equations
         points, number = np.unique(rows // 2, return_inverse=True)
-        x, proxies = of.centre[points], self.proxies(cluster)
-        circle = PROXY_RATIO * float(self.discs.radius[cluster])
-        forces = of.of_forces(point_forces(x, proxies, of.constants.poisson_ratio, circle), points, proxies)
+        both = (2 * points[:, None] + np.arange(2)).ravel()
+        forces = of.under_forces(self.proxies(cluster), both)
         blocks = [Block(forces, np.ones(len(forces)))]
         for kind in (0, 1):
             if (seen := near_columns[(near_columns // 2) % 2 == kind]).size:
-                blocks.append(Block(of.fields(x, points, seen).T, 1.0 / np.sqrt(of.lengths[seen // 4])))
+                blocks.append(Block(of.block(both, seen).T, 1.0 / np.sqrt(of.lengths[seen // 4])))
         tolerance = self.tolerance_at(cluster, rows // 2)
         return sketched(
             blocks,

@@ -8,9 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray, IntArray
-from bemkit.operators.hierarchy.compression import Compression
 from bemkit.operators.hierarchy.element_laws import ElementLaws, SolvedConditions, solve_for_two
-from bemkit.operators.hierarchy.factor import Border, HierarchicalFactor
+from bemkit.operators.hierarchy.factor import Factor
 from bemkit.operators.linear.dense import SingularMatrixError
 
 
@@ -68,39 +67,22 @@ class UndeterminedError(SingularMatrixError):
 
 
 class HierarchicalSystem:
-    """Boundary equations over a tree, with two conditions on each element or node.
+    """Boundary equations over a tree, with two conditions on each element along its own directions.
 
     Parameters
     ----------
-    compression : Compression
-    border : Border
+    factor : Factor
     frame : (n_elements, 2, 2) array
         Rows are the directions of the conditions of each element.
     displacement_unit : float [m/Pa]
         Displacement by traction of a single element.
-    may_change : (n_elements,) bool array
-        Elements whose conditions change by themselves; see `HierarchicalFactor`.
-
-    Notes
-    -----
-    Places of the tree beyond the elements, those of holes, have only a traction.
     """
 
-    def __init__(
-        self,
-        compression: Compression,
-        border: Border,
-        frame: FloatArray,
-        displacement_unit: float,
-        may_change: BoolArray,
-    ) -> None:
-        self.compression, self._tree, self._columns = compression, compression.tree, compression.columns
-        self._order, self.n_elements, self._unit = self._tree.order, len(frame), displacement_unit
+    def __init__(self, factor: Factor, frame: FloatArray, displacement_unit: float) -> None:
+        self.factor, self._tree, self._order, self._unit = factor, factor.tree, factor.tree.order, displacement_unit
         self._place = np.empty_like(self._order)
         self._place[self._order] = np.arange(self._order.size)
-        changing = self._tree.leaves_of(self._place[np.flatnonzero(may_change)])
-        self.factor = HierarchicalFactor(compression, border, frozenset(changing.tolist()))
-        self._frame = np.concatenate([frame, np.tile(np.eye(2), (self._order.size - len(frame), 1, 1))])
+        self._frame = frame
 
     @property
     def n_answers(self) -> int:
@@ -177,11 +159,14 @@ class HierarchicalSystem:
 
     def everywhere(self) -> tuple[FloatArray, FloatArray]:
         """Return tractions and displacements (n_elements, 2) in x and y under the conditions of the last `state`."""
-        state = self._states()[self._place[: self.n_elements]]
-        return state[:, :2], state[:, 2:]
+        laws = self.factor.laws
+        assert laws is not None  # `state` comes first
+        unknowns = self.factor.unknowns(np.arange(self._tree.n_leaves))
+        states = ((laws.factors @ unknowns[:, :, None])[:, :, 0] + laws.given)[self._place]
+        return states[:, :2], states[:, 2:]
 
     def residual(self, elements: IntArray, traction: FloatArray, displacement: FloatArray) -> FloatArray:
-        """Return what is left (n, 2) of the equations of some elements, nothing compressed, as displacements.
+        """Return the residual (n, 2) of the equations of some elements, without any compression, as displacements.
 
         Parameters
         ----------
@@ -189,30 +174,15 @@ class HierarchicalSystem:
         traction, displacement : (n_elements, 2) arrays
             As `everywhere` has returned them.
         """
-        places, border = self._place[elements], self.factor.border
-        of_all, is_element = np.empty((self._order.size, 4)), self._order < self.n_elements
-        of_all[is_element] = np.concatenate([traction, displacement], axis=1)[self._order[is_element]]
-        if not is_element.all():
-            of_all[~is_element] = self._states()[~is_element]
-        left = self._columns.applied(places, of_all[:, :2], of_all[:, 2:])
-        errors = border.errors.reshape(self._order.size, 2, -1)[places] @ self.factor.errors()
-        residual: FloatArray = left + errors
+        places, equations = self._place[elements], self.factor.equations
+        by_place = traction[self._order], displacement[self._order]
+        errors = equations.border.errors.reshape(self._order.size, 2, -1)[places] @ self.factor.errors()
+        residual: FloatArray = equations.residual(places, *by_place) + errors
         return residual
 
     def laws(self, conditions: NodeConditions) -> ElementLaws:
         """Return what conditions on all elements make of their tractions and displacements, by place, in x and y."""
-        n_holes = self._order.size - self.n_elements
-        free = NodeConditions.given(np.ones((n_holes, 2), bool), *np.zeros((2, n_holes, 2)))
-        every = NodeConditions(*map(np.concatenate, zip(vars(conditions).values(), vars(free).values(), strict=True)))
-        return turned(every.solved(self._unit).in_full(), self._frame).take(self._order)
-
-    def _states(self) -> FloatArray:
-        """Return (t_x, t_y, u_x, u_y) at all places under the conditions of the last `state`."""
-        laws = self.factor.laws
-        assert laws is not None  # `state` comes first
-        unknowns = self.factor.unknowns(np.arange(self._tree.n_leaves))
-        states: FloatArray = (laws.factors @ unknowns[:, :, None])[:, :, 0] + laws.given
-        return states
+        return turned(conditions.solved(self._unit).in_full(), self._frame).take(self._order)
 
     def _places_in(self, leaves: IntArray) -> IntArray:
         return np.concatenate([np.zeros(0, np.intp), *(np.r_[self._tree.places(0, leaf)] for leaf in leaves.tolist())])

@@ -61,6 +61,11 @@ class ClusterTree:
             order[begin:end].sort()
         return cls(order, bounds, n_levels)
 
+    @classmethod
+    def single(cls, n: int) -> ClusterTree:
+        """Return a tree whose only cluster holds n points in their own order."""
+        return cls(np.arange(n), np.array([0, n]), 0)
+
     @property
     def n_leaves(self) -> int:
         """Number of leaves."""

@@ -16,11 +16,11 @@ import numpy as np
 from bemkit.arrays import BoolArray, ComplexArray, IntArray
 from bemkit.geometry.quadrature import gauss_legendre
 from bemkit.operators.hierarchy.clusters import Clusters, Pairs
-from bemkit.operators.hierarchy.expansions import Expansions, Sources
-from bemkit.operators.hierarchy.source_series import SEPARATION, SourceSeries
 from bemkit.operators.integrals.panels import Panels
 from bemkit.operators.kernels import legendre_values
 from bemkit.operators.material import Material
+from bemkit.operators.matrix_free.expansions import Expansions, Sources
+from bemkit.operators.matrix_free.source_series import SEPARATION, SourceSeries
 from bemkit.operators.somigliana.moments import N_POINTS, ArcQuadrature
 
 ORDER = 34

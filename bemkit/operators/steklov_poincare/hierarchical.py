@@ -9,9 +9,11 @@ import numpy as np
 from bemkit.arrays import BoolArray, FloatArray, IntArray
 from bemkit.errors import InputError
 from bemkit.geometry.mesh import BoundaryMesh
-from bemkit.operators.hierarchy.collocation_system import collocation_system
+from bemkit.operators.collocation.images import collocation_equations
 from bemkit.operators.hierarchy.element_laws import ElementLaws
+from bemkit.operators.hierarchy.factor import Factor
 from bemkit.operators.hierarchy.system import HierarchicalSystem, NodeConditions
+from bemkit.operators.hierarchy.tree import ClusterTree
 from bemkit.operators.linear.dense import SingularMatrixError
 from bemkit.operators.linear.solvers import Hierarchical, MatrixFree
 from bemkit.operators.material import Material
@@ -19,6 +21,8 @@ from bemkit.operators.steklov_poincare.collocation import CollocationElasticity
 from bemkit.operators.steklov_poincare.nodal_conditions import GivenData, NodalConditions, free_modes, turning
 from bemkit.operators.steklov_poincare.protocol import CondensedMap
 
+LEAF_SIZE = 88
+"""Elements of a leaf: larger ones cost more to factor, smaller ones have skeletons nearly as large as themselves."""
 _LARGEST_RESIDUAL, _SAMPLED = 1e3, 16
 """Residual by the tolerance of the compression, found at so many elements, beyond which equations are inexact. It is
 below one on all bodies that were tried."""
@@ -97,19 +101,20 @@ class HierarchicalCollocation(CollocationElasticity):
             Elements whose traction, and whose displacement, may ever differ from zero.
         """
         if isinstance(self.options, MatrixFree):
-            from bemkit.operators.hierarchy.matrix_free import MatrixFreeSystem
+            from bemkit.operators.matrix_free.system import MatrixFreeSystem
 
             return MatrixFreeSystem(self.mesh, self.material, conditions.frame, self.options, slopes=self.slopes)
-        return collocation_system(
-            self.mesh,
-            self.material,
-            conditions.frame,
-            may_be_traction=may_be_loaded,
-            may_be_displacement=may_move,
-            may_change=np.any(conditions.is_retained, axis=1),
-            slopes=self.slopes,
-            tolerance=self.options.tolerance,
+        mesh, may_differ = self.mesh, np.repeat(np.stack([may_be_loaded, may_move], axis=1), 2, axis=1)
+        tree = ClusterTree.of(mesh.centres, LEAF_SIZE)
+        factor = Factor(
+            collocation_equations(mesh, self.material, tree.order, takes_slopes=self.slopes),
+            tree,
+            self.options.tolerance,
+            may_differ=may_differ[tree.order],
+            may_change=np.any(conditions.is_retained, axis=1)[tree.order],
         )
+        unit = mesh.diameter / mesh.n_elements / self.material.plane_modulus
+        return HierarchicalSystem(factor, conditions.frame, unit)
 
     def condense(self, conditions: NodalConditions, force: FloatArray) -> CondensedMap:
         """Solve for a unit displacement of each retained direction; see `SteklovPoincare.condense`.

@@ -33,8 +33,8 @@ from bemkit.operators.steklov_poincare.needs import (
 _DIRECT: LinearSolver = DenseCholesky()
 _FEWEST_ELEMENTS = 200
 """Smallest number of leaves of a tree."""
-_MOST_LOOPS = 40
-"""Each loop of a symmetric body has an equation of its own that passes through the whole tree."""
+_MOST_LOOPS = 41
+"""An outer curve and 40 holes: each loop has an equation of its own that passes through the whole tree."""
 _LEAST_COMPRESSIBILITY = 1e-8
 """1/2 less Poisson's ratio: below, clusters of the tree, which are solved before these equations, lose the digits."""
 _SHARE = 0.5
@@ -88,10 +88,10 @@ def why_dense(case: BodyCase) -> str:
     mesh = case.mesh
     if mesh.n_elements < _FEWEST_ELEMENTS:
         return f"{mesh.n_elements} elements are few"
-    if mesh.symmetry is not None and len(mesh.loops) > _MOST_LOOPS:
-        return f"the boundary of half the body has {len(mesh.loops)} closed curves"
-    if mesh.symmetry is not None and _is_incompressible_with_holes(case):
-        return "the material is incompressible, and the body symmetric and with holes"
+    if len(mesh.loops) > _MOST_LOOPS:
+        return f"the boundary has {len(mesh.loops)} closed curves"
+    if _is_incompressible_with_holes(case):
+        return "the material is incompressible, and the body has holes"
     return ""
 
 

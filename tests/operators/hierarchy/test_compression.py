@@ -7,9 +7,10 @@ import pytest
 
 from bemkit.geometry import BoundaryMesh, Polygon, Rectangle, discretise
 from bemkit.operators.collocation import compiled
-from bemkit.operators.hierarchy.boundary_columns import BoundaryColumns
+from bemkit.operators.collocation.images import collocation_equations
+from bemkit.operators.hierarchy.clusters import Discs
 from bemkit.operators.hierarchy.compression import Compression
-from bemkit.operators.hierarchy.proxies import PROXY_RATIO, discs_of, extents, n_proxies, near_clusters, proxy_points
+from bemkit.operators.hierarchy.proxies import PROXY_RATIO, n_proxies, near_clusters, proxy_points
 from bemkit.operators.hierarchy.tree import ClusterTree
 from bemkit.operators.material import Material
 from tests.slow import slow_except
@@ -19,8 +20,8 @@ L_SHAPE = Polygon(((0.0, 0.0), (2.0, 0.0), (2.0, 1.0), (1.0, 1.0), (1.0, 2.0), (
 
 def compressed(mesh: BoundaryMesh, tolerance: float, *, slopes: bool = True) -> Compression:
     tree = ClusterTree.of(mesh.centres, 24)
-    columns = BoundaryColumns.of(mesh, Material(1.0, 0.3), tree.order, takes_slopes=slopes)
-    return Compression.of(columns, tree, np.ones((mesh.n_elements, 4), bool), tolerance)
+    equations = collocation_equations(mesh, Material(1.0, 0.3), tree.order, takes_slopes=slopes)
+    return Compression.of(equations, tree, np.ones((mesh.n_elements, 4), bool), tolerance)
 
 
 @pytest.mark.parametrize("slopes", [True, False], ids=["slopes", "constant"])
@@ -30,14 +31,14 @@ def test_blocks_between_leaves_follow_from_their_skeletons(
     shape: Rectangle | Polygon, tolerance: float, slopes: bool
 ) -> None:
     compression = compressed(discretise(shape.outline(), n_elements=240).unit, tolerance, slopes=slopes)
-    columns, tree, leaves = compression.columns, compression.tree, compression.skeletons[0]
+    equations, tree, leaves = compression.equations, compression.tree, compression.skeletons[0]
     for one in (0, 3, tree.n_leaves - 1):
         for two in (1, 2, tree.n_leaves - 2):
             if one == two:
                 continue
             rows = np.arange(2 * tree.places(0, one).start, 2 * tree.places(0, one).stop)
-            block = columns.entries(rows, compression.unknowns[two])
-            few = columns.entries(leaves[one].rows, leaves[two].columns)
+            block = equations.block(rows, compression.unknowns[two])
+            few = equations.block(leaves[one].rows, leaves[two].columns)
             error = np.abs(leaves[one].row_map.matrix() @ few @ leaves[two].column_map.matrix().T - block).max()
             # ten times: interpolation multiplies what pivoted QR leaves out, which is measured in mean squares
             assert error <= 10.0 * tolerance * np.abs(block).max() + 1e-14
@@ -50,17 +51,17 @@ def test_columns_of_one_kind_are_compressed_alone(monkeypatch: pytest.MonkeyPatc
         monkeypatch.setattr(compiled, "MANY_ELEMENTS", 0)
     mesh = discretise(L_SHAPE.outline(), n_elements=240).unit
     tree = ClusterTree.of(mesh.centres, 24)
-    columns = BoundaryColumns.of(mesh, Material(1.0, 0.3), tree.order, takes_slopes=True)
-    place = columns.centre.real + 2.0 * columns.centre.imag
+    equations = collocation_equations(mesh, Material(1.0, 0.3), tree.order, takes_slopes=True)
+    place = equations.points.real + 2.0 * equations.points.imag
     for kind in (0, 1):
         may_differ = np.tile(np.arange(4) // 2 == kind, (mesh.n_elements, 1))
-        compression = Compression.of(columns, tree, may_differ, 1e-9)
+        compression = Compression.of(equations, tree, may_differ, 1e-9)
         leaves = compression.skeletons[0]
         for receiver, source in ((0, len(leaves) - 1), (len(leaves) - 1, 0), (1, 2)):
             unknowns, own = compression.unknowns[source], tree.places(0, receiver)
             values = np.cos(place[unknowns // 4] + unknowns % 4)
-            exact = columns.entries(np.arange(2 * own.start, 2 * own.stop), unknowns) @ values
-            between = columns.entries(leaves[receiver].rows, leaves[source].columns)
+            exact = equations.block(np.arange(2 * own.start, 2 * own.stop), unknowns) @ values
+            between = equations.block(leaves[receiver].rows, leaves[source].columns)
             found = leaves[receiver].row_map.matrix() @ (between @ leaves[source].column_map.gather(values))
             # sums over all elements of errors below the tolerance each
             assert np.abs(found - exact).max() <= 1e-8 * np.abs(exact).max()
@@ -85,13 +86,12 @@ def test_memory_grows_like_the_number_of_elements() -> None:
 def test_discs_hold_their_clusters_and_proxies_lie_around_them() -> None:
     mesh = discretise(L_SHAPE.outline(), n_elements=200).unit
     tree = ClusterTree.of(mesh.centres, 16)
-    columns = BoundaryColumns.of(mesh, Material(1.0, 0.3), tree.order, takes_slopes=True)
+    equations = collocation_equations(mesh, Material(1.0, 0.3), tree.order, takes_slopes=True)
     for level in range(tree.n_levels):
-        discs = discs_of(columns, tree, level)
+        discs = Discs.around(tree, level, equations.supports)
         for cluster in range(discs.radius.size):
             places = tree.places(level, cluster)
-            acting = columns.reach[:, places].ravel()
-            far = max(np.abs(ends[acting] - discs.centre[cluster]).max() for ends in (columns.start, columns.end))
+            far = np.abs(equations.supports[:, places] - discs.centre[cluster]).max()
             assert far == pytest.approx(discs.radius[cluster])
             around = np.abs(proxy_points(discs, cluster, 8) - discs.centre[cluster])
             np.testing.assert_allclose(around, PROXY_RATIO * discs.radius[cluster])
@@ -100,5 +100,6 @@ def test_discs_hold_their_clusters_and_proxies_lie_around_them() -> None:
             others = np.setdiff1d(np.arange(discs.radius.size), [cluster, *near])
             apart = np.abs(discs.centre[others] - discs.centre[cluster]) - discs.radius[others]
             assert np.all(apart >= PROXY_RATIO * discs.radius[cluster] * (1.0 - 1e-14))
-    assert np.all(extents(columns) > columns.lengths)
+    # an element acts on its neighbours
+    assert np.all(np.abs(equations.supports - equations.points).max(axis=0) > equations.lengths)
     assert n_proxies(1e-12) > n_proxies(1e-6)

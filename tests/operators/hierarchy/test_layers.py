@@ -12,11 +12,10 @@ import pytest
 from bemkit.arrays import ComplexArray, IntArray
 from bemkit.geometry import BoundaryMesh, PlateWithHole, Rectangle, Symmetry, discretise
 from bemkit.operators.collocation import compiled
+from bemkit.operators.collocation.curved_elements import CurvedElements
+from bemkit.operators.collocation.equations import NOWHERE, point_forces
+from bemkit.operators.collocation.images import collocation_equations
 from bemkit.operators.collocation.layers import Constants, Layer, Unknowns, straight_layer
-from bemkit.operators.hierarchy.boundary_columns import NOWHERE, BoundaryColumns
-from bemkit.operators.hierarchy.curved_elements import CurvedElements
-from bemkit.operators.hierarchy.folded_columns import boundary_columns
-from bemkit.operators.hierarchy.proxies import point_forces
 from bemkit.operators.integrals.panels import Panels
 from bemkit.operators.material import Material
 from tests.operators.collocation_matrices import collocation_matrices
@@ -94,9 +93,9 @@ def test_columns_of_symmetric_bodies_are_those_of_collocation(
     mesh = discretise(shape.outline(), n_elements=80, symmetry=symmetry).unit
     assert mesh.n_elements * symmetry.n_images == 80
     assert_columns_are_those_of_collocation(mesh, slopes)
-    columns = boundary_columns(mesh, MATERIAL, np.arange(mesh.n_elements), takes_slopes=slopes)
+    columns = collocation_equations(mesh, MATERIAL, np.arange(mesh.n_elements), takes_slopes=slopes)
     # a point of no element sees the element alone, a point in the middle of one its images, too
-    alone, with_images = (columns.fields(columns.centre[:1], np.array([at]), np.array([40])) for at in (NOWHERE, 0))
+    alone, with_images = columns.fields(columns.points[:1], np.array([40])), columns.block(np.arange(2), np.array([40]))
     assert abs(alone - with_images).max() > 1e-3
 
 
@@ -104,8 +103,8 @@ def assert_columns_are_those_of_collocation(mesh: BoundaryMesh, slopes: bool) ->
     n, order = mesh.n_elements, np.random.default_rng(0).permutation(mesh.n_elements)
     single, double = collocation_matrices(mesh, MATERIAL, takes_slopes=slopes)
     dofs = (2 * order[:, None] + np.arange(2)).ravel()
-    columns = boundary_columns(mesh, MATERIAL, order, takes_slopes=slopes)
-    entries = columns.entries(np.arange(2 * n), np.arange(4 * n)).reshape(2 * n, n, 2, 2)
+    columns = collocation_equations(mesh, MATERIAL, order, takes_slopes=slopes)
+    entries = columns.block(np.arange(2 * n), np.arange(4 * n)).reshape(2 * n, n, 2, 2)
     whole = np.ix_(dofs, dofs)
     # closed forms on either side: only round-off of entries of size one differs
     np.testing.assert_allclose(entries[:, :, 0].reshape(2 * n, -1), -single[whole], atol=1e-15)
@@ -115,7 +114,7 @@ def assert_columns_are_those_of_collocation(mesh: BoundaryMesh, slopes: bool) ->
     both = np.concatenate([traction, displacement], axis=1).ravel()
     product = (entries.reshape(2 * n, -1) @ both).reshape(n, 2)
     places = np.array([0, 3, n - 1])
-    np.testing.assert_allclose(columns.applied(places, traction, displacement), product[places], atol=1e-13)
+    np.testing.assert_allclose(columns.residual(places, traction, displacement), product[places], atol=1e-13)
 
 
 def test_fields_anywhere_are_integrals_of_the_kernel(backend: str) -> None:
@@ -172,14 +171,14 @@ def test_points_on_the_line_of_an_element_and_close_to_it_keep_their_digits(back
 
 @pytest.mark.usefixtures("backend")
 def test_points_of_no_element_see_no_jump() -> None:
-    columns = BoundaryColumns.of(straight(Rectangle(1.0, 1.0), 20), MATERIAL, np.arange(20), takes_slopes=False)
+    columns = collocation_equations(straight(Rectangle(1.0, 1.0), 20), MATERIAL, np.arange(20), takes_slopes=False)
     of_displacements = 4 * np.arange(20) + 2
-    inside = columns.fields(np.array([0.05 + 0.02j]), np.array([NOWHERE]), of_displacements)[0]
+    inside = columns.fields(np.array([0.05 + 0.02j]), of_displacements)[0]
     # a unit translation of the boundary: T 1 is -1 inside of the body, -1/2 + 1/2 on its boundary, 0 outside
     np.testing.assert_allclose(inside.sum(), -1.0, atol=1e-14)
-    on = columns.fields(columns.centre[:1], np.array([0]), of_displacements)[0]
+    on = columns.block(np.array([0]), of_displacements)[0]
     np.testing.assert_allclose(on.sum(), 0.0, atol=1e-14)
-    outside = columns.fields(np.array([3.0 + 0.0j]), np.array([NOWHERE]), of_displacements)[0]
+    outside = columns.fields(np.array([3.0 + 0.0j]), of_displacements)[0]
     np.testing.assert_allclose(outside.sum(), 0.0, atol=1e-14)
 
 
@@ -213,8 +212,8 @@ def test_a_broken_numba_is_replaced_by_numpy_and_named_in_one_line(
     assert layer is straight_layer
     assert words in why
     assert "\n" not in why
-    columns = BoundaryColumns.of(straight(Rectangle(1.0, 1.0), 8), MATERIAL, np.arange(8), takes_slopes=True)
-    assert np.isfinite(columns.fields(columns.centre, np.arange(8), np.arange(32))).all()
+    columns = collocation_equations(straight(Rectangle(1.0, 1.0), 8), MATERIAL, np.arange(8), takes_slopes=True)
+    assert np.isfinite(columns.block(np.arange(16), np.arange(32))).all()
 
 
 @pytest.mark.usefixtures("backend")

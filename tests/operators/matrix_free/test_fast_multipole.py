@@ -9,10 +9,10 @@ from scipy.sparse.linalg import LinearOperator
 from bemkit.arrays import FloatArray
 from bemkit.geometry import BoundaryMesh
 from bemkit.operators.collocation import compiled
-from bemkit.operators.hierarchy.boundary_columns import BoundaryColumns
-from bemkit.operators.hierarchy.fast_multipole import FastMultipole
-from bemkit.operators.hierarchy.straight_elements import StraightElements
+from bemkit.operators.collocation.images import collocation_equations
 from bemkit.operators.material import Material
+from bemkit.operators.matrix_free.fast_multipole import FastMultipole
+from bemkit.operators.matrix_free.straight_elements import StraightElements
 from tests.operators.hierarchy.test_system import SHAPES, graded, mesh_of
 
 TINY = 1e-12
@@ -27,8 +27,8 @@ def multipole_of(
 def entries_of(elements: StraightElements) -> FloatArray:
     """All entries, from closed forms."""
     n, material = elements.mesh.n_elements, Material(2.0, elements.constants.poisson_ratio)
-    columns = BoundaryColumns.of(elements.mesh, material, np.arange(n), takes_slopes=elements.takes_slopes)
-    return columns.entries(np.arange(2 * n), np.arange(4 * n))
+    equations = collocation_equations(elements.mesh, material, np.arange(n), takes_slopes=elements.takes_slopes)
+    return equations.block(np.arange(2 * n), np.arange(4 * n))
 
 
 def error_of(operator: FastMultipole) -> float:

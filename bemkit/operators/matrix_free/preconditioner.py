@@ -13,15 +13,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray, IntArray
-from bemkit.operators.hierarchy.boundary_columns import BoundaryColumns
-from bemkit.operators.hierarchy.coarse_equations import ElementGroups
-from bemkit.operators.hierarchy.collocation_system import boundary_border
-from bemkit.operators.hierarchy.compact_laws import CompactLaws
-from bemkit.operators.hierarchy.straight_elements import StraightElements
+from bemkit.operators.collocation.equations import CollocationEquations, collocation_border
 from bemkit.operators.hierarchy.system import turned
-from bemkit.operators.hierarchy.traction_hierarchy import TractionHierarchy
 from bemkit.operators.linear.dense import DenseLU
 from bemkit.operators.material import Material
+from bemkit.operators.matrix_free.coarse_equations import ElementGroups
+from bemkit.operators.matrix_free.compact_laws import CompactLaws
+from bemkit.operators.matrix_free.straight_elements import StraightElements
+from bemkit.operators.matrix_free.traction_hierarchy import TractionHierarchy
 
 _CHUNK = 16
 """Groups whose columns are evaluated at a time."""
@@ -111,16 +110,16 @@ def _coarse(groups: ElementGroups, material: Material, factors: FloatArray, elem
     """Factor the equations of the groups under laws (n_groups, 4, 2)."""
     n, takes_slopes = len(factors), elements.takes_slopes
     order = np.arange(n)
-    of_groups = BoundaryColumns.of(
-        groups.mesh, material, order, takes_slopes=takes_slopes, log_length=elements.constants.log_length
+    border = collocation_border(groups.mesh, material, order, takes_slopes=takes_slopes)
+    of_groups = CollocationEquations.of(
+        groups.mesh, material, order, border, takes_slopes=takes_slopes, log_length=elements.constants.log_length
     )
-    border = boundary_border(groups.mesh, material, order, takes_slopes, has_holes=True)
     balances = border.balances.reshape(-1, n, 4)
     # by columns: the LU of what is stored by rows is that of the transpose, whose pivots grow on graded groups
     matrix = np.zeros((2 * n + len(balances), 2 * n + len(balances)), order="F")
     for begin in range(0, n, _CHUNK):
         own = np.arange(begin, min(begin + _CHUNK, n))
-        entries = of_groups.entries(np.arange(2 * n), (4 * own[:, None] + np.arange(4)).ravel())
+        entries = of_groups.block(np.arange(2 * n), (4 * own[:, None] + np.arange(4)).ravel())
         of_unknowns = np.einsum("rnq,nqz->rnz", entries.reshape(2 * n, -1, 4), factors[own])
         matrix[: 2 * n, 2 * begin : 2 * begin + 2 * own.size] = of_unknowns.reshape(2 * n, -1)
     matrix[2 * n :, : 2 * n] = np.einsum("bnq,nqz->bnz", balances, factors).reshape(len(balances), -1)

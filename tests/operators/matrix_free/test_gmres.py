@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from bemkit.arrays import FloatArray
-from bemkit.operators.linear.gmres import KEPT, gmres
+from bemkit.operators.matrix_free.gmres import KEPT, gmres
 
 N = 300
 RANDOM = np.random.default_rng(0)

@@ -11,18 +11,18 @@ import bemkit as bk
 from bemkit.arrays import FloatArray
 from bemkit.geometry import BoundaryMesh
 from bemkit.model.prepared import prepare
+from bemkit.operators.collocation.equations import CollocationEquations, collocation_border
+from bemkit.operators.collocation.images import collocation_equations
 from bemkit.operators.collocation.layers import Constants
-from bemkit.operators.hierarchy.boundary_columns import BoundaryColumns
-from bemkit.operators.hierarchy.coarse_equations import ElementGroups
-from bemkit.operators.hierarchy.collocation_system import boundary_border
-from bemkit.operators.hierarchy.matrix_free import MatrixFreeSystem, NotConvergedError, WholeBoundary
-from bemkit.operators.hierarchy.preconditioner import Preconditioner
-from bemkit.operators.hierarchy.straight_elements import StraightElements, pairs
 from bemkit.operators.hierarchy.system import HierarchicalSystem, NodeConditions
-from bemkit.operators.hierarchy.traction_hierarchy import TractionHierarchy
 from bemkit.operators.linear.dense import SingularMatrixError
 from bemkit.operators.linear.solvers import MatrixFree
 from bemkit.operators.material import Material
+from bemkit.operators.matrix_free.coarse_equations import ElementGroups
+from bemkit.operators.matrix_free.preconditioner import Preconditioner
+from bemkit.operators.matrix_free.straight_elements import StraightElements, pairs
+from bemkit.operators.matrix_free.system import MatrixFreeSystem, NotConvergedError, WholeBoundary
+from bemkit.operators.matrix_free.traction_hierarchy import TractionHierarchy
 from bemkit.operators.steklov_poincare.hierarchical import HierarchicalCollocation
 from tests.operators.hierarchy.test_system import MATERIAL, SHAPES, conditions_of, graded, mesh_of, system_of
 from tests.scenes import paper
@@ -146,7 +146,7 @@ def test_what_is_not_stored_of_the_whole_boundary(name: str, slopes: bool) -> No
     mesh = mesh_of(name, 100)
     n, elements = mesh.n_elements, StraightElements.of(mesh, MATERIAL, takes_slopes=slopes)
     own = WholeBoundary.of(elements, MATERIAL)
-    stored = boundary_border(mesh, MATERIAL, np.arange(n), slopes=slopes, has_holes=True)
+    stored = collocation_border(mesh, MATERIAL, np.arange(n), takes_slopes=slopes)
     random = np.random.default_rng(1)
     unknowns, (traction, displacement) = random.standard_normal(own.n_unknowns), random.standard_normal((2, n, 2))
     equations = np.zeros(n, complex)
@@ -159,9 +159,10 @@ def test_what_is_not_stored_of_the_whole_boundary(name: str, slopes: bool) -> No
 
 def test_slopes_that_are_not_stored() -> None:
     mesh = mesh_of("hole", 100)
-    columns = BoundaryColumns.of(mesh, MATERIAL, np.arange(mesh.n_elements), takes_slopes=True)
+    equations = collocation_equations(mesh, MATERIAL, np.arange(mesh.n_elements), takes_slopes=True)
+    assert isinstance(equations, CollocationEquations)
     displacement = np.random.default_rng(0).standard_normal((mesh.n_elements, 2))
-    _, *exact = columns.densities(displacement, displacement)
+    _, *exact = equations.densities(displacement, displacement)
     found = StraightElements.of(mesh, MATERIAL, takes_slopes=True).reconstructed(displacement @ [1.0, 1j])
     np.testing.assert_allclose(found, exact, rtol=1e-12)
 

@@ -17,14 +17,14 @@ from scipy.sparse.linalg import LinearOperator
 from bemkit.arrays import ComplexArray, FloatArray, IntArray
 from bemkit.geometry.quadrature import gauss_legendre
 from bemkit.operators.collocation.compiled import layer_for
+from bemkit.operators.collocation.equations import Densities, counted
 from bemkit.operators.collocation.layers import displaced
-from bemkit.operators.hierarchy.boundary_columns import Densities, counted
 from bemkit.operators.hierarchy.clusters import Clusters, Discs
-from bemkit.operators.hierarchy.expansions import Expansions, Sources
-from bemkit.operators.hierarchy.source_series import SEPARATION, SourceSeries, order_for
-from bemkit.operators.hierarchy.straight_elements import StraightElements
 from bemkit.operators.hierarchy.tree import ClusterTree
 from bemkit.operators.linear.threads import for_each_chunk
+from bemkit.operators.matrix_free.expansions import Expansions, Sources
+from bemkit.operators.matrix_free.source_series import SEPARATION, SourceSeries, order_for
+from bemkit.operators.matrix_free.straight_elements import StraightElements
 
 if TYPE_CHECKING:
     _LinearOperator: TypeAlias = LinearOperator[np.float64]
@@ -71,7 +71,7 @@ class _Near:
 class FastMultipole(_LinearOperator):
     """(1/2 + T) u - U t in the middle of all straight elements, from their tractions t and displacements u.
 
-    As a linear operator it is (2 n_elements, 4 n_elements), numbered like `BoundaryColumns.entries`, the order
+    As a linear operator it is (2 n_elements, 4 n_elements), numbered like `BoundaryEquations.block`, the order
     of the elements being that of the mesh.
 
     Parameters

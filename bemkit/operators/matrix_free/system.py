@@ -11,14 +11,14 @@ from bemkit.arrays import ComplexArray, FloatArray, IntArray
 from bemkit.errors import NoResultError
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.operators.collocation.reciprocity import Arcs, ReciprocalField, reciprocal_fields
-from bemkit.operators.hierarchy.compact_laws import CompactLaws
-from bemkit.operators.hierarchy.fast_multipole import FastMultipole
-from bemkit.operators.hierarchy.preconditioner import Preconditioner
-from bemkit.operators.hierarchy.straight_elements import StraightElements, pairs
 from bemkit.operators.hierarchy.system import HierarchicalSystem, NodeConditions
-from bemkit.operators.linear.gmres import SingleArray, gmres
 from bemkit.operators.linear.solvers import MatrixFree
 from bemkit.operators.material import Material
+from bemkit.operators.matrix_free.compact_laws import CompactLaws
+from bemkit.operators.matrix_free.fast_multipole import FastMultipole
+from bemkit.operators.matrix_free.gmres import SingleArray, gmres
+from bemkit.operators.matrix_free.preconditioner import Preconditioner
+from bemkit.operators.matrix_free.straight_elements import StraightElements, pairs
 from bemkit.operators.rigid_modes import admissible_modes, traction_free_modes, without_motion
 
 _PRODUCTS = 1e-3
@@ -36,7 +36,7 @@ Vector: TypeAlias = FloatArray | SingleArray
 
 @dataclass(frozen=True, eq=False)
 class WholeBoundary:
-    """Unknowns and equations of the boundary as a whole, those of `collocation_system.boundary_border`.
+    """Unknowns and equations of the boundary as a whole, those of `collocation_border`.
 
     Parameters
     ----------

@@ -6,8 +6,8 @@ import numpy as np
 
 from bemkit.arrays import FloatArray
 from bemkit.contact.conditions import LinearConditions, augmented, separated, slip, stick
-from bemkit.operators.hierarchy.compact_laws import CompactLaws
 from bemkit.operators.hierarchy.element_laws import SolvedConditions, solve_for_two
+from bemkit.operators.matrix_free.compact_laws import CompactLaws
 
 N = 4
 ONE = np.ones(N)

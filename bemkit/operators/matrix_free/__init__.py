@@ -1,0 +1,1 @@
+"""The boundary equations of collocation solved by iteration, with products by the fast multipole method."""
