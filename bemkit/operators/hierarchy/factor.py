@@ -25,11 +25,8 @@ from bemkit.operators.hierarchy.equations import BoundaryEquations
 from bemkit.operators.hierarchy.known_loads import KnownLoads
 from bemkit.operators.hierarchy.skeletons import Skeleton
 from bemkit.operators.hierarchy.tree import ClusterTree
-from bemkit.operators.linear.dense import SingularMatrixError
+from bemkit.operators.linear.dense import SingularMatrixError, SmallLU
 from bemkit.operators.linear.threads import for_each_chunk
-
-_SMALLEST_PIVOT = 1e-13
-"""Pivots below this share of the largest entry of their column are round-off."""
 
 
 class SingularClusterError(SingularMatrixError):
@@ -40,27 +37,6 @@ class SingularClusterError(SingularMatrixError):
             f"a cluster of {n_elements} elements is singular: check that supports and contacts hold the body; if they "
             "do, take the linear solver 'direct'"
         )
-
-
-class _LU:
-    """Factors of a dense matrix, its columns of any size; raises `error` if it is singular."""
-
-    def __init__(self, matrix: FloatArray, error: SingularMatrixError, smallest_size: float = 0.0) -> None:
-        from scipy.linalg.lapack import dgetrf
-
-        if not matrix.size:
-            return
-        sizes = np.maximum(np.abs(matrix).max(axis=0, initial=0.0), smallest_size)
-        self._factor, self._pivots, info = dgetrf(matrix)
-        if info or np.any(np.abs(np.diagonal(self._factor)) <= _SMALLEST_PIVOT * sizes):
-            raise error
-
-    def solve(self, right: FloatArray) -> FloatArray:
-        from scipy.linalg.lapack import dgetrs
-
-        if not right.size:
-            return np.zeros(right.shape)
-        return np.asarray(dgetrs(self._factor, self._pivots, right)[0])
 
 
 @dataclass(eq=False)
@@ -102,13 +78,13 @@ class _Leaf:
         What tractions and displacements do to the equations, cause outside and add to the balances.
     of_unknowns : (2 n, n_rows + n_caused + n_border) array
         The same of the unknowns z.
-    inverse : _LU
+    inverse : SmallLU
     """
 
     factors: FloatArray
     of_quantities: FloatArray
     of_unknowns: FloatArray
-    inverse: _LU
+    inverse: SmallLU
 
 
 class Factor:
@@ -325,7 +301,7 @@ class Factor:
             both[columns - 4 * places.start, rows.size : rows.size + n_caused] = skeleton.column_map.matrix()
         both[:, rows.size + n_caused :] = self.equations.border.balances[:, 4 * places.start : 4 * places.stop].T
         of_unknowns = (factors.transpose(0, 2, 1) @ both.reshape(n, 4, -1)).reshape(2 * n, -1)
-        leaf = _Leaf(factors, both, of_unknowns, _LU(of_unknowns[:, : rows.size].T, SingularClusterError(n)))
+        leaf = _Leaf(factors, both, of_unknowns, SmallLU(of_unknowns[:, : rows.size].T, SingularClusterError(n)))
         if self.tree.n_leaves == 1:
             self._only_leaf = leaf
         return leaf
@@ -360,7 +336,7 @@ class Factor:
         felt_two[:, n_felt:] = on_two @ one.of_loads[: on_two.shape[1]]
         felt_one -= from_two[:, :n_two] @ felt_two
         left = np.eye(n_one) - from_two[:, :n_two] @ from_one[:, :n_one]
-        felt_one = _LU(left, self._singular(level, cluster), 1.0).solve(felt_one)
+        felt_one = SmallLU(left, self._singular(level, cluster), 1.0).solve(felt_one)
         felt_two -= from_one[:, :n_one] @ felt_one
         caused = []
         for each, of_rows in ((one, felt_one), (two, felt_two)):
@@ -403,4 +379,4 @@ class Factor:
     def _of_border(self, root: _Cluster) -> FloatArray:
         """Return the unknowns (n_border, k) of the boundary as a whole."""
         error = SingularMatrixError("the balance of forces is singular: check that supports and contacts hold the body")
-        return _LU(root.scattering - self.equations.border.own, error).solve(root.of_loads)
+        return SmallLU(root.scattering - self.equations.border.own, error).solve(root.of_loads)

@@ -31,6 +31,10 @@ def subtract_product(target: FloatArray, left: FloatArray, right: FloatArray) ->
     dgemm(-1.0, left, right, beta=1.0, c=target, trans_b=1, overwrite_c=1)
 
 
+_SMALLEST_PIVOT = 1e-13
+"""Pivots below this share of the largest entry of their column are round-off."""
+
+
 class SingularMatrixError(InputError):
     """A matrix that must be regular is not; the message names it."""
 
@@ -149,3 +153,34 @@ class DenseLU:
         solution = np.asarray(dgetrs(self._factor, self._pivots, right, trans=int(self._is_transposed))[0])
         solution /= self._column_sizes[(slice(None), *[None] * (solution.ndim - 1))]
         return solution
+
+
+class SmallLU:
+    """Factors of one of many small matrices, whose columns may have any size.
+
+    Parameters
+    ----------
+    matrix : (n, n) array
+    error : SingularMatrixError
+        Raised if the matrix is singular.
+    smallest_size : float
+        Columns count as at least so large.
+    """
+
+    def __init__(self, matrix: FloatArray, error: SingularMatrixError, smallest_size: float = 0.0) -> None:
+        from scipy.linalg.lapack import dgetrf
+
+        if not matrix.size:
+            return
+        sizes = np.maximum(np.abs(matrix).max(axis=0, initial=0.0), smallest_size)
+        self._factor, self._pivots, info = dgetrf(matrix)
+        if info or np.any(np.abs(np.diagonal(self._factor)) <= _SMALLEST_PIVOT * sizes):
+            raise error
+
+    def solve(self, right: FloatArray) -> FloatArray:
+        """Solve A x = right."""
+        from scipy.linalg.lapack import dgetrs
+
+        if not right.size:
+            return np.zeros(right.shape)
+        return np.asarray(dgetrs(self._factor, self._pivots, right)[0])
