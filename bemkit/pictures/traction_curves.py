@@ -10,8 +10,7 @@ from bemkit.arrays import FloatArray, IntArray
 from bemkit.contact.condensation.nodes import contact_frame
 from bemkit.contact.obstacle import measure_contact
 from bemkit.geometry.neighbours import along_boundary
-from bemkit.geometry.spaces import BoundarySpace, ConstantSpace, dof_points
-from bemkit.pictures.contact_nodes import node_points
+from bemkit.geometry.spaces import BoundarySpace, ConstantSpace
 from bemkit.pictures.shown import Result
 from bemkit.results.assembly_solution import AssemblySolution
 from bemkit.results.solution import Solution
@@ -46,7 +45,7 @@ def traction_curve(solution: Result, part: str) -> TractionCurve:
     part : str
         Name of a contact part, or of a contact of several bodies.
     """
-    body, name = _side_of(solution, part) if isinstance(solution, AssemblySolution) else (solution, part)
+    body, name = _side_with_nodes(solution, part) if isinstance(solution, AssemblySolution) else (solution, part)
     elements = along_boundary(body.mesh, body.mesh.part(name))
     xi = local_points(body)
     s = arc_length(body, elements, xi)
@@ -89,19 +88,10 @@ def _resolved(
     return TractionCurve(s, normal, tangential)
 
 
-def _side_of(solution: AssemblySolution, contact: str) -> tuple[SolvedBody, str]:
-    """Return the body and the part whose nodes decide on a contact."""
-    points = node_points(solution.contact)[solution.contact.rows(contact)]
-    sides = [side.split(".", 1) for side in contact.split(" / ") if "." in side]
-
-    def distance(side: list[str]) -> float:
-        body = solution.bodies[side[0]]
-        space = body.scene.discretisation.displacement_space(body.mesh)
-        nodes = dof_points(space)[np.unique(space.element_dofs[body.mesh.part(side[1])])]
-        return float(max(np.hypot(*(nodes - point).T).min() for point in points))
-
-    name, part = min(sides, key=distance)
-    return solution.bodies[name], part
+def _side_with_nodes(solution: AssemblySolution, contact: str) -> tuple[SolvedBody, str]:
+    """Return the body and the part with the nodes of a contact."""
+    side = solution.contact_sides[contact][0]
+    return solution.bodies[side.body], side.part
 
 
 def _directions(

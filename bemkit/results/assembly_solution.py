@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from bemkit.results.part_forces import ContactForce, RigidResult
 from bemkit.results.solved_body import BoundaryFields, SolvedBody
 from bemkit.results.solved_problem import SolvedProblem
 from bemkit.results.zone_ends import Side, ZoneEnd
-from bemkit.scene.assembly import Assembly, ContactPair, body_and_part
+from bemkit.scene.assembly import Assembly
 from bemkit.scene.scene import Scene
 
 if TYPE_CHECKING:
@@ -60,6 +60,13 @@ class BodyResult(SolvedBody):
         }
 
 
+class SideName(NamedTuple):
+    """A side of an elastic body in a contact."""
+
+    body: str
+    part: str
+
+
 @dataclass(frozen=True, eq=False, kw_only=True)
 class AssemblySolution(SolvedProblem):
     """The solution of an assembly, as `bemkit.run` returns it and result files hold it.
@@ -75,6 +82,8 @@ class AssemblySolution(SolvedProblem):
         step.
     bodies : mapping of str to BodyResult
         By name, in the order of the assembly.
+    contact_sides : mapping of str to tuple of SideName
+        The sides of elastic bodies in each contact of the table and of the assembly, first the one with the nodes.
     contact_directions : (n_contact, 2) array
         Unit vectors of u_n and sigma_n, out of the body with the node.
     friction_bound : (n_contact,) array or None [Pa]
@@ -87,6 +96,7 @@ class AssemblySolution(SolvedProblem):
 
     assembly: Assembly
     bodies: Mapping[str, BodyResult]
+    contact_sides: Mapping[str, tuple[SideName, ...]]
     contact_directions: FloatArray
     friction_bound: FloatArray | None
     contacts: tuple[ContactForce, ...]
@@ -139,7 +149,9 @@ class AssemblySolution(SolvedProblem):
     def _measured_between(self, motion: SlipHistory | None) -> dict[str, BetweenNodes]:
         from bemkit.results.between_bodies import violations_between_bodies  # mortars, which single bodies lack
 
-        return violations_between_bodies(self.assembly, self.bodies, self.rigid, self.contact, motion)
+        return violations_between_bodies(
+            self.assembly, self.bodies, self.contact_sides, self.rigid, self.contact, motion
+        )
 
     def contact_elements(self, body: str) -> IntArray:
         """Return the elements of a body that may touch other bodies or obstacles.
@@ -180,13 +192,7 @@ class AssemblySolution(SolvedProblem):
 
     def _sides_of(self, contact: str) -> list[Side]:
         """Return the sides of elastic bodies in a contact of the table: two, or one at an obstacle."""
-        pair = self._listed.get(contact)
-        names = [body_and_part(contact)] if pair is None else pair.elastic_parts
-        return [Side(body, self.bodies[body].mesh, part) for body, part in names]
-
-    @cached_property
-    def _listed(self) -> dict[str, ContactPair]:
-        return {pair.name: pair for pair in self.assembly.contacts}
+        return [Side(body, self.bodies[body].mesh, part) for body, part in self.contact_sides[contact]]
 
     def _n_sides(self, contact: str) -> int:
         return len(self._sides_of(contact))

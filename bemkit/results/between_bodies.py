@@ -17,7 +17,7 @@ from bemkit.contact.mortar.projection import mean_directions
 from bemkit.contact.mortar.segments import common_refinement, facing_points
 from bemkit.contact.mortar.sides import ContactSide
 from bemkit.geometry.placement import Placement
-from bemkit.model.assembled.contacts import carries_multipliers, reach_of
+from bemkit.model.assembled.contacts import reach_of
 from bemkit.results.between_nodes import (
     BetweenNodes,
     Interpolation,
@@ -49,6 +49,7 @@ class _Measured(NamedTuple):
 def violations_between_bodies(
     assembly: Assembly,
     bodies: Mapping[str, SolvedBody],
+    sides: Mapping[str, Sequence[tuple[str, str]]],
     rigid: Mapping[str, RigidResult],
     contact: ContactTable,
     motion: SlipHistory | None = None,
@@ -60,6 +61,8 @@ def violations_between_bodies(
     assembly : Assembly
     bodies : mapping of str to SolvedBody
         By name.
+    sides : mapping of str to sequence of (str, str)
+        Body and part of both sides of each contact, first the one with the nodes.
     rigid : mapping of str to RigidResult
         By name.
     contact : ContactTable
@@ -79,7 +82,7 @@ def violations_between_bodies(
     the heaviest. Without any contact force lengths are relative to the larger displacement of the two.
     """
     with np.errstate(all="ignore"):  # results that are not finite are measured by nan
-        stated = [*_at_obstacles(assembly, bodies, rigid), *_at_bodies(assembly, bodies)]
+        stated = [*_at_obstacles(assembly, bodies, rigid), *_at_bodies(assembly, bodies, sides)]
     forces = {name: 0.0 for name in bodies}
     stresses = dict(forces)
     size = np.hypot(contact.sigma_n, contact.sigma_t)
@@ -136,18 +139,20 @@ def _at_obstacles(
                 yield rival._replace(values=rival.values.take(nearest == k))
 
 
-def _at_bodies(assembly: Assembly, solved: Mapping[str, SolvedBody]) -> Iterator[_Measured]:
+def _at_bodies(
+    assembly: Assembly, solved: Mapping[str, SolvedBody], sides: Mapping[str, Sequence[tuple[str, str]]]
+) -> Iterator[_Measured]:
     """Yield the contacts between elastic bodies, the tractions of both sides one after the other."""
     placements = {body.name: body.placement for body in assembly.placed_bodies}
     known: dict[Hashable, _Facing] = {}
     for pair in assembly.elastic_contacts:
-        names, parts = zip(*pair.elastic_parts, strict=True)
+        names, parts = zip(*sides[pair.name], strict=True)
         one, two = (solved[name] for name in names)
         reach = reach_of(pair, one.mesh, two.mesh)
         alike = stand_alike((one.mesh, placements[names[0]]), (two.mesh, placements[names[1]]), reach)
-        key = (alike, parts, pair.multipliers_on and pair.multipliers_on == pair.sides[0])
+        key = (alike, parts)
         if key not in known:
-            known[key] = _Facing.of(pair, (one, two), parts, placements[names[0]], reach)
+            known[key] = _Facing.of((one, two), parts, placements[names[0]], reach)
         values = known[key].values((one, two), placements[names[0]], pair.gap)
         yield _Measured(pair.name, names, assembly.law_of(pair), values)
 
@@ -159,9 +164,7 @@ class _Facing:
     Parameters
     ----------
     placement : Placement
-        Of the body named first when points and vectors were computed.
-    is_swapped : bool
-        Whether the body named second has the multipliers.
+        Of the body with the multipliers when points and vectors were computed.
     sides : two Interpolation
         Of the body with the multipliers, and of the other one.
     s : (n,) array [m]
@@ -170,7 +173,6 @@ class _Facing:
     """
 
     placement: Placement
-    is_swapped: bool
     sides: tuple[Interpolation, Interpolation]
     s: FloatArray
     points: FloatArray
@@ -180,7 +182,6 @@ class _Facing:
     @classmethod
     def of(
         cls,
-        pair: ContactPair,
         bodies: tuple[SolvedBody, SolvedBody],
         parts: Sequence[str],
         placement: Placement,
@@ -190,9 +191,6 @@ class _Facing:
             ContactSide(body.scene.discretisation.displacement_space(body.mesh), body.mesh.part(part))
             for body, part in zip(bodies, parts, strict=True)
         )
-        is_swapped = not carries_multipliers(pair, one, two)
-        if is_swapped:
-            one, two, bodies = two, one, bodies[::-1]
         directions = mean_directions(one, two, reach)
         segments = common_refinement(one, two, directions, reach)
         xi = points_between(max(one.space.degree, two.space.degree))
@@ -201,7 +199,6 @@ class _Facing:
         before, half = np.cumsum(one.lengths) - one.lengths, 0.5 * one.lengths[row, None]
         return cls(
             placement,
-            is_swapped,
             (
                 Interpolation.at(bodies[0], one.elements[row], xi),
                 Interpolation.at(bodies[1], two.elements[places.partner], places.eta),
@@ -214,7 +211,7 @@ class _Facing:
 
     def values(self, bodies: tuple[SolvedBody, SolvedBody], placement: Placement, gap: float) -> PointsBetween:
         """Return clearance and tractions at the points, first with those of one side, then of the other."""
-        first, second = bodies[::-1] if self.is_swapped else bodies
+        first, second = bodies
         points = placement.forward(self.placement.back(self.points))
         directions, gaps = (
             placement.turned(self.placement.turned_back(vectors)) for vectors in (self.directions, self.gap)

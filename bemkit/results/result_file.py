@@ -20,6 +20,7 @@ stranger runs no code. The layout, version 4 (files of other versions are refuse
                          dimensionless state from which a run goes on
         displacement, traction, traction_dofs, reaction    one body after the other
         outcome          of a load history: text, all else of the step as JSON
+        scene            text, of steps that are scenes of their own: the scene or assembly of the step
     /last            the group of the last step
     /outcome         text: status, certificate, transitions, history, timings, warnings ... of the whole run as JSON;
                      there is none until the last step is finished
@@ -171,7 +172,10 @@ class ResultWriter:
             self._growing, n_written = self._begun(solution), 0
         file = self._growing.file
         for number, step in enumerate(steps[n_written:], start=n_written + 1):
-            write_step(file.create_group(_group(number)), cast(Any, step.end), step)
+            group = file.create_group(_group(number))
+            write_step(group, cast(Any, step.end), step)
+            if solution.loading is not None and solution.stated.n_steps != solution.loading.n_steps:
+                write_array(group, "scene", scene_to_toml(cast(Any, step.end).stated))
         if not steps:
             write_step(file.create_group(_group(1)), solution, None)
         self._written = steps
@@ -252,8 +256,12 @@ def _read_history(
     """Return the result of the steps in the file; `listed` has all contacts of an assembly."""
     n_steps = int(reader.attributes("steps")["n_steps"])
     groups = [f"steps/{name}" for name in reader.names("steps")]
-    problems = cast("Sequence[Scene | Assembly]", load_steps(cast(Any, asked)))
-    if not 0 < len(groups) <= len(problems) == n_steps:
+    problems = (
+        [_read_problem(reader, f"{group}/scene") for group in groups]
+        if asked.n_steps != n_steps
+        else cast("Sequence[Scene | Assembly]", load_steps(cast(Any, asked)))
+    )
+    if not 0 < len(groups) <= min(n_steps, len(problems)):
         raise InputError(f"{len(groups)} of {n_steps} steps, where {len(problems)} were asked")
     steps: list[LoadStep] = []
     whole: Any = None

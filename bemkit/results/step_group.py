@@ -20,7 +20,7 @@ from bemkit.hdf5 import Reader, write_array, write_table
 from bemkit.operators.counts import OperationCounts
 from bemkit.plan import Plan
 from bemkit.result_warning import ResultWarning
-from bemkit.results.assembly_solution import AssemblySolution, BodyResult
+from bemkit.results.assembly_solution import AssemblySolution, BodyResult, SideName
 from bemkit.results.contact_table import ContactTable, Transition
 from bemkit.results.load_history import LoadStep, StepWork
 from bemkit.results.part_forces import ContactForce, RigidResult
@@ -104,8 +104,7 @@ def read_step(
     reader: Reader, group: str, outcome: str, problem: Scene | Assembly, layout: StepLayout
 ) -> Solution | AssemblySolution:
     """Read the fields that `write_step` wrote, and the outcome at a path, as the solution of a scene or an assembly."""
-    is_assembly = isinstance(problem, Assembly)
-    names = (*_CONTACT, *_ASSEMBLY) if is_assembly else _CONTACT
+    names = (*_CONTACT, *_ASSEMBLY) if isinstance(problem, Assembly) else _CONTACT
     columns = reader.table(f"{group}/contact", floats=names, integers=("status",))
     entries = reader.json(outcome)
     table = {name: columns[name] for name in (*_CONTACT, "status")}
@@ -128,6 +127,9 @@ def read_step(
     return AssemblySolution(
         assembly=problem,
         bodies={body.name: body for body in bodies},
+        contact_sides={
+            name: tuple(SideName(*map(str, side)) for side in sides) for name, sides in entries["sides"].items()
+        },
         contact_directions=np.stack([columns[name] for name in _ASSEMBLY[:2]], axis=1),
         friction_bound=bound if entries["has_friction"] else None,
         contacts=tuple(_rows(entries["contacts"], ContactForce)),
@@ -152,6 +154,7 @@ def write_outcome(group: h5py.Group, solution: Solution | AssemblySolution, step
     if isinstance(solution, AssemblySolution):
         entries |= {
             "energies": [body.energy for body in solution.solved_bodies],
+            "sides": solution.contact_sides,
             "has_friction": solution.friction_bound is not None,
             "contacts": [asdict(contact) for contact in solution.contacts],
             "rigid": [asdict(body) for body in solution.rigid.values()],

@@ -23,7 +23,7 @@ from bemkit.model.solved_contact import with_energies_checked
 from bemkit.operators.stopwatch import Stage, StageClock
 from bemkit.plan import Plan
 from bemkit.plan.assembly_plan import plan_assembly
-from bemkit.results.assembly_solution import AssemblySolution, BodyResult
+from bemkit.results.assembly_solution import AssemblySolution, BodyResult, SideName
 from bemkit.results.contact_table import ContactTable, bound_at, find_transitions
 from bemkit.results.part_forces import RigidResult, contact_forces, nodal_resultants
 from bemkit.results.solution import BoundaryFields
@@ -161,6 +161,7 @@ def assembly_solution(
         status=result.status,
         certificate=result.certificate,
         contact=table,
+        contact_sides=_contact_sides(prepared),
         contact_directions=prepared.frame[:, 0].copy(),
         friction_bound=bound_at(table, law),
         contacts=contact_forces(table, nodal_resultants(table, prepared.frame, prepared.acting_at), transitions),
@@ -176,6 +177,15 @@ def assembly_solution(
         rigid=rigid,
     )
     return solution.with_warnings(find_warnings)
+
+
+def _contact_sides(prepared: PreparedAssembly) -> dict[str, tuple[SideName, ...]]:
+    """Return the sides of elastic bodies in each contact, first the one with the nodes."""
+    sides = {pair.name: tuple(SideName(*each) for each in pair.elastic_parts) for pair in prepared.assembly.contacts}
+    for rows in prepared.rows:
+        with_nodes = SideName(prepared.bodies[rows.body].name, rows.part)
+        sides[rows.name] = (with_nodes, *(side for side in sides.get(rows.name, ()) if side != with_nodes))
+    return sides
 
 
 def _contact_table(model: AssembledModel, state: ContactState, node_status: IntArray) -> ContactTable:

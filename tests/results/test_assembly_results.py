@@ -76,6 +76,21 @@ def test_any_program_reads_the_bodies_by_number(solution: AssemblySolution, tmp_
         assert json.loads(file["derived"][()])["contacts"][0]["force_normal"] == solution.contacts[0].force_normal
 
 
+def test_the_side_with_the_nodes_is_stored(solution: AssemblySolution, arch: AssemblySolution, tmp_path: Path) -> None:
+    for each in (solution, arch):
+        bk.write_result(tmp_path / "r.h5", each)
+        again = bk.read_result(tmp_path / "r.h5")
+        assert isinstance(again, AssemblySolution)
+        assert again.contact_sides == each.contact_sides
+        for name, (side, *_) in each.contact_sides.items():
+            body, rows = each.bodies[side.body], each.contact.rows(name)
+            space = body.scene.discretisation.displacement_space(body.mesh)
+            nodes = body.boundary.points[np.unique(space.element_dofs[body.mesh.part(side.part)])]
+            points = np.column_stack([each.contact.x, each.contact.y])[rows]
+            distances = np.linalg.norm(points[:, None] - nodes, axis=2).min(axis=1)
+            assert distances.max(initial=0.0) <= 1e-9 * body.mesh.diameter
+
+
 def test_a_file_without_a_body_is_damaged(solution: AssemblySolution, tmp_path: Path) -> None:
     bk.write_result(tmp_path / "r.h5", solution)
     with h5py.File(tmp_path / "r.h5", "r+") as file:

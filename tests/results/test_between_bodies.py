@@ -13,7 +13,7 @@ import pytest
 
 import bemkit as bk
 from bemkit.results import between_bodies
-from bemkit.results.assembly_solution import AssemblySolution
+from bemkit.results.assembly_solution import AssemblySolution, SideName
 from bemkit.results.between_nodes import BetweenNodes
 from bemkit.results.result_file import read_result, write_result
 from bemkit.results.tables import to_json
@@ -133,7 +133,11 @@ def test_a_light_contact_is_not_judged_by_a_heavy_one(pressed: AssemblySolution)
     )
     share = np.repeat([1.0, 0.01], table.n_contact)
     both = replace(both, sigma_n=share * both.sigma_n, sigma_t=share * both.sigma_t)
-    found = replace(pressed, assembly=assembly, contact=both, bodies=bodies).contacts_between_nodes
+    ((strong_name, strong_sides),) = pressed.contact_sides.items()
+    weak_sides = tuple(SideName(f"weak {side.body}", side.part) for side in strong_sides)
+    sides = {strong_name: strong_sides, pair.name: weak_sides}
+    merged = replace(pressed, assembly=assembly, contact=both, bodies=bodies, contact_sides=sides)
+    found = merged.contacts_between_nodes
     strong, light = (found[each.name].penetration for each in assembly.contacts)
     assert light == pytest.approx(100.0 * strong, rel=1e-12)
 

@@ -241,12 +241,8 @@ def _ordered(pair: ContactPair, bodies: Sequence[PlacedBody], numbers: dict[str,
         number = numbers[body]
         sides.append((number, part, ContactSide(bodies[number].space, bodies[number].mesh.part(part))))
     one, two = sides
-    return (one, two) if carries_multipliers(pair, one[2], two[2]) else (two, one)
-
-
-def carries_multipliers(pair: ContactPair, one: ContactSide, two: ContactSide) -> bool:
-    """Whether the first side of a contact carries the multipliers, and not the second."""
-    return is_non_mortar(one, two) if pair.multipliers_on is None else pair.multipliers_on == pair.sides[0]
+    is_first = is_non_mortar(one[2], two[2]) if pair.multipliers_on is None else pair.multipliers_on == pair.sides[0]
+    return (one, two) if is_first else (two, one)
 
 
 def approaches(nodes: IntArray, directions: FloatArray, frame: FloatArray, is_fixed: BoolArray) -> BoolArray:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bemkit.arrays import FloatArray
-from bemkit.results.assembly_solution import AssemblySolution
+from bemkit.results.assembly_solution import AssemblySolution, SideName
 from bemkit.results.solution import Solution
 from bemkit.testing.independent_check.balance import trusted_work
 from bemkit.testing.independent_check.check import contact_violations, is_finite, violations_of_body
@@ -93,13 +93,13 @@ def violations_of(step: Solution | AssemblySolution, before: Solution | Assembly
     return violations_of_body(step, before if isinstance(before, Solution) else None)
 
 
-def forces(joints: Joints) -> dict[str, tuple[FloatArray, float]]:
+def forces(joints: Joints) -> dict[SideName, tuple[FloatArray, float]]:
     """Return the resultant (2,) and size [N/m] of the forces on each side of the table."""
-    table, found = joints.solution.contact, dict[str, tuple[FloatArray, float]]()
+    table, found = joints.solution.contact, dict[SideName, tuple[FloatArray, float]]()
     acting = _nodal(joints)
     for name in table.parts:
         own = acting[table.rows(name)]
-        for side, sign in ((joints.owner[name], 1.0), (joints.partner(name), -1.0)):
+        for side, sign in ((joints.owner(name), 1.0), (joints.partner(name), -1.0)):
             if side is not None:
                 force, size = found.get(side, (np.zeros(2), 0.0))
                 found[side] = force + sign * own.sum(axis=0), size + float(np.abs(own).sum())
@@ -129,7 +129,7 @@ def rigid_mismatch(joints: Joints) -> float:
             distance = (table.gap[rows] - pair.gap)[:, None] * solution.contact_directions[rows]
             arm, force = points[rows] + distance - body.centre, acting[rows]
             total += [*force.sum(axis=0), float(np.sum(arm[:, 0] * force[:, 1] - arm[:, 1] * force[:, 0]))]
-            scales = joints.side(joints.owner[name]).body.scales
+            scales = joints.side(joints.owner(name)).body.scales
             size += float(np.abs(force).sum()) + scales.stress * float(table.weight[rows].min())
         reach = np.array([1.0, 1.0, max(each.result.mesh.diameter for each in joints.bodies.values())])
         reaction = np.array([found.force_x, found.force_y, found.moment])
@@ -156,8 +156,7 @@ def largest_imbalance(joints: Joints) -> float:
     """Return the largest resultant on a body [-], of its loads, contacts and forces inside."""
     total = {name: (np.zeros(2), 0.0) for name in joints.bodies}
     for name, (force, size) in forces(joints).items():
-        body = name.split(".", 1)[0]
-        total[body] = total[body][0] + force, total[body][1] + size
+        total[name.body] = total[name.body][0] + force, total[name.body][1] + size
     return max(body.imbalance(*total[name]) for name, body in joints.bodies.items())
 
 

@@ -26,11 +26,11 @@ def gap_mismatch(joints: Joints) -> float:
     length, _ = joints.units()
     for name in table.parts:
         rows = table.rows(name)
-        scales = joints.side(joints.owner[name]).body.scales
+        scales = joints.side(joints.owner(name)).body.scales
         partner = joints.partner(name)
         if partner is not None:
             gap = joints.pairs[name].gap
-            flat = measure_flat(joints.side(joints.owner[name]), joints.side(partner), gap)
+            flat = measure_flat(joints.side(joints.owner(name)), joints.side(partner), gap)
             if flat is None:
                 continue
             differences = np.abs(table.gap[rows] - flat.distance - gap)
@@ -45,7 +45,7 @@ def _from_obstacle(joints: Joints, name: str) -> FloatArray:
     """Return differences [m] of gaps from the distances of a rigid obstacle, in its position before it moves."""
     table, rows = joints.solution.contact, joints.solution.contact.rows(name)
     points = np.column_stack([table.x, table.y])[rows]
-    body, part = joints.owner[name].split(".", 1)
+    body, part = joints.owner(name)
     measured = joints.bodies[body]
     nodes = np.linalg.norm(points[:, None] - measured.result.boundary.points, axis=2).argmin(axis=1)
     normals = mean_normals(measured.fields.solution, measured.boundary, part)[nodes]
@@ -72,12 +72,12 @@ def mean_mismatch(joints: Joints) -> float:
         rows, partner = table.rows(name), joints.partner(name)
         if partner is None:
             continue
-        flat = measure_flat(joints.side(joints.owner[name]), joints.side(partner), joints.pairs[name].gap)
+        flat = measure_flat(joints.side(joints.owner(name)), joints.side(partner), joints.pairs[name].gap)
         weight = table.weight[rows]
         if flat is None or abs(weight.sum() - flat.length) > 1e-9 * flat.length:
             continue  # slivers beside nodes that others hold carry no multiplier
         sums = np.array([weight @ table.u_n[rows], weight @ table.u_t[rows]])
-        turned = max(joints.side(side).body.scales.turned for side in joints.pairs[name].sides)
+        turned = max(joints.side(side).body.scales.turned for side in joints.solution.contact_sides[name])
         worst.append(beyond(np.abs(sums - flat.means) / flat.length, turned, float(lengths[rows][0])))
     return float(np.max(worst))
 
@@ -94,7 +94,7 @@ def hidden_overlaps(joints: Joints) -> tuple[float, float]:
     """
     deepest, unsaid = [0.0], [0.0]
     for pair in joints.pairs.values():
-        one, two = (joints.side(name) for name in pair.sides)
+        one, two = (joints.side(name) for name in joints.solution.contact_sides[pair.name])
         flat = measure_flat(one, two, pair.gap)
         reach = 0.25 * min(one.body.result.mesh.diameter, two.body.result.mesh.diameter)
         overlap = sampled_overlap(one, two, pair.gap, reach) if flat is None else flat.overlap

@@ -10,13 +10,12 @@ import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray
 from bemkit.contact.laws import FrictionLaw
-from bemkit.results.assembly_solution import AssemblySolution
+from bemkit.results.assembly_solution import AssemblySolution, SideName
 from bemkit.results.contact_table import ContactTable
 from bemkit.scene.assembly import ContactPair
 from bemkit.testing.independent_check.bodies import MeasuredBody
 from bemkit.testing.independent_check.boundary import trusted_stress
 from bemkit.testing.independent_check.check import Measured, measure
-from bemkit.testing.independent_check.nodes import mean_normals
 from bemkit.testing.independent_check.sides import Side
 
 LIGHTEST = 1e-3
@@ -35,15 +34,12 @@ class Joints:
         By name, those between elastic bodies.
     moving : mapping of str to ContactPair
         By name, those with rigid bodies that move.
-    owner : mapping of str to str
-        The side ``"body.part"`` whose nodes each contact of the table has.
     """
 
     solution: AssemblySolution
     bodies: Mapping[str, MeasuredBody]
     pairs: Mapping[str, ContactPair]
     moving: Mapping[str, ContactPair]
-    owner: Mapping[str, str]
 
     @classmethod
     def of(cls, solution: AssemblySolution, before: AssemblySolution | None = None) -> Joints:
@@ -56,7 +52,7 @@ class Joints:
         moving = {pair.name: pair for pair in contacts if pair.name not in pairs}
         touched: dict[str, list[str]] = {name: [] for name in solution.bodies}
         for pair in contacts:
-            for body, part in (side.split(".", 1) for side in pair.elastic_sides):
+            for body, part in solution.contact_sides[pair.name]:
                 touched[body].append(part)
         earlier = {} if before is None else before.bodies
         views = {
@@ -65,51 +61,32 @@ class Joints:
         }
         most = max(body.largest_stress for body in views.values())
         bodies = {name: body.measured_by(LIGHTEST * most) for name, body in views.items()}
-        joints = cls(solution, bodies, pairs, moving, {})
-        owner = {name: name for name in solution.contact.parts}
-        owner |= {name: joints._owner(pairs[name]) for name in owner if name in pairs}
-        owner |= {name: moving[name].elastic_sides[0] for name in owner if name in moving}
-        return cls(solution, bodies, pairs, moving, owner)
+        return cls(solution, bodies, pairs, moving)
 
-    def _owner(self, pair: ContactPair) -> str:
-        """Return the side on which all nodes of a contact lie, out of whose body the directions point."""
-        table, own = self.solution.contact, self.solution.contact.rows(pair.name)
-        points, directions = np.column_stack([table.x, table.y])[own], self.solution.contact_directions[own]
-        misses = []
-        for name in pair.sides:
-            side = self.side(name)
-            nodes = np.unique(side.body.boundary.nodes[side.elements])
-            normals = mean_normals(side.body.fields.solution, side.body.boundary, name.split(".", 1)[1])[nodes]
-            apart = np.linalg.norm(points[:, None] - side.body.result.boundary.points[nodes], axis=2)
-            facing = np.sum(normals[apart.argmin(axis=1)] * directions, axis=1)
-            misses.append(float(apart.min(axis=1).max() / side.body.result.mesh.diameter + np.mean(facing < 0.0)))
-        return pair.sides[int(np.argmin(misses))]
+    def side(self, name: SideName) -> Side:
+        """Return the elements of a side."""
+        return Side(self.bodies[name.body], self.bodies[name.body].result.mesh.part(name.part))
 
-    def side(self, name: str) -> Side:
-        """Return the side ``"body.part"``."""
-        body, part = name.split(".", 1)
-        return Side(self.bodies[body], self.bodies[body].result.mesh.part(part))
+    def owner(self, contact: str) -> SideName:
+        """Return the side with the nodes of a contact."""
+        return self.solution.contact_sides[contact][0]
 
-    def partner(self, name: str) -> str | None:
+    def partner(self, contact: str) -> SideName | None:
         """Return the elastic side without the nodes, None of an obstacle."""
-        if name not in self.pairs:
-            return None
-        one, two = self.pairs[name].sides
-        return two if one == self.owner[name] else one
+        return next(iter(self.solution.contact_sides[contact][1:]), None)
 
     def _law(self, name: str) -> FrictionLaw:
         if pair := self.pairs.get(name) or self.moving.get(name):
             return self.solution.assembly.law_of(pair)
-        body, part = name.split(".", 1)
-        return self.solution.bodies[body].scene.laws[part]
+        side = self.owner(name)
+        return self.solution.bodies[side.body].scene.laws[side.part]
 
     def units(self) -> tuple[FloatArray, FloatArray]:
         """Return (n_contact,) lengths [m] and stresses [Pa] by which each row is measured."""
         length, stress = np.ones((2, self.solution.contact.n_contact))
         for name in self.solution.contact.parts:
-            partner = self.partner(name)
-            sides = [side for side in (self.owner[name], partner) if side is not None]
-            bodies = [self.bodies[side.split(".", 1)[0]] for side in sides]
+            sides = self.solution.contact_sides[name]
+            bodies = [self.bodies[side.body] for side in sides]
             scales = [body.scales for body in bodies]
             # a body that moves far passes on what is round-off there
             trusted = max(trusted_stress(body.fields.solution, body.fields.before) for body in bodies)
@@ -138,7 +115,7 @@ class Joints:
 
     def _is_supported(self, name: str) -> BoolArray:
         """Return which nodes of a contact a support holds, or another obstacle of the body shares."""
-        side, table = self.side(self.owner[name]), self.solution.contact
+        side, table = self.side(self.owner(name)), self.solution.contact
         points = np.column_stack([table.x, table.y])[table.rows(name)]
         nodes = side.body.supported_nodes()
         if name not in self.pairs:
