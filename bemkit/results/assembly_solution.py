@@ -13,7 +13,7 @@ from bemkit.arrays import FloatArray, IntArray
 from bemkit.contact.body import SlipHistory
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.results.between_nodes import BetweenNodes
-from bemkit.results.contact_table import resolved_transitions
+from bemkit.results.contact_table import resolved_transitions, single_contacts
 from bemkit.results.part_forces import ContactForce, RigidResult
 from bemkit.results.solved_body import BoundaryFields, SolvedBody
 from bemkit.results.solved_problem import SolvedProblem
@@ -194,18 +194,20 @@ class AssemblySolution(SolvedProblem):
         """Return the sides of elastic bodies in a contact of the table: two, or one at an obstacle."""
         return [Side(body, self.bodies[body].mesh, part) for body, part in self.contact_sides[contact]]
 
-    def _n_sides(self, contact: str) -> int:
+    def n_sides(self, contact: str) -> int:
+        """Return how many elastic bodies carry the tractions of a contact."""
         return len(self._sides_of(contact))
 
     @cached_property
     def zone_ends(self) -> tuple[ZoneEnd, ...]:
-        """Where zones of one status end, on all sides, as far as they are resolved; see `resolved_transitions`."""
+        """Where zones of one status end, on all sides, and where contact is missed or a single node.
+
+        See `resolved_transitions`, `missed_contacts` and `single_contacts`.
+        """
         resolved = resolved_transitions(self.contact, self.transitions)
-        return tuple(
-            side.near(np.array([transition.x, transition.y]))
-            for transition in resolved
-            for side in self._sides_of(transition.part)
-        )
+        places = [(each.part, (each.x, each.y)) for each in resolved]
+        places += [*single_contacts(self.contact), *self.missed_contacts.items()]
+        return tuple(side.near(np.array(place)) for name, place in places for side in self._sides_of(name))
 
     @cached_property
     def _edges(self) -> list[tuple[Side, Side, FloatArray, ZoneEnd]]:

@@ -4,34 +4,36 @@ from __future__ import annotations
 
 from collections.abc import Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property, partial
 from typing import NamedTuple
 
 import numpy as np
 
-from bemkit.arrays import FloatArray
+from bemkit.arrays import FloatArray, IntArray
 from bemkit.contact.body import SlipHistory
 from bemkit.contact.condensation.nodes import contact_frame
 from bemkit.contact.laws import FrictionLaw
 from bemkit.contact.mortar.congruent import stand_alike
 from bemkit.contact.mortar.projection import mean_directions
-from bemkit.contact.mortar.segments import common_refinement, facing_points
+from bemkit.contact.mortar.segments import Segments, common_refinement, facing_points
 from bemkit.contact.mortar.sides import ContactSide
 from bemkit.geometry.placement import Placement
 from bemkit.model.assembled.contacts import reach_of
 from bemkit.results.between_nodes import (
     BetweenNodes,
     Interpolation,
-    PointsBetween,
     law_between,
-    points_at_obstacle,
     points_between,
+    sample_at_obstacle,
     violations_at,
 )
 from bemkit.results.contact_table import ContactTable
+from bemkit.results.least_clearance import PointsBetween, Sample, nearest_only, with_least_clearances
 from bemkit.results.part_forces import RigidResult
 from bemkit.results.solved_body import SolvedBody
 from bemkit.scene.assembly import Assembly, ContactPair
 from bemkit.scene.conditions import Contact
+from bemkit.scene.plane_motion import RigidBody
 
 _LIGHTEST = 1e-3
 """A body that carries less than this share of what the others carry is measured by this share."""
@@ -117,26 +119,29 @@ def _at_obstacles(
         if pair.rigid_body is not None:
             moving.setdefault(pair.elastic_parts[0][0], []).append(pair)
     for owner, body in bodies.items():
-        scene = body.scene
-        facing: dict[str, list[_Measured]] = {}
+        scene, mesh = body.scene, body.mesh
+        facing: dict[str, list[tuple[str, FrictionLaw, Sample]]] = {}
         for part in scene.parts:
             if isinstance(part.condition, Contact):
-                values = points_at_obstacle(body, part.condition.obstacle, body.mesh.part(part.name))
-                name = f"{owner}.{part.name}"
-                facing.setdefault(part.name, []).append(_Measured(name, (owner,), scene.laws[part.name], values))
+                sample = sample_at_obstacle(body, part.condition.obstacle, mesh.part(part.name))
+                facing.setdefault(part.name, []).append((f"{owner}.{part.name}", scene.laws[part.name], sample))
         for pair in moving.get(owner, ()):
             part_name = pair.elastic_parts[0][1]
-            stated = assembly.rigid_body_of(pair)
-            values = points_at_obstacle(body, stated.obstacle, body.mesh.part(part_name))
-            motion = rigid[str(pair.rigid_body)]
-            moved = stated.motions_at(values.points) @ np.array([motion.x, motion.y, motion.turn])
-            clearance = values.clearance + pair.gap + np.sum(moved * values.directions, axis=1)
-            values = values._replace(clearance=clearance)
-            facing.setdefault(part_name, []).append(_Measured(pair.name, (owner,), assembly.law_of(pair), values))
-        for rivals in facing.values():
-            nearest = np.argmin([rival.values.clearance for rival in rivals], axis=0)
-            for k, rival in enumerate(rivals):
-                yield rival._replace(values=rival.values.take(nearest == k))
+            shift = partial(_moved, assembly.rigid_body_of(pair), rigid[str(pair.rigid_body)])
+            obstacle = assembly.rigid_body_of(pair).obstacle
+            sample = sample_at_obstacle(body, obstacle, mesh.part(part_name), pair.gap, shift)
+            facing.setdefault(part_name, []).append((pair.name, assembly.law_of(pair), sample))
+        xi = points_between(scene.discretisation.displacement_space(mesh).degree)
+        for part_name, rivals in facing.items():
+            samples = [sample for _, _, sample in rivals]
+            for k, (name, law, _) in enumerate(rivals):
+                values = with_least_clearances(nearest_only(samples, k), mesh.part(part_name).size, xi)
+                yield _Measured(name, (owner,), law, values)
+
+
+def _moved(stated: RigidBody, motion: RigidResult, points: FloatArray) -> FloatArray:
+    """Return the displacements (n, 2) [m] of a rigid body at points (n, 2)."""
+    return np.asarray(stated.motions_at(points) @ np.array([motion.x, motion.y, motion.turn]))
 
 
 def _at_bodies(
@@ -165,19 +170,24 @@ class _Facing:
     ----------
     placement : Placement
         Of the body with the multipliers when points and vectors were computed.
-    sides : two Interpolation
-        Of the body with the multipliers, and of the other one.
-    s : (n,) array [m]
-    points, directions, gap : (n, 2) arrays
-        The gap is the vector from one side to the other.
+    sides : two ContactSide
+        That of the body with the multipliers, and the other one.
+    bodies : two SolvedBody
+        In the same order.
+    directions : (n_knots, 2) array
+        Of the projection.
+    segments : Segments
+        That face the other side.
+    xi : (q,) array
+        Points on each.
     """
 
     placement: Placement
-    sides: tuple[Interpolation, Interpolation]
-    s: FloatArray
-    points: FloatArray
+    sides: tuple[ContactSide, ContactSide]
+    bodies: tuple[SolvedBody, SolvedBody]
     directions: FloatArray
-    gap: FloatArray
+    segments: Segments
+    xi: FloatArray
 
     @classmethod
     def of(
@@ -194,36 +204,81 @@ class _Facing:
         directions = mean_directions(one, two, reach)
         segments = common_refinement(one, two, directions, reach)
         xi = points_between(max(one.space.degree, two.space.degree))
-        places = facing_points(segments, one, two, directions, xi, np.ones_like(xi))
+        return cls(placement, (one, two), bodies, directions, segments.covered(), xi)
+
+    @cached_property
+    def _whole(self) -> _FacingPoints:
+        n = self.segments.row.size
+        return self.at(np.arange(n), np.full(n, -1.0), np.ones(n))
+
+    def at(self, pieces: IntArray, low: FloatArray, high: FloatArray) -> _FacingPoints:
+        """Return the points of intervals of pieces, and what they face."""
+        one, two = self.sides
+        segments = self.segments.within(pieces, low, high)
+        places = facing_points(segments, one, two, self.directions, self.xi, np.ones_like(self.xi))
         xi, row = places.xi, places.row
         before, half = np.cumsum(one.lengths) - one.lengths, 0.5 * one.lengths[row, None]
-        return cls(
-            placement,
+        return _FacingPoints(
             (
-                Interpolation.at(bodies[0], one.elements[row], xi),
-                Interpolation.at(bodies[1], two.elements[places.partner], places.eta),
+                Interpolation.at(self.bodies[0], one.elements[row], xi),
+                Interpolation.at(self.bodies[1], two.elements[places.partner], places.eta),
             ),
             (before[row, None] + half * (1.0 + xi)).ravel(),
             one.points(row, xi).reshape(-1, 2),
-            np.asarray(one.directions(directions, row, xi)).reshape(-1, 2),
+            np.asarray(one.directions(self.directions, row, xi)).reshape(-1, 2),
             places.gap.reshape(-1, 2),
         )
 
     def values(self, bodies: tuple[SolvedBody, SolvedBody], placement: Placement, gap: float) -> PointsBetween:
-        """Return clearance and tractions at the points, first with those of one side, then of the other."""
-        first, second = bodies
-        points = placement.forward(self.placement.back(self.points))
+        """Return clearance and tractions at points of the sides, first with those of one side, then of the other."""
+        n = self.segments.row.size
+        one_sided = [
+            with_least_clearances(partial(self._sample, side, bodies, placement, gap), n, self.xi) for side in (0, 1)
+        ]
+        return PointsBetween(*(np.concatenate(columns) for columns in zip(*one_sided, strict=True)))
+
+    def _sample(
+        self,
+        side: int,
+        bodies: tuple[SolvedBody, SolvedBody],
+        placement: Placement,
+        gap: float,
+        pieces: IntArray,
+        low: FloatArray,
+        high: FloatArray,
+    ) -> PointsBetween:
+        """Return clearance at points of intervals of pieces, and the tractions of one of the sides, 0 or 1."""
+        is_whole = bool(np.all(high - low == 2.0))
+        at = self._whole if is_whole else self.at(pieces, low, high)
+        points = placement.forward(self.placement.back(at.points))
         directions, gaps = (
-            placement.turned(self.placement.turned_back(vectors)) for vectors in (self.directions, self.gap)
+            placement.turned(self.placement.turned_back(vectors)) for vectors in (at.directions, at.gap)
         )
-        one, two = self.sides
-        gaps = gaps - one.displacement(first).reshape(-1, 2) + two.displacement(second).reshape(-1, 2)
-        traction = np.concatenate([one.traction(first), -two.traction(second)]).reshape(-1, 2)
-        both = np.tile(directions, (2, 1))
-        return PointsBetween(
-            np.tile(points, (2, 1)),
-            np.tile(self.s, 2),
-            both,
-            np.tile(gap + np.sum(gaps * directions, axis=1), 2),
-            *np.einsum("nkc,nc->kn", contact_frame(both), traction),
+        displacements = (
+            fields.displacement(body).reshape(-1, 2) for fields, body in zip(at.fields, bodies, strict=True)
         )
+        one, two = displacements
+        clearance = gap + np.sum((gaps - one + two) * directions, axis=1)
+        traction = (1.0, -1.0)[side] * at.fields[side].traction(bodies[side]).reshape(-1, 2)
+        sigma_n, sigma_t = np.einsum("nkc,nc->kn", contact_frame(directions), traction)
+        step = sum(fields.step(body).ravel() for fields, body in zip(at.fields, bodies, strict=True))
+        return PointsBetween(points, at.s, directions, clearance, sigma_n, sigma_t, np.asarray(step))
+
+
+class _FacingPoints(NamedTuple):
+    """Points of two sides that face each other.
+
+    Parameters
+    ----------
+    fields : two Interpolation
+        Of the body with the multipliers, and of the other one.
+    s : (n,) array [m]
+    points, directions, gap : (n, 2) arrays
+        The gap is the vector from one side to the other.
+    """
+
+    fields: tuple[Interpolation, Interpolation]
+    s: FloatArray
+    points: FloatArray
+    directions: FloatArray
+    gap: FloatArray

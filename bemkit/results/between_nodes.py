@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import asdict, dataclass
-from typing import NamedTuple
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
 
 import numpy as np
 
-from bemkit.arrays import BoolArray, FloatArray, IntArray
+from bemkit.arrays import FloatArray, IntArray
 from bemkit.contact.body import SlipHistory
 from bemkit.contact.condensation.nodes import contact_frame
 from bemkit.contact.laws import FrictionLaw
@@ -16,7 +15,9 @@ from bemkit.contact.obstacle import Obstacle, measure_contact
 from bemkit.geometry.local_values import from_own_nodes
 from bemkit.geometry.neighbours import along_boundary
 from bemkit.geometry.spaces import BoundarySpace
-from bemkit.results.contact_table import ContactTable
+from bemkit.geometry.vectors import norms
+from bemkit.results.contact_table import ContactTable, free_contacts
+from bemkit.results.least_clearance import PointsBetween, Sample, deepest, with_least_clearances
 from bemkit.results.solved_body import SolvedBody
 from bemkit.scene.conditions import Contact
 
@@ -24,8 +25,15 @@ _SAME_POINT = 1e-9
 """Distance of neighbouring points, relative to the next one, below which they are one point: the end of an element."""
 _POINTS_PER_NODE = 4
 """Points on an element for each of its nodes: a polynomial is larger between them by a few per cent at most."""
+_NOWHERE = (float("nan"), float("nan"))
+_NUMBERS = ("penetration", "tension", "complementarity", "cone_excess", "penetration_depth")
 _ROUND_OFF = 64.0 * float(np.finfo(float).eps)
 """Round-off of clearances, which are differences of coordinates, relative to the largest coordinate."""
+LARGEST_MISSED = 0.05
+"""Overlap at points without traction, relative to the displacement that contact forces cause, up to which it belongs to
+the end of a contact zone inside an element."""
+_FREE_ROUND_OFF = 1e-12
+"""Overlap of a contact without any force, relative to how far its bodies move, that may be round-off."""
 
 
 @dataclass(frozen=True)
@@ -48,6 +56,14 @@ class BetweenNodes:
         ``|sigma_t| - bound(sigma_n)`` where positive, relative to the largest contact traction.
     penetration_depth : float [m]
         ``u_n - g`` where positive, and more than round-off of coordinates.
+    place : tuple of float, optional
+        The point of the boundary where that is.
+    missed : float
+        The penetration at points without traction, where contact is missed, beyond the steps of constant elements.
+    missed_place : tuple of float, optional
+        The point of the boundary where that is.
+    apart : float
+        The least distance of the sides, relative to the same displacement, where they touch nowhere.
     """
 
     penetration: float
@@ -55,6 +71,10 @@ class BetweenNodes:
     complementarity: float
     cone_excess: float
     penetration_depth: float
+    place: tuple[float, float] = _NOWHERE
+    missed: float = 0.0
+    missed_place: tuple[float, float] = _NOWHERE
+    apart: float = 0.0
 
     @property
     def violations(self) -> dict[str, float]:
@@ -67,12 +87,12 @@ class BetweenNodes:
         return float(np.max(list(self.violations.values())))
 
     def as_dict(self) -> dict[str, float]:
-        """Return all numbers by name."""
-        return asdict(self)
+        """Return the violations and the depth by name."""
+        return {name: getattr(self, name) for name in _NUMBERS}
 
     @classmethod
     def largest(cls, measured: Iterable[BetweenNodes]) -> BetweenNodes | None:
-        """Return the largest of each violation; None if `measured` is empty."""
+        """Return the largest of each violation, without places; None if `measured` is empty."""
         rows = [list(violations.as_dict().values()) for violations in measured]
         return cls(*np.max(rows, axis=0).tolist()) if rows else None
 
@@ -109,52 +129,60 @@ def violations_between_nodes(
     for part in scene.parts:
         if isinstance(part.condition, Contact) and (elements := mesh.part(part.name)).size:  # none beyond a symmetry
             with np.errstate(all="ignore"):  # results that are not finite are measured by nan
-                points = points_at_obstacle(body, part.condition.obstacle, elements)
+                sample = sample_at_obstacle(body, part.condition.obstacle, elements)
+                points = with_least_clearances(sample, elements.size, points_between(_degree(body)))
                 law = law_between(scene.laws[part.name], points, contact, part.name, motion)
                 violations[part.name] = violations_at(points, law, stress, length)
     return violations
 
 
-class PointsBetween(NamedTuple):
-    """Clearance and tractions at points of a contact, in (n, t) components.
+def points_at_obstacle(body: SolvedBody, obstacle: Obstacle, elements: IntArray) -> PointsBetween:
+    """Return clearance and tractions at points of elements (m,) that face a rigid obstacle at rest."""
+    sample = sample_at_obstacle(body, obstacle, elements)
+    return sample(np.arange(elements.size), np.full(elements.size, -1.0), np.ones(elements.size))
+
+
+def sample_at_obstacle(
+    body: SolvedBody,
+    obstacle: Obstacle,
+    elements: IntArray,
+    gap: float = 0.0,
+    shift: Callable[[FloatArray], FloatArray] | None = None,
+) -> Sample:
+    """Return the function that measures clearance and tractions on elements (m,) that face a rigid obstacle.
 
     Parameters
     ----------
-    points : (n, 2) array [m]
-    s : (n,) array [m]
-        Arc length from the start of the side.
-    directions : (n, 2) array
-        Of contact, out of the body.
-    clearance : (n,) array [m]
-    sigma_n, sigma_t : (n,) arrays [Pa]
+    body : SolvedBody
+    obstacle : Obstacle
+    elements : (m,) int array
+    gap : float [m]
+        Added to the distance.
+    shift : callable, optional
+        Points (n, 2) -> displacements (n, 2) [m] of the obstacle there; none by default.
     """
-
-    points: FloatArray
-    s: FloatArray
-    directions: FloatArray
-    clearance: FloatArray
-    sigma_n: FloatArray
-    sigma_t: FloatArray
-
-    def take(self, rows: BoolArray) -> PointsBetween:
-        """Return some of the points."""
-        return PointsBetween(*(column[rows] for column in self))
-
-
-def points_at_obstacle(body: SolvedBody, obstacle: Obstacle, elements: IntArray) -> PointsBetween:
-    """Return clearance and tractions at points of elements (m,) that face a rigid obstacle, before it moves."""
     mesh = body.mesh
     elements = along_boundary(mesh, elements)
-    xi = points_between(body.scene.discretisation.displacement_space(mesh).degree)
-    points = mesh.points(elements, xi).reshape(-1, 2)
-    gap, directions = measure_contact(obstacle, points, mesh.normals_at(elements, xi).reshape(-1, 2))
-    at = np.broadcast_to(xi, (elements.size, xi.size))
-    lengths = mesh.lengths[elements]
-    s = (np.cumsum(lengths) - lengths)[:, None] + 0.5 * lengths[:, None] * (xi + 1.0)
-    fields, frame = Interpolation.at(body, elements, at), contact_frame(directions)
-    u_n, _ = np.einsum("nkc,nc->kn", frame, fields.displacement(body).reshape(-1, 2))
-    sigma_n, sigma_t = np.einsum("nkc,nc->kn", frame, fields.traction(body).reshape(-1, 2))
-    return PointsBetween(points, s.ravel(), directions, gap - u_n, sigma_n, sigma_t)
+    xi, lengths = points_between(_degree(body)), mesh.lengths[elements]
+    starts = np.cumsum(lengths) - lengths
+
+    def sample(pieces: IntArray, low: FloatArray, high: FloatArray) -> PointsBetween:
+        chosen, at = elements[pieces], 0.5 * (low + high)[:, None] + 0.5 * (high - low)[:, None] * xi
+        points = mesh.points(chosen, at).reshape(-1, 2)
+        distance, directions = measure_contact(obstacle, points, mesh.normals_at(chosen, at).reshape(-1, 2))
+        fields, frame = Interpolation.at(body, chosen, at), contact_frame(directions)
+        moved = fields.displacement(body).reshape(-1, 2) - (0.0 if shift is None else shift(points))
+        u_n, _ = np.einsum("nkc,nc->kn", frame, moved)
+        sigma_n, sigma_t = np.einsum("nkc,nc->kn", frame, fields.traction(body).reshape(-1, 2))
+        s = starts[pieces, None] + 0.5 * lengths[pieces, None] * (at + 1.0)
+        clearance, step = gap + distance - u_n, fields.step(body).ravel()
+        return PointsBetween(points, s.ravel(), directions, clearance, sigma_n, sigma_t, step)
+
+    return sample
+
+
+def _degree(body: SolvedBody) -> int:
+    return body.scene.discretisation.displacement_space(body.mesh).degree
 
 
 @dataclass(frozen=True, eq=False)
@@ -188,6 +216,16 @@ class Interpolation:
         """Return displacements (m, q, 2) [m]."""
         return np.asarray(self.of_displacement @ body.boundary.displacement[self.dofs])
 
+    def step(self, body: SolvedBody) -> FloatArray:
+        """Return half of the largest jump (m, q) [m] of constant elements to a neighbour; zero of other elements."""
+        mesh, steps = body.mesh, np.zeros(body.mesh.n_elements)
+        if self.dofs.shape[1] == 1:
+            before, after = mesh.node_elements[(mesh.node_elements >= 0).all(axis=1)].T
+            jumps = 0.5 * norms(body.boundary.displacement[after] - body.boundary.displacement[before])
+            for elements in (before, after):
+                np.maximum.at(steps, elements, jumps)
+        return np.broadcast_to(steps[self.elements, None], self.of_traction.shape[:2])
+
     def traction(self, body: SolvedBody) -> FloatArray:
         """Return tractions (m, q, 2) [Pa]."""
         at_nodes = body.boundary.traction_dofs.reshape(body.mesh.n_elements, -1, 2)
@@ -218,34 +256,39 @@ def violations_at(values: PointsBetween, law: FrictionLaw, stress: float, length
     # friction given across the gap is no sign of contact
     shear = 0.0 if law.acts_across_gap else np.abs(values.sigma_t)
     traction = np.maximum(np.abs(values.sigma_n), shear) / stress
-    depth = _deepest(values)
-    depth = 0.0 if depth <= _ROUND_OFF * _largest(np.abs(values.points)) else depth
+    round_off = _ROUND_OFF * _largest(np.abs(values.points))
+    free = values.take(values.is_free)
+    free = free._replace(clearance=free.clearance + free.step)
+    (depth, place), (missed_depth, missed_place) = (
+        (0.0 if depth <= round_off else depth, (float(point[0]), float(point[1])))
+        for depth, point in (deepest(values), deepest(free))
+    )
     return BetweenNodes(
         penetration=depth / length,
         tension=_largest(values.sigma_n) / stress,
         complementarity=_largest(np.minimum(traction, np.abs(values.clearance) / length)),
         cone_excess=_largest(np.abs(values.sigma_t) - bound) / stress,
         penetration_depth=depth,
+        place=place,
+        missed=missed_depth / length,
+        missed_place=missed_place,
+        apart=max(float(values.clearance.min()), 0.0) / length if values.clearance.size else 0.0,
     )
 
 
-def _deepest(values: PointsBetween) -> float:
-    """Return the largest penetration [m]: where the parabola through the deepest point and those beside it has its end.
+def missed_contacts(table: ContactTable, measured: Mapping[str, BetweenNodes]) -> dict[str, tuple[float, float]]:
+    """Return the points where sides overlap without any traction, by contact.
 
-    The points know a polynomial to some per cent of its range on an element. That may be all of a penetration where it
-    crosses zero there.
+    Of a contact without any force every overlap counts that is no round-off; of others those that exceed a share of the
+    displacement that contact forces cause.
     """
-    deepest = _largest(-values.clearance)
-    k = int(np.argmin(values.clearance)) if values.clearance.size else 0
-    if not deepest > 0.0 or not 0 < k < values.clearance.size - 1:
-        return deepest
-    (before, after), clearance = np.diff(values.s[k - 1 : k + 2]), values.clearance[k - 1 : k + 2]
-    if not min(before, after) > _SAME_POINT * max(before, after):  # the end of an element
-        return deepest
-    fall, rise = -np.diff(clearance) / (before, after)
-    curvature, slope = (rise - fall) / (before + after), (fall * after + rise * before) / (before + after)
-    is_between = curvature < 0.0 and -before <= -0.5 * slope / curvature <= after  # its end, off the deepest point
-    return deepest - float(0.25 * slope**2 / curvature) if is_between else deepest
+    free, missed = free_contacts(table), {}
+    for name, each in measured.items():
+        if name in free and each.penetration > _FREE_ROUND_OFF:
+            missed[name] = each.place
+        elif name not in free and each.missed > LARGEST_MISSED:
+            missed[name] = each.missed_place
+    return missed
 
 
 def points_between(degree: int) -> FloatArray:

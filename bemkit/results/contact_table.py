@@ -260,6 +260,22 @@ def resolved_transitions(contact: ContactTable, transitions: Sequence[Transition
     return tuple(resolved)
 
 
+def free_contacts(table: ContactTable) -> set[str]:
+    """Return the names of the contacts without any force."""
+    return {name for name in table.parts if not table.sigma_n[table.rows(name)].any()}
+
+
+def single_contacts(contact: ContactTable) -> list[tuple[str, tuple[float, float]]]:
+    """Return the parts and points of single nodes in contact between separated ones, which resolve no zone.
+
+    The next mesh keeps a node there, else it may miss the contact.
+    """
+    is_pressed, joined = contact.sigma_n < 0.0, contact.is_joined
+    is_free = np.append(False, joined & ~is_pressed[:-1]) & np.append(joined & ~is_pressed[1:], False)
+    rows = np.flatnonzero(is_pressed & is_free).tolist()
+    return [(str(contact.part[k]), (float(contact.x[k]), float(contact.y[k]))) for k in rows]
+
+
 def _kept_apart(contact: ContactTable, changes: list[int], places: FloatArray) -> FloatArray:
     """Return the arc lengths of transitions, halfway between their nodes where `places` leave too little of a zone."""
     result = places.copy()

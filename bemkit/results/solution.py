@@ -18,7 +18,7 @@ from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.results.between_nodes import BetweenNodes, violations_between_nodes
 from bemkit.results.contact_table import ContactTable as ContactTable
 from bemkit.results.contact_table import Transition as Transition
-from bemkit.results.contact_table import bound_at, resolved_transitions
+from bemkit.results.contact_table import bound_at, resolved_transitions, single_contacts
 from bemkit.results.solved_body import BoundaryFields as BoundaryFields
 from bemkit.results.solved_body import SolvedBody
 from bemkit.results.solved_problem import SolvedProblem
@@ -154,11 +154,16 @@ class Solution(SolvedProblem, SolvedBody):
 
     @cached_property
     def zone_ends(self) -> tuple[ZoneEnd, ...]:
-        """Where zones of one status end, as far as they are resolved; see `resolved_transitions`."""
-        from bemkit.results.zone_ends import zone_end
+        """Where zones of one status end, as far as they are resolved, and where contact is missed or a single node.
+
+        See `resolved_transitions`, `missed_contacts` and `single_contacts`.
+        """
+        from bemkit.results.zone_ends import Side, zone_end
 
         resolved = resolved_transitions(self.contact, self.transitions)
-        return tuple(zone_end(self.mesh, self.contact, each) for each in resolved)
+        places = (*single_contacts(self.contact), *self.missed_contacts.items())
+        missed = (Side("", self.mesh, part).near(np.array(place)) for part, place in places)
+        return (*(zone_end(self.mesh, self.contact, each) for each in resolved), *missed)
 
     @cached_property
     def reversal_ends(self) -> tuple[ZoneEnd, ...]:

@@ -17,8 +17,8 @@ from bemkit.notebook import ShownInNotebooks
 from bemkit.operators.counts import OperationCounts
 from bemkit.plan import Plan
 from bemkit.result_warning import ResultWarning, without_duplicates
-from bemkit.results.between_nodes import BetweenNodes
-from bemkit.results.contact_table import ContactTable, Transition
+from bemkit.results.between_nodes import BetweenNodes, missed_contacts
+from bemkit.results.contact_table import ContactTable, Transition, free_contacts
 from bemkit.results.load_history import LoadHistory, step_rows
 from bemkit.results.solved_body import SolvedBody
 from bemkit.results.when_asked import WhenAsked
@@ -103,7 +103,7 @@ class SolvedProblem(ShownInNotebooks):
         """Return the corners of one of the bodies at which contact tractions grow without bound."""
         raise NotImplementedError
 
-    def _n_sides(self, contact: str) -> int:
+    def n_sides(self, contact: str) -> int:
         """Return how many elastic bodies carry the tractions of a contact."""
         return 1
 
@@ -162,8 +162,10 @@ class SolvedProblem(ShownInNotebooks):
         """Estimated error of all bodies in the energy norm, sqrt(a(u - u_h, u - u_h) / a(u_h, u_h)).
 
         None without an estimate, and where the energy is not positive, so that an error is measured against nothing;
-        zero of bodies at rest, or that only move as a whole.
+        zero of bodies at rest, or that only move as a whole. None, too, while contact is missed that no node meets.
         """
+        if self.wrongly_free:
+            return None
         errors = [float(np.sum(body.element_errors)) for body in self.solved_bodies if body.element_errors is not None]
         unit = sum(body.error_unit for body in self.solved_bodies)
         if len(errors) < len(self.solved_bodies):
@@ -177,7 +179,7 @@ class SolvedProblem(ShownInNotebooks):
         """L2 norm of the contact tractions of all bodies [Pa m^(1/2)]; those between two bodies count for both."""
         table = self.contact
         squared = table.weight * (table.sigma_n**2 + table.sigma_t**2)
-        return float(np.sqrt(sum(self._n_sides(name) * squared[table.rows(name)].sum() for name in table.parts)))
+        return float(np.sqrt(sum(self.n_sides(name) * squared[table.rows(name)].sum() for name in table.parts)))
 
     @property
     def units(self) -> UnitNames | None:
@@ -206,6 +208,17 @@ class SolvedProblem(ShownInNotebooks):
     def contacts_between_nodes(self) -> dict[str, BetweenNodes]:
         """Largest violations between the nodes of each contact, by its name in the contact table."""
         return self._measured_between(None if self.loading is None else self.loading.motion)
+
+    @cached_property
+    def missed_contacts(self) -> dict[str, tuple[float, float]]:
+        """Points where contact is missed, because no node meets it, by contact; see `bemkit.results.missed_contact`."""
+        return missed_contacts(self.contact, self.contacts_between_nodes)
+
+    @cached_property
+    def wrongly_free(self) -> dict[str, tuple[float, float]]:
+        """The missed contacts without any force; nothing is measured if each contact has a force."""
+        free = free_contacts(self.contact)
+        return {name: place for name, place in self.missed_contacts.items() if name in free} if free else {}
 
     @property
     def unasked_warnings(self) -> Any:

@@ -13,6 +13,9 @@ from bemkit.results.solved_problem import AnySolution, with_totals
 from bemkit.scene.mesh_options import MOST_ELEMENTS, MeshOptions
 from bemkit.solvers.base import Status
 
+_MOST_MISSED = 12
+"""Meshes whose nodes meet no contact, each of which has nodes where the one before missed it."""
+
 
 class SizedLevel(Protocol):
     """What is solved next, in the form that a `Refinement` keeps."""
@@ -100,10 +103,13 @@ def refined(
             break
         solutions.append(solution)
         now = time.perf_counter()
-        if not solution.is_converged:
+        is_missed = solution.status is Status.MISSED_CONTACT
+        if sum(each.status is Status.MISSED_CONTACT for each in solutions) > _MOST_MISSED:
+            obstacle = f"contact lies between the nodes of {len(solutions)} meshes"
+        elif not solution.is_converged and not is_missed:
             worst, word = solution.certificate.worst, solution.status.name.lower().replace("_", " ")
             obstacle = f"the solve on {solution.n_elements} elements ended {word} (certificate {worst:.1e})"
-        elif refinement.is_enough(solutions):
+        elif not (is_missed or solution.missed_contacts) and refinement.is_enough(solutions):
             break
         else:
             try:

@@ -16,6 +16,7 @@ from bemkit.operators.linear.threads import blas_threads_for
 from bemkit.operators.stopwatch import Stage, StageClock, announce, assembly_time
 from bemkit.plan import Plan, announce_plan, check_memory
 from bemkit.results.load_history import LoadHistory, LoadStep
+from bemkit.results.missed_contact import with_missed_contact_named
 from bemkit.results.solved_problem import following
 from bemkit.runs.load_path import Callback, Path, ReachedStep, Standing, reach
 from bemkit.scene.load_history import AnyScene, load_steps
@@ -229,6 +230,7 @@ def solve_steps(
             break
         with np.errstate(over="ignore", invalid="ignore"):  # the status says what is not finite
             solution = kind.solution(model, result, plan, clock, reached.end.motion)
+        solution = with_missed_contact_named(solution)
         if history.is_recorded and solution.is_converged:
             solution = replace(solution, loading=_loading(history, solutions, model, reached, solution))
         solutions.append(solution)

@@ -49,6 +49,7 @@ class Status(Enum):
         "This driver asks for several responses for each contact node, and those of this body are costly; use "
         "SemismoothNewton, AugmentedLagrangian or FixedPoint."
     )
+    MISSED_CONTACT = "The elements are too long to find the contact; use more elements there, or give an accuracy."
     NEGATIVE_ENERGY = (
         "The elastic energy is negative or can become so, because the elements are too long for collocation; "
         "use more elements, at least two for the thickness of a thin body, or linear or quadratic Galerkin elements."

@@ -71,7 +71,7 @@ def test_a_penetration_that_is_small_beside_the_range_of_the_clearance_is_found(
     middle = 0.5 * (xi[3] + xi[4])
     clearance = (xi - middle) ** 2 - crossing**2 - (xi[3] - middle) ** 2  # `crossing` at two points alike
     at, nothing = np.stack([xi, 0.0 * xi], axis=1), np.zeros_like(xi)
-    found = violations_at(PointsBetween(at, xi, at, clearance, nothing, nothing), bk.Frictionless(), 1.0, 2.0)
+    found = violations_at(PointsBetween(at, xi, at, clearance, nothing, nothing, nothing), bk.Frictionless(), 1.0, 2.0)
     assert found.penetration_depth == pytest.approx(crossing**2 + (xi[3] - middle) ** 2, rel=1e-12)
     assert found.penetration == pytest.approx(0.5 * found.penetration_depth)
     assert found.penetration_depth > (1.25 if crossing < 0.1 else 1.0) * -clearance.min()

@@ -142,8 +142,15 @@ def test_status(status, problem, driver, options):
 
 
 def test_every_status_has_a_case():
-    # `run` alone judges energies, estimates and load steps: tests/model/test_energy.py, tests/adaptive, tests/runs
-    by_run = {Status.NEGATIVE_ENERGY, Status.ACCURACY_NOT_REACHED, Status.UNFINISHED, Status.LOAD_NOT_REACHED}
+    # `run` alone judges energies, estimates, load steps and places between nodes: tests/model/test_energy.py,
+    # tests/adaptive, tests/runs, tests/results/test_missed_contact.py
+    by_run = {
+        Status.NEGATIVE_ENERGY,
+        Status.ACCURACY_NOT_REACHED,
+        Status.UNFINISHED,
+        Status.LOAD_NOT_REACHED,
+        Status.MISSED_CONTACT,
+    }
     assert {case[0] for case in CASES.values()} == set(Status) - by_run
 
 

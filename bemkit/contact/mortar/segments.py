@@ -40,6 +40,16 @@ class Segments:
         """(s,) bool array: whether the mortar side faces the piece."""
         return self.partner >= 0
 
+    def covered(self) -> Segments:
+        """Return the pieces that the mortar side faces."""
+        chosen = self.is_covered
+        return Segments(self.row[chosen], self.low[chosen], self.high[chosen], self.partner[chosen])
+
+    def within(self, pieces: IntArray, low: FloatArray, high: FloatArray) -> Segments:
+        """Return parts of pieces (m,), from low (m,) to high (m,) in coordinates that run from -1 to 1 on each."""
+        middle, half = 0.5 * (self.high + self.low)[pieces], 0.5 * (self.high - self.low)[pieces]
+        return Segments(self.row[pieces], middle + half * low, middle + half * high, self.partner[pieces])
+
     def cut(self, is_cut: BoolArray, at: FloatArray) -> Segments:
         """Return the pieces, those of the elements (m,) marked in `is_cut` cut at the places `at` (k,) as well."""
         chosen = np.flatnonzero(is_cut[self.row])

@@ -282,7 +282,9 @@ def loose_scenes() -> dict[str, bk.Scene]:
 @pytest.mark.parametrize("name", loose_scenes())
 def test_open_nodes_of_a_body_that_may_still_move_have_no_traction_at_all(name: str) -> None:
     solution = bk.run(loose_scenes()[name])
-    assert solution.is_converged
+    # a parabolic gap is least between two quadratic nodes of the body that was pushed out
+    is_missed = name == "is pushed out of overlaps"
+    assert solution.status is (bk.Status.MISSED_CONTACT if is_missed else bk.Status.CONVERGED)
     is_open = solution.contact.clearance > 1e-9 * np.abs(solution.boundary.displacement).max()
     assert is_open.any()
     assert not solution.contact.sigma_n[is_open].any()

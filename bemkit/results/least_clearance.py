@@ -1,0 +1,140 @@
+"""Points of a contact between its nodes, closer together where the clearance is least."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import NamedTuple, TypeAlias
+
+import numpy as np
+
+from bemkit.arrays import BoolArray, FloatArray, IntArray
+
+_LEVELS = 4
+"""Times that the points about a least clearance are taken closer together: by a factor of four each time. A parabola
+through the last ones finds the least clearance of a smooth gap to round-off."""
+_SAME = 1e-13
+"""Distance along a side, relative to its length, up to which two points of an element are the same."""
+FREE = 1e-6
+"""Traction, relative to the largest one, up to which a point carries none."""
+
+
+class PointsBetween(NamedTuple):
+    """Clearance and tractions at points of a contact, in (n, t) components.
+
+    Parameters
+    ----------
+    points : (n, 2) array [m]
+    s : (n,) array [m]
+        Arc length from the start of the side.
+    directions : (n, 2) array
+        Of contact, out of the body.
+    clearance : (n,) array [m]
+    sigma_n, sigma_t : (n,) arrays [Pa]
+    step : (n,) array [m]
+        Half of the jump of displacements to the next element, up to which the clearance of constant elements is known.
+    """
+
+    points: FloatArray
+    s: FloatArray
+    directions: FloatArray
+    clearance: FloatArray
+    sigma_n: FloatArray
+    sigma_t: FloatArray
+    step: FloatArray
+
+    def take(self, rows: BoolArray | IntArray) -> PointsBetween:
+        """Return some of the points."""
+        return PointsBetween(*(column[rows] for column in self))
+
+    @property
+    def is_free(self) -> BoolArray:
+        """(n,) bool array: whether a point carries no traction."""
+        size = np.hypot(self.sigma_n, self.sigma_t)
+        return np.asarray(size <= FREE * size.max(initial=0.0))
+
+
+Sample: TypeAlias = Callable[[IntArray, FloatArray, FloatArray], PointsBetween]
+"""Pieces (m,) of a side and an interval of each, from low (m,) to high (m,) within [-1, 1] -> points of each interval,
+piece by piece."""
+
+
+def nearest_only(samples: Sequence[Sample], index: int) -> Sample:
+    """Return one of several functions of the same pieces, infinitely far away where another one is nearer."""
+
+    def sample(pieces: IntArray, low: FloatArray, high: FloatArray) -> PointsBetween:
+        rivals = [each(pieces, low, high) for each in samples]
+        nearest = np.argmin([rival.clearance for rival in rivals], axis=0)
+        own = rivals[index]
+        return own._replace(clearance=np.where(nearest == index, own.clearance, np.inf))
+
+    return samples[index] if len(samples) == 1 else sample
+
+
+def with_least_clearances(sample: Sample, n_pieces: int, xi: FloatArray) -> PointsBetween:
+    """Return points of all pieces, and more points where a penetration may lie between them.
+
+    Parameters
+    ----------
+    sample : Sample
+        Of the points at `xi` of each interval.
+    n_pieces : int
+    xi : (q,) array
+        Ascending, from -1 to 1, at least three.
+
+    Returns
+    -------
+    PointsBetween
+        In the order of the arc length, without those that face nothing, which are infinitely far away.
+
+    Notes
+    -----
+    A parabola falls below the least of three equidistant points by at most a quarter of the difference between them. An
+    interval about the least of the points is searched where that difference leads below zero: of pieces without
+    traction each one, because its contact may be missed, of the others the deepest.
+    """
+    pieces, low, high = np.arange(n_pieces), np.full(n_pieces, -1.0), np.ones(n_pieces)
+    values = sample(pieces, low, high)
+    found, owners = [values], [np.repeat(pieces, xi.size)]
+    is_free = np.all(values.is_free.reshape(n_pieces, xi.size), axis=1)
+    for _ in range(_LEVELS):
+        if not pieces.size:
+            break
+        clearance = values.clearance.reshape(pieces.size, xi.size)
+        least = clearance.min(axis=1)
+        first = np.clip(np.argmin(clearance, axis=1) - 1, 0, xi.size - 3)
+        about = np.take_along_axis(clearance, first[:, None] + np.arange(3), axis=1)
+        bound = 2.0 * least - about.max(axis=1)
+        chosen = bound < np.minimum(0.0, np.where(is_free, 0.0, least.min()))
+        half, middle = 0.5 * (high - low), 0.5 * (high + low)
+        low, high = ((middle + half * xi[end])[chosen] for end in (first, first + 2))
+        pieces, is_free = pieces[chosen], is_free[chosen]
+        if pieces.size:
+            values = sample(pieces, low, high)
+            found.append(values)
+            owners.append(np.repeat(pieces, xi.size))
+    joined = PointsBetween(*(np.concatenate(columns) for columns in zip(*found, strict=True)))
+    owner = np.concatenate(owners)
+    order = np.lexsort((joined.s, owner))
+    # intervals begin and end at points that are known already
+    is_new = np.diff(joined.s[order], prepend=-np.inf) > _SAME * joined.s.max(initial=0.0)
+    is_new |= np.diff(owner[order], prepend=-1) > 0
+    return joined.take(order[is_new & (joined.clearance[order] != np.inf)])
+
+
+def deepest(values: PointsBetween) -> tuple[float, FloatArray]:
+    """Return the largest penetration [m], and the point (2,) that is nearest to it.
+
+    It lies at the end of the parabola through the deepest point and those beside it, if that end lies between them: the
+    points know a polynomial to some per cent of its range on an element, which may be all of a penetration.
+    """
+    if not values.clearance.size:
+        return 0.0, np.full(2, np.nan)
+    k, clearance = int(np.argmin(values.clearance)), values.clearance
+    least = float(clearance[k])
+    if 0 < k < clearance.size - 1 and min(before_after := np.diff(values.s[k - 1 : k + 2])) > 0.0:  # within an element
+        before, after = before_after
+        fall, rise = -np.diff(clearance[k - 1 : k + 2]) / (before, after)
+        curvature, slope = (rise - fall) / (before + after), (fall * after + rise * before) / (before + after)
+        if curvature < 0.0 and -before <= -0.5 * slope / curvature <= after:
+            least += float(0.25 * slope**2 / curvature)
+    return float(np.maximum(-least, 0.0)), values.points[k]

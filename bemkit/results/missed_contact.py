@@ -1,0 +1,49 @@
+"""Contact that the nodes do not find, because it lies between them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, TypeVar
+
+import numpy as np
+
+from bemkit.scene.unit_names import amount
+from bemkit.solvers.base import Status
+
+if TYPE_CHECKING:
+    from bemkit.results.solved_problem import SolvedProblem
+
+LARGEST_APART = 0.2
+"""Least distance of sides with a contact force, relative to the displacement that contact forces cause, up to which
+they touch: mortar conditions hold in the mean, which curved sides of long elements meet apart."""
+_FEW = 3
+"""Pressed nodes up to which sides may have a force although they touch nowhere."""
+
+AnySolution = TypeVar("AnySolution", bound="SolvedProblem")
+
+
+def with_missed_contact_named(solution: AnySolution) -> AnySolution:
+    """Return the same solution, with the status MISSED_CONTACT if the mesh does not find the contact.
+
+    A contact without any force overlaps between its nodes, or sides that touch nowhere have a force.
+    """
+    if not solution.is_converged:
+        return solution
+    if solution.wrongly_free:
+        name, (x, y) = next(iter(solution.wrongly_free.items()))
+        depth = amount(solution.contacts_between_nodes[name].penetration_depth, "length", solution.units, 2)
+        words = f"Contact {name!r} overlaps by {depth} at ({x:.4g}, {y:.4g})."
+    elif apart := _pressed_apart(solution):
+        words = f"Contact {apart[0]!r} has a force, but its sides touch nowhere."
+    else:
+        return solution
+    message = f"{Status.MISSED_CONTACT.value} {words}"
+    return replace(solution, status=Status.MISSED_CONTACT, message=message, warnings=solution.unasked_warnings)
+
+
+def _pressed_apart(solution: SolvedProblem) -> list[str]:
+    """Return the contacts between elastic bodies with a force whose sides touch nowhere."""
+    table = solution.contact
+    n_pressed = {name: np.count_nonzero(table.sigma_n[table.rows(name)]) for name in table.parts}
+    narrow = [name for name, n in n_pressed.items() if 0 < n <= _FEW and solution.n_sides(name) > 1]
+    return [name for name in narrow if solution.contacts_between_nodes[name].apart > LARGEST_APART]

@@ -1,0 +1,166 @@
+"""Contact that no node meets is found: a round side is nearest between two nodes, and the approach is small."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import bemkit as bk
+from bemkit.results.least_clearance import PointsBetween, deepest, with_least_clearances
+from tests.slow import slow_except
+
+STEEL = bk.Material(1.0, 0.3)
+KINDS: dict[str, Any] = {"constant": bk.ConstantCollocation(), **{f"degree {k}": bk.Galerkin(k) for k in (1, 2, 5)}}
+
+
+def roll(approach: float, degrees: float, discretisation: Any, mesh: bk.MeshOptions, width: float = 0.3) -> bk.Scene:
+    """Return half a disc that approaches a plane tilted by an angle [degrees]; contact is possible on an arc."""
+    angle = np.radians(degrees)
+    normal = np.array([-np.sin(angle), np.cos(angle)])
+    shift = -approach * normal
+    where = bk.Expression(f"abs(x - {np.sin(angle) + 0.071:.6g}) < {width}")
+    return bk.Scene(
+        title="roll",
+        shape=bk.Sector(1.0, 180.0, 360.0),
+        material=STEEL,
+        parts=(
+            bk.Part("load", bk.PrescribedDisplacement(*shift.tolist()), ("start", "end")),
+            bk.Part("tip", bk.Contact(bk.HalfPlane(tuple(-normal), tuple(normal))), ("arc",), where),
+        ),
+        law=bk.Frictionless(),
+        discretisation=discretisation,
+        mesh=mesh,
+    )
+
+
+def is_inside(solution: bk.Solution) -> bool:
+    """Whether a body without any contact force reaches into the obstacle, on a thousand points of each element."""
+    mesh, space = solution.mesh, solution.scene.discretisation.displacement_space(solution.mesh)
+    (part,) = solution.scene.contact_parts
+    elements = mesh.part("tip")
+    points = mesh.points(elements, np.linspace(-1.0, 1.0, 1001)).reshape(-1, 2)
+    assert space is not None
+    motion = solution.boundary.displacement.mean(axis=0)
+    gap = part.condition.obstacle.gap(
+        points + motion, mesh.normals_at(elements, np.linspace(-1, 1, 1001)).reshape(-1, 2)
+    )
+    return bool(solution.force_normal == 0.0 and gap.min() < -1e-13)
+
+
+@pytest.mark.parametrize("word", slow_except(KINDS, "degree 1"))
+@pytest.mark.parametrize("approach", slow_except((1e-9, 1e-6, 1e-4), 1e-9, 1e-6))
+@pytest.mark.parametrize("degrees", slow_except((0.0, 7.0, -13.0), 0.0))
+def test_fixed_meshes_that_miss_contact_end_by_name(word: str, approach: float, degrees: float) -> None:
+    for elements in (24, 29, 41):
+        solution = bk.run(roll(approach, degrees, KINDS[word], bk.MeshOptions(elements=elements)))
+        if solution.force_normal > 0.0:
+            continue
+        assert solution.status is bk.Status.MISSED_CONTACT
+        assert solution.estimated_error is None
+        assert solution.between_nodes is not None
+        # constant elements see their middles move, which lie on the arc
+        assert solution.between_nodes.penetration_depth == pytest.approx(approach, rel=1e-3)
+        x, y = solution.missed_contacts["tip"]
+        assert (x, y) == pytest.approx((np.sin(np.radians(degrees)), -np.cos(np.radians(degrees))), abs=2e-3)
+        assert f"({x:.4g}, {y:.4g})" in solution.message
+
+
+@pytest.mark.parametrize("word", slow_except(KINDS, "degree 1"))
+def test_a_body_that_stays_apart_is_converged(word: str) -> None:
+    solution = bk.run(roll(-1e-9, 3.0, KINDS[word], bk.MeshOptions(elements=29)))
+    assert solution.is_converged
+    assert not solution.missed_contacts
+    assert solution.contact.clearance.min() > 1e-9
+
+
+@pytest.mark.parametrize("degrees", [0.0, pytest.param(20.0, marks=pytest.mark.slow)])
+def test_rising_degrees_find_contact_between_nodes(degrees: float) -> None:
+    exact = bk.run(roll(1e-6, degrees, bk.Galerkin(2), bk.MeshOptions(accuracy=1e-3)))
+    rising = bk.MeshOptions(accuracy=1e-2, rising_degrees=True)
+    solution = bk.run(roll(1e-6, degrees, bk.Galerkin(2), rising))
+    assert solution.is_converged
+    assert solution.force_normal == pytest.approx(exact.force_normal, rel=2e-2)
+
+
+@pytest.mark.parametrize("approach", [1e-7, -1e-7])
+def test_a_rigid_body_that_meets_no_node_ends_by_name(approach: float) -> None:
+    block = bk.Body(
+        name="block",
+        shape=bk.Rectangle(2.0, 1.0, (-1.0, -1.0)),
+        material=STEEL,
+        parts=(bk.Part("base", bk.Clamped(), ("bottom",)),),
+        mesh=bk.MeshOptions(elements=26),
+    )
+    ball = bk.RigidBody(name="ball", obstacle=bk.Circle((0.013, 1.0), 1.0), centre=(0.013, 1.0), y=-approach)
+    contact = bk.ContactPair(("block.top", "ball"))
+    solution = bk.run(
+        bk.Assembly(
+            title="ball", bodies=(block,), rigid=(ball,), contacts=(contact,), law=bk.Frictionless(),
+            discretisation=bk.Galerkin(1),
+        )
+    )  # fmt: skip
+    assert solution.force_normal == 0.0
+    assert solution.status is (bk.Status.MISSED_CONTACT if approach > 0.0 else bk.Status.CONVERGED)
+    if approach > 0.0:
+        assert solution.between_nodes.penetration_depth == pytest.approx(approach, rel=1e-3)
+        assert solution.missed_contacts["block.top / ball"] == pytest.approx((0.013, 0.0), abs=1e-3)
+
+
+def sampled(low: float, middle: float) -> PointsBetween:
+    """Return the points of one piece whose clearance is a parabola with its least value `low` at `middle`."""
+    xi = np.linspace(-1.0, 1.0, 9)
+
+    def sample(pieces, low_end, high_end):
+        at = (0.5 * (low_end + high_end)[:, None] + 0.5 * (high_end - low_end)[:, None] * xi).ravel()
+        nothing = np.zeros_like(at)
+        points = np.stack([at, nothing], axis=1)
+        return PointsBetween(points, at, points, (at - middle) ** 2 + low, nothing, nothing, nothing)
+
+    return with_least_clearances(sample, 1, xi)
+
+
+@pytest.mark.parametrize("middle", [-0.99, -0.1, 0.37, 0.875, 1.0])
+def test_the_least_clearance_is_found_where_no_point_is_inside(middle: float) -> None:
+    depth, place = deepest(sampled(-1e-9, middle))
+    assert depth == pytest.approx(1e-9, rel=1e-6)
+    assert place[0] == pytest.approx(middle, abs=1e-2)
+    assert deepest(sampled(1e-9, middle))[0] == 0.0
+
+
+def test_the_parabola_stays_between_its_points() -> None:
+    s = np.array([0.0, 1e-3, 1.0])
+    flat = np.array([-1.0, -1.0 - 1e-9, -0.5])
+    points = np.stack([s, s], axis=1)
+    depth, _ = deepest(PointsBetween(points, s, points, flat, 0.0 * s, 0.0 * s, 0.0 * s))
+    assert depth < 1.1
+
+
+@pytest.mark.parametrize("approach", [1e-7, pytest.param(-1e-7, marks=pytest.mark.slow)])
+def test_sides_with_a_force_that_touch_nowhere_end_by_name(approach: float) -> None:
+    """Weighted gaps of a round side over long linear elements are negative where the gap is not."""
+    mesh = bk.MeshOptions(elements=26)
+    block = bk.Body(
+        name="block",
+        shape=bk.Rectangle(2.0, 1.0, (-1.0, -1.0)),
+        material=STEEL,
+        parts=(bk.Part("base", bk.Clamped(), ("bottom",)),),
+        mesh=mesh,
+    )
+    disc = bk.Body(
+        name="disc",
+        shape=bk.Sector(1.0, 180.0, 360.0, centre=(0.013, 1.0)),
+        material=STEEL,
+        parts=(bk.Part("load", bk.PrescribedDisplacement(0.0, -approach), ("start", "end")),),
+        mesh=mesh,
+    )
+    pair = bk.ContactPair(("disc.arc", "block.top"))
+    solution = bk.run(
+        bk.Assembly(
+            title="disc", bodies=(block, disc), contacts=(pair,), law=bk.Frictionless(), discretisation=bk.Galerkin(1)
+        )
+    )
+    assert solution.force_normal > 100.0 * abs(approach)
+    assert solution.status is bk.Status.MISSED_CONTACT
+    assert "Contact 'disc.arc / block.top' has a force, but its sides touch nowhere." in solution.message
