@@ -21,7 +21,7 @@ from rich.progress import (
 from rich.progress_bar import ProgressBar
 from rich.text import Text
 
-from bemkit.operators.stopwatch import PROGRESS
+from bemkit.stopwatch import PROGRESS
 
 if TYPE_CHECKING:
     from bemkit.solvers.base import StepRecord
@@ -89,7 +89,7 @@ def compute_with_progress(
 
 
 class _Display(logging.Handler):
-    """Shows what `bemkit.operators.stopwatch.announce` announces."""
+    """Shows what `bemkit.stopwatch.announce` announces."""
 
     def __init__(self, bar: Progress, console: Console) -> None:
         super().__init__()

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
-
 import numpy as np
 
 from bemkit.arrays import BoolArray, IntArray, read_only
@@ -41,7 +39,6 @@ def along_boundary(mesh: BoundaryMesh, elements: IntArray) -> IntArray:
     return np.array(ordered, dtype=np.intp)
 
 
-@lru_cache(maxsize=4)
 def break_nodes(mesh: BoundaryMesh) -> BoolArray:
     """Return the (n_nodes,) mask, read-only, of nodes where tractions may jump: corners and ends of boundary parts."""
     if mesh.symmetry is not None:

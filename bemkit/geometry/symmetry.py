@@ -81,10 +81,13 @@ class Symmetry:
         """Return the images of points (..., 2) [m]; `image` is a row of `images`."""
         return np.where(image < 0.0, 2.0 * self._places - points, points)
 
-    def meets(self, points: FloatArray) -> BoolArray:
-        """Return (n, 2) bool: which points (n, 2) lie on the lines x = a and y = b, to the round-off of coordinates."""
+    def meets(self, nodes: FloatArray) -> BoolArray:
+        """Return (n, 2) bool: which nodes (n, 2) lie on the lines x = a and y = b.
+
+        The nodes are all of a body: the round-off of its largest coordinate counts, wherever a node is.
+        """
         with np.errstate(invalid="ignore"):
-            on_line = np.abs(points - self._places) <= _ON_LINE * np.abs(points).max()
+            on_line = np.abs(nodes - self._places) <= _ON_LINE * np.abs(nodes).max()
         return np.asarray(on_line)
 
     @property
@@ -103,9 +106,9 @@ class Symmetry:
             beyond = (points > self._places).any(axis=-1)
         return np.asarray(beyond)
 
-    def snapped(self, points: FloatArray) -> FloatArray:
-        """Return points (n, 2), those on a line moved there to the last digit."""
-        return np.where(self.meets(points), self._places, points)
+    def snapped(self, nodes: FloatArray) -> FloatArray:
+        """Return all nodes (n, 2) of a body, those on a line moved there to the last digit."""
+        return np.where(self.meets(nodes), self._places, nodes)
 
     def transformed(self, shift: tuple[float, float], factor: float) -> "Symmetry":
         """Return the lines of the body (x - shift) * factor."""

@@ -14,9 +14,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bemkit.arrays import FloatArray, IntArray
+from bemkit.contact.equilibrium import NOISE_FACTOR, round_off_of
 from bemkit.geometry.spaces import BoundarySpace, dof_points
 from bemkit.model.contact_model import Model, energy_beyond, map_fields
-from bemkit.operators.equilibrium import NOISE_FACTOR, round_off_of
 from bemkit.operators.rigid_modes import traction_free_modes
 from bemkit.operators.steklov_poincare import CondensedMap, SteklovPoincare
 from bemkit.result_warning import ResultWarning

@@ -11,9 +11,9 @@ from bemkit.arrays import FloatArray
 from bemkit.contact.body import ContactState, LinearBody
 from bemkit.contact.certificate import Certificate
 from bemkit.contact.conditions import LinearConditions
+from bemkit.contact.equilibrium import Imbalance, resultant_imbalance, round_off_of
 from bemkit.geometry.spaces import BoundarySpace, dof_points
 from bemkit.operators.counts import OperationCounts
-from bemkit.operators.equilibrium import Imbalance, resultant_imbalance, round_off_of
 from bemkit.operators.rigid_modes import admissible_modes
 from bemkit.operators.steklov_poincare import CondensedMap
 from bemkit.operators.steklov_poincare.forces_inside import ForcesInside, condensed_under

@@ -26,7 +26,7 @@ from bemkit.operators.integrals.pairs import Degrees, PairIntegrals
 from bemkit.operators.integrals.sweep import FEW, PairSweep
 from bemkit.operators.linear.threads import for_each_chunk
 from bemkit.operators.pair_form import Functions, PairForm, Term
-from bemkit.operators.stopwatch import assembling
+from bemkit.stopwatch import assembling
 
 if TYPE_CHECKING:
     from scipy.sparse import csc_array, csr_array

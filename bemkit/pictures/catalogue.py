@@ -8,7 +8,6 @@ from functools import partial
 
 from bemkit.errors import InputError
 from bemkit.formulas import closest
-from bemkit.operators.stopwatch import announce
 from bemkit.pictures.boundary_traction import draw_boundary_traction
 from bemkit.pictures.contact_curves import (
     draw_contact_clearance,
@@ -24,6 +23,7 @@ from bemkit.pictures.load_history import draw_friction_loop, draw_status_over_ti
 from bemkit.pictures.shown import Result
 from bemkit.pictures.stress import STRESSES, draw_stress
 from bemkit.results.assembly_solution import AssemblySolution
+from bemkit.stopwatch import announce
 
 MOST_CONTACTS = 6
 """Contacts up to which each has pictures of its own where none is named."""

@@ -27,11 +27,11 @@ from bemkit.operators.steklov_poincare.needs import (
     physical_memory,
     seconds_of,
 )
-from bemkit.operators.stopwatch import announce
 from bemkit.result_warning import ResultWarning
 from bemkit.scene.load_history import load_steps
 from bemkit.scene.registry import BODY_FORCES
 from bemkit.scene.scene import Scene
+from bemkit.stopwatch import announce
 
 _BYTES = 8
 _FLOPS_PER_NUMBER = 30.0

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator
 from importlib.util import find_spec
 
-from bemkit.operators.stopwatch import announce
 from bemkit.pictures.catalogue import Picture, default_pictures, find_picture
 from bemkit.pictures.shown import Result
 from bemkit.report.html import Element, element, image
 from bemkit.scene.unit_names import amount
+from bemkit.stopwatch import announce
 
 FURTHER = ("friction-cone", "convergence")
 """Pictures of a report besides those that suit the result."""

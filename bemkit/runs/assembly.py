@@ -20,7 +20,6 @@ from bemkit.model.assembled.model import AssembledModel, build_assembled_model
 from bemkit.model.assembled.prepared import PreparedAssembly, prepare_assembly_steps
 from bemkit.model.assembled.turning import with_turning_checked
 from bemkit.model.solved_contact import with_energies_checked
-from bemkit.operators.stopwatch import Stage, StageClock
 from bemkit.plan import Plan
 from bemkit.plan.assembly_plan import plan_assembly
 from bemkit.results.assembly_solution import AssemblySolution, BodyResult, SideName
@@ -32,6 +31,7 @@ from bemkit.results.warnings import find_warnings
 from bemkit.runs.steps import Kind, joined, solved_history
 from bemkit.scene.assembly import Assembly
 from bemkit.solvers.base import ContactSolution, Status, StepRecord
+from bemkit.stopwatch import Stage, StageClock
 
 
 def run_assembly(

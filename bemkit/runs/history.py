@@ -18,7 +18,6 @@ from bemkit.geometry.spaces import dof_points
 from bemkit.model.contact_model import Model, build_model
 from bemkit.model.prepared import Prepared, prepare_steps
 from bemkit.model.solved_contact import contact_warnings, with_energy_checked
-from bemkit.operators.stopwatch import Stage, StageClock
 from bemkit.plan import Plan, check_elements, plan_steps
 from bemkit.result_warning import ResultWarning
 from bemkit.results.contact_table import ContactTable, find_transitions
@@ -28,6 +27,7 @@ from bemkit.results.warnings import find_warnings
 from bemkit.runs.steps import Kind, joined, solved_history
 from bemkit.scene.scene import NoContactError, Scene
 from bemkit.solvers.base import ContactSolution, Status, StepRecord
+from bemkit.stopwatch import Stage, StageClock
 
 
 def run_history(

@@ -14,12 +14,12 @@ from bemkit.arrays import FloatArray
 from bemkit.contact.body import ContactState, SlipHistory
 from bemkit.contact.problem import ContactProblem
 from bemkit.model.units import Units
-from bemkit.operators.stopwatch import announce
 from bemkit.results.load_history import StepWork
 from bemkit.solvers.active_sets import NodeStatus
 from bemkit.solvers.base import ContactSolution, ContactSolver, Status, StepRecord, solve
 from bemkit.solvers.fallbacks import Fallbacks
 from bemkit.solvers.records import continued
+from bemkit.stopwatch import announce
 
 MOST_HALVINGS = 6
 """How often an increment is halved before a step is given up."""

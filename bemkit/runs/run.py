@@ -12,7 +12,6 @@ from bemkit.errors import BemkitError, InputError
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.model.solved_contact import with_energy_checked
 from bemkit.operators.linear.threads import blas_threads_for
-from bemkit.operators.stopwatch import Stage
 from bemkit.plan.plan import few_on, make_plan
 from bemkit.results.solution import Solution
 from bemkit.results.solved_problem import with_times
@@ -22,6 +21,7 @@ from bemkit.scene.load_history import load_steps
 from bemkit.scene.scene import NoContactError, Scene
 from bemkit.scene.steps import check_stated
 from bemkit.solvers.base import StepRecord
+from bemkit.stopwatch import Stage
 
 if TYPE_CHECKING:
     from bemkit.results.assembly_solution import AssemblySolution

@@ -17,7 +17,6 @@ from bemkit.model.contact_model import Model, build_model
 from bemkit.model.prepared import Prepared
 from bemkit.model.units import find_units
 from bemkit.operators.linear.threads import blas_threads_for
-from bemkit.operators.stopwatch import Stage, StageClock
 from bemkit.results.assembly_solution import AssemblySolution
 from bemkit.results.solution import Solution
 from bemkit.runs.assembly import SEVERAL_BODIES, assembly_solution
@@ -28,6 +27,7 @@ from bemkit.runs.warm_start import state_on
 from bemkit.scene.assembly import Assembly
 from bemkit.scene.load_history import load_steps
 from bemkit.scene.scene import Scene
+from bemkit.stopwatch import Stage, StageClock
 
 AnyScene = Scene | Assembly
 AnySolution = Solution | AssemblySolution

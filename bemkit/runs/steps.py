@@ -13,7 +13,6 @@ from bemkit.contact.problem import ContactProblem
 from bemkit.contact.solvability import UnsolvableLoad, find_unsolvable_load
 from bemkit.errors import InputError
 from bemkit.operators.linear.threads import blas_threads_for
-from bemkit.operators.stopwatch import Stage, StageClock, announce, assembly_time
 from bemkit.plan import Plan, announce_plan, check_memory
 from bemkit.results.load_history import LoadHistory, LoadStep
 from bemkit.results.missed_contact import with_missed_contact_named
@@ -21,6 +20,7 @@ from bemkit.results.solved_problem import following
 from bemkit.runs.load_path import Callback, Path, ReachedStep, Standing, reach
 from bemkit.scene.load_history import AnyScene, load_steps
 from bemkit.solvers.base import ContactSolution, Status, solve
+from bemkit.stopwatch import Stage, StageClock, announce, assembly_time
 
 if TYPE_CHECKING:
     from bemkit.results.assembly_solution import AssemblySolution

@@ -17,8 +17,8 @@ from rich.progress import Progress
 import bemkit as bk
 from bemkit.cli.options import shown_progress
 from bemkit.cli.progress import _Display, _PlannedBar, _TimeLeft, live_progress
-from bemkit.operators.stopwatch import PROGRESS, announce
 from bemkit.scene.toml import with_overrides
+from bemkit.stopwatch import PROGRESS, announce
 
 pty = pytest.importorskip("pty")
 

@@ -4,9 +4,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bemkit.contact.conditions import LinearConditions, augmented, separated, slip, stick
+from bemkit.contact.equilibrium import Imbalance
 from bemkit.contact.laws import Coulomb
 from bemkit.contact.problem import ContactProblem, ContactState, DenseBody, SingularResponse
-from bemkit.operators.equilibrium import Imbalance
 from tests.handmade import block_body, random_body
 
 

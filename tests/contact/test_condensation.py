@@ -11,12 +11,12 @@ from bemkit.arrays import FloatArray, IntArray
 from bemkit.contact.condensation.direct_body import DirectBody
 from bemkit.contact.condensation.nodes import ContactNodes
 from bemkit.contact.conditions import LinearConditions, separated, stick
+from bemkit.contact.equilibrium import resultant_imbalance
 from bemkit.contact.laws import Coulomb, FrictionLaw, Frictionless
 from bemkit.contact.problem import ContactProblem, ContactState
 from bemkit.geometry import BoundaryMesh, Polygon, Rectangle, Selection, Shape, discretise
 from bemkit.geometry.spaces import BoundarySpace, LinearSpace, dof_points
 from bemkit.model.untouched_body import UntouchedBody, certified
-from bemkit.operators.equilibrium import resultant_imbalance
 from bemkit.operators.linear.dense import SingularMatrixError
 from bemkit.operators.material import Material
 from bemkit.operators.steklov_poincare import CondensedMap, SteklovPoincare

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from bemkit.contact.equilibrium import Imbalance
 from bemkit.contact.laws import Coulomb, Tresca
 from bemkit.contact.problem import ContactProblem
-from bemkit.operators.equilibrium import Imbalance
 from bemkit.solvers.active_sets import ActiveSets, ProjectionEquations
 from bemkit.solvers.alm import AugmentedLagrangian
 from bemkit.solvers.base import Status, solve

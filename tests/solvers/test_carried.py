@@ -10,11 +10,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import bemkit as bk
+from bemkit.contact.equilibrium import NOISE_FACTOR, Unbalanced
 from bemkit.contact.laws import Coulomb, Frictionless
 from bemkit.contact.problem import ContactState
 from bemkit.model.contact_model import build_model
 from bemkit.model.prepared import prepare
-from bemkit.operators.equilibrium import NOISE_FACTOR, Unbalanced
 from bemkit.solvers.newton import carried_on
 from bemkit.testing.independent_check import violations_of_body
 from tests.slow import slow_except

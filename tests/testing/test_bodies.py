@@ -7,10 +7,10 @@ import pytest
 
 import bemkit as bk
 from bemkit.contact.body import ContactState, LinearBody
+from bemkit.contact.equilibrium import Imbalance
 from bemkit.contact.problem import ContactProblem, DenseBody
 from bemkit.model.contact_model import build_model
 from bemkit.model.prepared import prepare
-from bemkit.operators.equilibrium import Imbalance
 from bemkit.testing import CheckFailed, check_body
 from tests.contact.test_following_tangents import SCENES
 from tests.handmade import Inexact, block_body, random_body

@@ -10,8 +10,8 @@ from bemkit.arrays import BoolArray, FloatArray, IntArray, read_only, spread_fra
 from bemkit.contact.body import ContactState, LinearBody, SingularResponse
 from bemkit.contact.condensation.held_friction import HeldFriction
 from bemkit.contact.conditions import LinearConditions, orthonormal
+from bemkit.contact.equilibrium import Imbalance, Unbalanced
 from bemkit.errors import InputError
-from bemkit.operators.equilibrium import Imbalance, Unbalanced
 
 _SMALLEST_RCOND = 1e-13
 """Below this reciprocal condition number of a row-scaled system its matrix counts as singular. A condensed stiffness

@@ -15,8 +15,8 @@ from bemkit.contact.condensation.dense_body import DenseBody
 from bemkit.contact.condensation.node_coupling import NodeCoupling
 from bemkit.contact.condensation.nodes import ContactNodes, NoContactNodesError
 from bemkit.contact.condensation.whole_body import WholeBody
+from bemkit.contact.equilibrium import Imbalance
 from bemkit.operators.counts import OperationCounts
-from bemkit.operators.equilibrium import Imbalance
 from bemkit.operators.steklov_poincare import CondensedMap, SteklovPoincare
 from bemkit.operators.steklov_poincare.forces_inside import ForcesInside
 from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions

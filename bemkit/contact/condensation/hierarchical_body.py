@@ -12,9 +12,9 @@ from bemkit.contact.body import ContactState, LinearBody, SingularResponse
 from bemkit.contact.condensation.held_friction import HeldFriction
 from bemkit.contact.condensation.nodes import ContactNodes, NoContactNodesError, free_motions, held_nodes
 from bemkit.contact.conditions import LinearConditions, stick
+from bemkit.contact.equilibrium import NOISE_FACTOR, Imbalance, resultant_imbalance
 from bemkit.geometry.spaces import dof_points
 from bemkit.operators.counts import OperationCounts
-from bemkit.operators.equilibrium import NOISE_FACTOR, Imbalance, resultant_imbalance
 from bemkit.operators.hierarchy.system import NodeConditions
 from bemkit.operators.linear.dense import SingularMatrixError
 from bemkit.operators.rigid_modes import admissible_modes, without_motion

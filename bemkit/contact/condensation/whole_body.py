@@ -9,8 +9,8 @@ import numpy as np
 
 from bemkit.arrays import FloatArray
 from bemkit.contact.condensation.exact_motions import resisting_none, with_work
+from bemkit.contact.equilibrium import NOISE_FACTOR, Imbalance, Unbalanced, resultant_imbalance, round_off_of
 from bemkit.geometry.spaces import BoundarySpace, dof_points
-from bemkit.operators.equilibrium import NOISE_FACTOR, Imbalance, Unbalanced, resultant_imbalance, round_off_of
 from bemkit.operators.rigid_modes import admissible_modes, rigid_motions
 from bemkit.operators.steklov_poincare import CondensedMap
 from bemkit.operators.steklov_poincare.forces_inside import ForcesInside, condensed_under

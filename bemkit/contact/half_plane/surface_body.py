@@ -19,10 +19,10 @@ from bemkit.arrays import ComplexArray, FloatArray, IntArray
 from bemkit.contact.body import ContactState, LinearBody, SingularResponse
 from bemkit.contact.condensation.nodes import ContactNodes
 from bemkit.contact.conditions import LinearConditions, separated
+from bemkit.contact.equilibrium import Imbalance
 from bemkit.contact.reduced_conditions import ReducedConditions, as_complex, as_pairs
 from bemkit.geometry.spaces import dof_points
 from bemkit.operators.counts import OperationCounts
-from bemkit.operators.equilibrium import Imbalance
 from bemkit.operators.half_plane.surface import SurfaceElasticity
 from bemkit.operators.linear.dense import SingularMatrixError
 from bemkit.operators.steklov_poincare.forces_inside import ForcesInside

@@ -13,10 +13,10 @@ from bemkit.contact.body import ContactState, LinearBody, SingularResponse
 from bemkit.contact.condensation.dense_body import DenseBody
 from bemkit.contact.condensation.node_coupling import NodeCoupling
 from bemkit.contact.conditions import LinearConditions, RigidMotions
+from bemkit.contact.equilibrium import NOISE_FACTOR, Imbalance
 from bemkit.contact.joined.coupled_members import CoupledMembers
 from bemkit.contact.joined.dense_form import DirectStiffness, RelativeStiffness
 from bemkit.contact.joined.sparse_form import Compliance, sparse_response
-from bemkit.operators.equilibrium import NOISE_FACTOR, Imbalance
 
 LIGHTEST = 1e-3
 """Forces on a member are measured by at least this share of the largest forces on any: one linear system solves for all

@@ -24,7 +24,7 @@ from bemkit.operators.collocation.gradient_reconstruction import GradientReconst
 from bemkit.operators.integrals.panels import Panels
 from bemkit.operators.linear.threads import for_each_chunk
 from bemkit.operators.material import Material
-from bemkit.operators.stopwatch import assembling
+from bemkit.stopwatch import assembling
 
 CHUNK_PAIRS = 32768
 

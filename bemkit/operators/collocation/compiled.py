@@ -13,7 +13,7 @@ import numpy as np
 
 from bemkit.errors import printable
 from bemkit.operators.collocation.layers import Constants, Layer, Unknowns, straight_layer
-from bemkit.operators.stopwatch import announce
+from bemkit.stopwatch import announce
 
 MANY_ELEMENTS = 1000
 """Elements of a body from which on the compiled layer saves more than loading it costs."""

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cache
+from functools import lru_cache
 
 import numpy as np
 
@@ -23,6 +23,8 @@ _SKETCHED = 0.3
 """Tolerance of a sketch by that asked for: the remainder of LU of random combinations is a few times that of QR."""
 _ROUND_OFF = 5e-14
 """No tolerance of a sketch is smaller: pivots below that are round-off of the sums, and would raise the rank."""
+_KEPT, _MOST_KEPT = 8, 2**19
+"""Arrays of random numbers that are kept, and their largest size: 4 MB each."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -227,8 +229,14 @@ def _norms(matrix: FloatArray) -> FloatArray:
     return norms
 
 
-@cache
 def _random(n_rows: int, n_columns: int) -> FloatArray:
+    """Return the same random numbers for the same shape; large arrays are made anew, so that few bytes are kept."""
+    make = _kept_random if n_rows * n_columns <= _MOST_KEPT else _kept_random.__wrapped__
+    return make(n_rows, n_columns)
+
+
+@lru_cache(maxsize=_KEPT)
+def _kept_random(n_rows: int, n_columns: int) -> FloatArray:
     return np.random.default_rng(0).standard_normal((n_rows, n_columns))
 
 

@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bemkit.arrays import FloatArray
+from bemkit.operators.hierarchy import interpolative as interpolative_module
 from bemkit.operators.hierarchy.interpolative import Block, interpolative, sketched
 
 
@@ -103,3 +104,12 @@ def test_nothing_has_no_skeleton() -> None:
         assert result.skeleton.size == 0
         assert result.matrix().shape == (shape[1], 0)
     assert interpolative(np.zeros((4, 3)), 1e-8).skeleton.size == 0
+
+
+def test_few_random_numbers_are_kept(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(interpolative_module, "_MOST_KEPT", 64)
+    before = interpolative_module._kept_random.cache_info().currsize
+    one, two = (interpolative_module._random(16, 8) for _ in range(2))
+    np.testing.assert_array_equal(one, two)
+    assert interpolative_module._kept_random.cache_info().currsize == before
+    assert interpolative_module._random(8, 8) is interpolative_module._random(8, 8)

@@ -6,7 +6,7 @@ import time
 
 import pytest
 
-from bemkit.operators.stopwatch import assembling, assembly_time
+from bemkit.stopwatch import assembling, assembly_time
 
 PAUSE = 0.02
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from bemkit.operators.equilibrium import Imbalance, resultant_imbalance
+from bemkit.contact.equilibrium import Imbalance, resultant_imbalance
 
 POINTS = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
 BALANCED = np.array([[1.0, 0.0], [0.0, 1.0], [-1.0, 0.0], [0.0, -1.0]])
