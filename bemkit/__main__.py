@@ -10,7 +10,7 @@ def main() -> None:
 
         run()
     except KeyboardInterrupt:
-        sys.stderr.write("bemkit: error: interrupted; no file is half written\n")
+        sys.stderr.write("bemkit: error: interrupted\n")
         sys.exit(130)
 
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from bemkit.cli import options
 from bemkit.cli.options import shown_progress
 from bemkit.cli.outputs import Outputs, TextFile
 from bemkit.errors import concerning
@@ -18,9 +19,9 @@ if TYPE_CHECKING:
 
 @click.command("critical-friction")
 @click.argument("scene")
-@click.option("--elements", type=int, metavar="N", help="Number of boundary elements, instead of the scene's.")
-@click.option("--accuracy", type=float, metavar="E", help="Refine until the estimated relative error is below E.")
-@click.option("--json", "json_file", metavar="FILE", help="Write the numbers as JSON; - is standard output.")
+@options.elements_option
+@options.accuracy_option
+@options.json_option
 def critical_friction(scene: str, elements: int | None, accuracy: float | None, json_file: str | None) -> None:
     """Find the friction coefficients at which sliding states of SCENE lose uniqueness."""
     with shown_progress(quiet=False), concerning(scene):

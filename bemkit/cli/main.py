@@ -22,22 +22,25 @@ from bemkit.errors import BemkitError, NoResultError, one_line, printable
 from bemkit.version import __version__
 
 _COMMANDS = {
-    "cite": ("listings", "Name the works behind a scene or a result."),
-    "critical-friction": ("critical_friction", "Find the friction at which sliding states lose uniqueness."),
+    "cite": ("listings", "Print the references of the methods of a scene or a result."),
+    "critical-friction": (
+        "critical_friction",
+        "Find the friction coefficient above which sliding states may not be unique.",
+    ),
     "outline": ("outline", "Show the sides of a part from a file; write a scene to start from."),
     "plan": ("plan", "List what would be computed, what skipped, and why, with time and memory."),
     "plot": ("plot", "Draw a result or a scene."),
-    "report": ("report", "Write a page on a result or a scene."),
+    "report": ("report", "Write an HTML page on a result or a scene."),
     "run": ("run", "Solve a scene."),
     "scenes": ("listings", "List the scenes that come with bemkit."),
     "schema": ("listings", "Print the JSON schema of scene files, for editors."),
     "show": ("show", "Show a result file."),
-    "stability": ("stability", "Drive a scene to its extremes, or solve random ones, and judge the answers."),
+    "stability": ("stability", "Solve extreme variants of a scene and check the results."),
     "study": ("study", "Measure error against run time; make the tables of the paper."),
-    "sweep": ("sweep", "Solve a scene under several values of its numbers."),
+    "sweep": ("sweep", "Solve a scene for several values of its numbers."),
     "verify": ("verify", "Compare with closed forms and other known answers."),
 }
-"""The module of each command, which is loaded when it is asked for, and what the list of commands says of it."""
+"""Module of each command, imported on use, and its line in the list of commands."""
 
 
 def main(arguments: list[str] | None = None) -> None:
@@ -73,7 +76,7 @@ def _run_to_end(arguments: list[str] | None) -> int:
         code = NOT_CONVERGED if isinstance(error, NoResultError) else BAD_INPUT
     except (click.Abort, KeyboardInterrupt) as error:
         is_ctrl_c = (error.__cause__ or error) is not _TERMINATION
-        _complain(f"{'interrupted' if is_ctrl_c else 'terminated'}; no file is half written")
+        _complain("interrupted" if is_ctrl_c else "terminated")
         code = INTERRUPTED if is_ctrl_c else TERMINATED
     except MemoryError:
         _complain("not enough memory: use fewer elements (--elements N)")
@@ -113,7 +116,9 @@ class _Commands(click.Group):
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         """Return the command of a name."""
         if cmd_name not in _COMMANDS:
-            return None
+            from bemkit.formulas import closest
+
+            ctx.fail(f"no command {cmd_name!r}{closest(cmd_name, _COMMANDS)}")
         module = import_module(f"bemkit.cli.{_COMMANDS[cmd_name][0]}")
         command: click.Command = getattr(module, cmd_name.replace("-", "_"))
         return command

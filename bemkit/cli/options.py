@@ -23,11 +23,6 @@ if TYPE_CHECKING:
     from bemkit.table import Table
 
 
-settings_option = click.option(
-    "--set", "settings", multiple=True, metavar="KEY=VALUE", help="Change the scene at a key of its file; repeatable."
-)
-
-
 def degree_of(context: click.Context, parameter: click.Parameter, value: str | None) -> int | Literal["hp"] | None:
     """Return a polynomial degree, or the word for degrees that rise until an accuracy is reached."""
     if value is None:
@@ -48,6 +43,35 @@ def pictures_of(context: click.Context, parameter: click.Parameter, value: str |
 
     names = tuple(name.strip() for name in value.split(",") if name.strip())
     return tuple(name if name == ANIMATION else find_picture(name).name for name in names)
+
+
+elements_option = click.option("--elements", type=int, metavar="N", help="Number of boundary elements.")
+accuracy_option = click.option(
+    "--accuracy", type=float, metavar="E", help="Refine until the estimated relative error is below E."
+)
+discretisation_option = click.option(
+    "--discretisation", metavar="NAME", help="Elements: hp, quadratic, linear or constant."
+)
+degree_option = click.option(
+    "--degree", metavar="P|hp", callback=degree_of, help="Galerkin elements of degree P, or hp refinement."
+)
+settings_option = click.option(
+    "--set", "settings", multiple=True, metavar="KEY=VALUE", help="Change the scene at a key of its file; repeatable."
+)
+rows_option = click.option(
+    "-o", "--output", metavar="FILE", help="Write the rows: .csv, .json, .md, .h5, or .jsonl, which resumes."
+)
+json_option = click.option("--json", "json_file", metavar="FILE", help="Write numbers as JSON; - is standard output.")
+csv_option = click.option("--csv", "csv_file", metavar="FILE", help="Write the table as CSV; - is standard output.")
+markdown_option = click.option("--markdown", metavar="FILE", help="Write the table as Markdown; - is standard output.")
+plot_option = click.option("--plot", "folder", metavar="DIR", help="Draw figures into the folder DIR.")
+what_option = click.option(
+    "--what", metavar="NAME,...", callback=pictures_of, help="Pictures to draw; bemkit plot --help lists them."
+)
+inside_option = click.option(
+    "--inside", type=int, default=0, metavar="N", help="Stress inside on N points across, in a .vtu or .vtp."
+)
+quiet_option = click.option("-q", "--quiet", is_flag=True, help="Print only errors.")
 
 
 def outputs_of(

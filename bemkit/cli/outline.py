@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from bemkit.cli import options
 from bemkit.cli.options import shown_progress
 from bemkit.cli.outputs import Outputs, TextFile
 
@@ -18,10 +19,10 @@ if TYPE_CHECKING:
 
 @click.command()
 @click.argument("file")
-@click.option("-o", "--output", metavar="SCENE", help="Write a scene to start from (TOML) that names the file.")
-@click.option("--plot", "folder", metavar="DIR", help="Draw outline.png into a folder.")
-@click.option("--scale", type=float, metavar="F", help="Times the numbers of the file.")
-@click.option("--only", multiple=True, metavar="NAME", help="Surface, layer or id of the body; may be repeated.")
+@click.option("-o", "--output", metavar="SCENE", help="Write a scene to start from (TOML).")
+@options.plot_option
+@click.option("--scale", type=float, metavar="F", help="Factor of all coordinates in the file.")
+@click.option("--only", multiple=True, metavar="NAME", help="Surface, layer or id of the body; repeatable.")
 @click.option(
     "--corner-angle", type=float, metavar="A", help="Degrees by which chords of a smooth curve may turn (25)."
 )

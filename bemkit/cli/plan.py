@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING, Literal
 
 import click
 
-from bemkit.cli.options import degree_of, settings_option, shown_progress
+from bemkit.cli import options
+from bemkit.cli.options import shown_progress
 from bemkit.cli.outputs import STDOUT, TextFile
 from bemkit.errors import concerning
 from bemkit.table import json_text
@@ -19,14 +20,12 @@ if TYPE_CHECKING:
 
 @click.command()
 @click.argument("scene")
-@settings_option
-@click.option("--elements", type=int, metavar="N", help="Number of boundary elements, instead of the scene's.")
-@click.option("--accuracy", type=float, metavar="E", help="Plan the first mesh towards a relative error below E.")
-@click.option("--discretisation", metavar="WORD", help="hp, quadratic, linear or constant, instead of the scene's.")
-@click.option(
-    "--degree", metavar="P|hp", callback=degree_of, help="Galerkin elements of that degree, or of rising ones."
-)
-@click.option("--json", "json_file", metavar="FILE", help="Write the plan as JSON; - is standard output.")
+@options.settings_option
+@options.elements_option
+@options.accuracy_option
+@options.discretisation_option
+@options.degree_option
+@options.json_option
 def plan(
     scene: str,
     settings: tuple[str, ...],

@@ -7,8 +7,9 @@ from pathlib import Path
 
 import click
 
+from bemkit.cli import options
 from bemkit.cli.exit_codes import exit_code_of
-from bemkit.cli.options import pictures_of, reserve, shown_progress
+from bemkit.cli.options import reserve, shown_progress
 
 
 class _PlotCommand(click.Command):
@@ -26,10 +27,12 @@ class _PlotCommand(click.Command):
 
 @click.command(cls=_PlotCommand)
 @click.argument("source")
-@click.option("--what", metavar="NAME,...", callback=pictures_of, help="The pictures, from the list below.")
-@click.option("-o", "--output", "place", default="figures", metavar="PLACE", help="Folder, or file for one picture.")
+@options.what_option
+@click.option(
+    "-o", "--output", "place", default="figures", metavar="PLACE", help="Write to a folder, or one picture to a file."
+)
 @click.option("--dpi", "dots_per_inch", type=click.IntRange(20, 1200), default=150, help="Dots per inch (150).")
-@click.option("-q", "--quiet", is_flag=True, help="Do not print the names of the files.")
+@options.quiet_option
 def plot(source: str, what: tuple[str, ...] | None, place: str, dots_per_inch: int, quiet: bool) -> int:
     """Draw SOURCE: a result file, or a scene, which is solved first.
 

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import click
 
+from bemkit.cli import options
 from bemkit.cli.exit_codes import exit_code_of
 from bemkit.cli.options import reserve, shown_progress
 
 
 @click.command()
 @click.argument("source")
-@click.option("-o", "--output", "place", default="report.html", metavar="FILE", help="The page (report.html).")
-@click.option("-q", "--quiet", is_flag=True, help="Do not print the name of the file.")
+@click.option(
+    "-o", "--output", "place", default="report.html", metavar="FILE", help="Write the page to FILE (report.html)."
+)
+@options.quiet_option
 def report(source: str, place: str, quiet: bool) -> int:
     """Write a page on SOURCE: a result file, or a scene, which is solved first.
 

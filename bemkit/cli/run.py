@@ -11,17 +11,9 @@ from typing import TYPE_CHECKING, Literal
 
 import click
 
+from bemkit.cli import options
 from bemkit.cli.exit_codes import exit_code_of
-from bemkit.cli.options import (
-    degree_of,
-    outputs_of,
-    pictures_of,
-    reserve,
-    result_target,
-    settings_option,
-    shown_progress,
-    write_animation,
-)
+from bemkit.cli.options import outputs_of, reserve, result_target, shown_progress, write_animation
 from bemkit.errors import concerning
 
 if TYPE_CHECKING:
@@ -35,23 +27,21 @@ if TYPE_CHECKING:
 @click.command()
 @click.argument("scene")
 @click.option("-o", "--output", metavar="FILE", help="Write the result: .h5, .json, .csv, .npz, .vtu or .vtp.")
-@click.option("--inside", type=int, default=0, metavar="N", help="Stress inside on N points across, in a .vtu or .vtp.")
-@click.option("--json", "json_file", metavar="FILE", help="Write the summary as JSON; - is standard output.")
-@click.option("--csv", "csv_file", metavar="FILE", help="Write the contact table as CSV; - is standard output.")
-@click.option("--plot", "folder", metavar="DIR", help="Draw figures into a folder.")
-@click.option("--what", metavar="NAME,...", callback=pictures_of, help="Which figures; bemkit plot --help lists them.")
-@settings_option
-@click.option("--elements", type=int, metavar="N", help="Number of boundary elements, instead of the scene's.")
-@click.option("--accuracy", type=float, metavar="E", help="Refine until the estimated relative error is below E.")
-@click.option("--discretisation", metavar="WORD", help="hp, quadratic, linear or constant, instead of the scene's.")
-@click.option(
-    "--degree", metavar="P|hp", callback=degree_of, help="Galerkin elements of that degree, or of rising ones."
-)
-@click.option("--solver", metavar="WORD", help="Such as augmented-lagrangian, instead of the scene's.")
-@click.option("--rho", type=float, metavar="R", help="Penalty of the solver in units of E'/L, instead of the scene's.")
+@options.inside_option
+@options.json_option
+@options.csv_option
+@options.plot_option
+@options.what_option
+@options.settings_option
+@options.elements_option
+@options.accuracy_option
+@options.discretisation_option
+@options.degree_option
+@click.option("--solver", metavar="NAME", help="Such as augmented-lagrangian.")
+@click.option("--rho", type=float, metavar="R", help="Penalty of the solver [E'/L].")
 @click.option("--cascade", is_flag=True, help="Solve on coarser meshes first and start from there.")
 @click.option("--explain", is_flag=True, help="Print planned and measured time and memory, and what was skipped.")
-@click.option("-q", "--quiet", is_flag=True, help="Print neither the convergence table nor the summary.")
+@options.quiet_option
 def run(
     scene: str,
     output: str | None,

@@ -6,22 +6,25 @@ from contextlib import ExitStack
 
 import click
 
-from bemkit.cli.options import outputs_of, pictures_of, result_target, shown_progress, write_animation
+from bemkit.cli import options
+from bemkit.cli.options import outputs_of, result_target, shown_progress, write_animation
 from bemkit.cli.outputs import STDOUT
 from bemkit.cli.streams import print_data
 
 
 @click.command()
 @click.argument("result")
-@click.option("--csv", "csv_file", metavar="FILE", help="Write a table as CSV; - is standard output.")
-@click.option("--table", type=click.Choice(["contact", "boundary", "history", "steps"]), help="Which (contact).")
-@click.option("--json", "json_file", metavar="FILE", help="Write the summary as JSON; - is standard output.")
-@click.option("--plot", "folder", metavar="DIR", help="Draw figures into a folder.")
-@click.option("--what", metavar="NAME,...", callback=pictures_of, help="Which figures; bemkit plot --help lists them.")
-@click.option("--scene", "shows_scene", is_flag=True, help="Print the scene inside as TOML.")
-@click.option("--step", type=int, metavar="N", help="Of a load history: show the end of a step, counted from 1.")
+@options.csv_option
+@click.option(
+    "--table", type=click.Choice(["contact", "boundary", "history", "steps"]), help="Table of --csv and -o (contact)."
+)
+@options.json_option
+@options.plot_option
+@options.what_option
+@click.option("--scene", "shows_scene", is_flag=True, help="Print the scene of the result as TOML.")
+@click.option("--step", type=int, metavar="N", help="Show load step N, counted from 1.")
 @click.option("-o", "--output", metavar="FILE", help="Write another format: .json, .csv, .npz, .vtu or .vtp.")
-@click.option("--inside", type=int, default=0, metavar="N", help="Stress inside on N points across, in a .vtu or .vtp.")
+@options.inside_option
 def show(
     result: str,
     csv_file: str | None,

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from bemkit.cli import options
 from bemkit.cli.options import StudyProgress, reserve, study_output
 from bemkit.cli.outputs import Outputs, TextFile
 
@@ -19,27 +20,27 @@ if TYPE_CHECKING:
 @click.command()
 @click.argument("scene", required=False)
 @click.option("--axis", "axis", multiple=True, metavar="NAME", help="Only this axis; may be given several times.")
-@click.option("-o", "--output", metavar="FILE", help="Rows as .csv, .json, .md, .h5; .jsonl also resumes.")
-@click.option("--csv", "csv", metavar="FILE", help="Write the rows as CSV; - is standard output.")
-@click.option("--markdown", "markdown", metavar="FILE", help="Write tables as Markdown; - is standard output.")
-@click.option("--plot", "plot", metavar="DIR", help="Draw one figure for each axis into a folder.")
-@click.option("--elements", type=int, metavar="N", help="Number of boundary elements, instead of the scene's.")
-@click.option("--discretisation", metavar="WORD", help="Such as linear or constant, instead of the scene's.")
-@click.option("-q", "--quiet", is_flag=True, help="Print neither progress nor tables.")
+@options.rows_option
+@options.csv_option
+@options.markdown_option
+@options.plot_option
+@options.elements_option
+@options.discretisation_option
+@options.quiet_option
 def stability(
     scene: str | None,
     axis: tuple[str, ...],
     output: str | None,
-    csv: str | None,
+    csv_file: str | None,
     markdown: str | None,
-    plot: str | None,
+    folder: str | None,
     elements: int | None,
     discretisation: str | None,
     quiet: bool,
 ) -> int:
-    """Drive SCENE (paper-1 by default) to its extremes and judge every answer by independent evidence.
+    """Solve extreme variants of SCENE (paper-1 by default) and check every result independently.
 
-    The exit code is 1 if an answer is wrong. Random scenes of every kind are a tool of the repository:
+    The exit code is 1 if a result is wrong. Random scenes of every kind are a tool of the repository:
     ``python -m checks.random_scenes 200``.
     """
     with StudyProgress(quiet) as progress:
@@ -59,10 +60,10 @@ def stability(
         rows, table = study_output(output, table_of)
         texts = (
             table,
-            TextFile(csv, to_csv),
+            TextFile(csv_file, to_csv),
             TextFile(markdown, partial(to_markdown, axes)),
         )
-        outputs = Outputs(texts, plot, partial(draw_axes, axes), figure_name(axes[0]))
+        outputs = Outputs(texts, folder, partial(draw_axes, axes), figure_name(axes[0]))
         reserve(outputs.check(FILE.check(rows)))
         shows_tables = not quiet and not outputs.uses_stdout
         labels = {"scene": scene_to_toml(chosen) if rows else ""}

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from bemkit.cli import options
 from bemkit.cli.exit_codes import NOT_CONVERGED
 from bemkit.cli.options import StudyProgress, reserve, shown_progress, study_output
 from bemkit.cli.outputs import STDOUT, Outputs, TextFile, plain_table, stdout_console
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
 
 DEFAULT_COMMAND = "errors"
 DEFAULT_REPEAT = 3
+DEFAULT_SOLVERS = "semismooth-newton,augmented-lagrangian"
 DEFAULT_MEASURES = "energy,sigma_n,displacement,transitions"
 
 
@@ -42,29 +44,29 @@ def study() -> None:
 
 @study.command(DEFAULT_COMMAND)
 @click.argument("scene")
-@click.option("--elements", default="40,80,160,320", metavar="N,...", help="Sizes of uniform and graded meshes.")
-@click.option("--accuracies", default="1e-2,1e-3,1e-4", metavar="E,...", help="Aims of adaptive meshes.")
-@click.option("--discretisation", metavar="WORD,...", help="Element types (constant,linear,quadratic).")
-@click.option("--degrees", metavar="P,...", help="Galerkin elements of these degrees instead, such as 1,2,4,8,hp.")
-@click.option("--solver", default="semismooth-newton,augmented-lagrangian", metavar="WORD,...", help="Drivers.")
-@click.option("--meshes", default="uniform,graded,adaptive", metavar="WORD,...", help="Sequences of meshes.")
-@click.option("--exponent", type=float, default=3.0, metavar="P", help="Grading of graded meshes (3).")
+@click.option("--sizes", default="40,80,160,320", metavar="N,...", help="Elements of fixed meshes.")
+@click.option("--accuracies", default="1e-2,1e-3,1e-4", metavar="E,...", help="Accuracies of adaptive meshes.")
+@click.option("--discretisations", metavar="NAME,...", help="Elements: constant,linear,quadratic.")
+@click.option("--degrees", metavar="P,...", help="Galerkin elements of these degrees, such as 1,2,4,8,hp.")
+@click.option("--solvers", default=DEFAULT_SOLVERS, metavar="NAME,...", help="Solvers.")
+@click.option("--meshes", default="uniform,graded,adaptive", metavar="NAME,...", help="Sequences of meshes.")
+@click.option("--exponent", type=float, default=3.0, metavar="P", help="Exponent of graded meshes (3).")
 @click.option("--most-elements", type=int, default=500, metavar="N", help="Limit of adaptive meshes (500).")
 @click.option("--over-resolve", type=click.IntRange(40), metavar="N", help="Measure against up to N fine elements.")
 @click.option("--repeat", type=click.IntRange(1), metavar="N", help="Timed repetitions of each run (3).")
-@click.option("--jobs", type=click.IntRange(1), default=1, metavar="N", help="Processes; more than one: no times.")
-@click.option("--errors", "measures", default=DEFAULT_MEASURES, metavar="WORD,...", help="Errors to show and draw.")
-@click.option("-o", "--output", metavar="FILE", help="Rows as .csv, .json, .md, .h5; .jsonl also resumes.")
-@click.option("--csv", "csv_file", metavar="FILE", help="Write the rows as CSV; - is standard output.")
-@click.option("--plot", "folder", metavar="DIR", help="Draw error-against-run-time.png into a folder.")
-@click.option("-q", "--quiet", is_flag=True, help="Print neither progress nor tables.")
+@click.option("--jobs", type=click.IntRange(1), default=1, metavar="N", help="Number of processes (1).")
+@click.option("--errors", "measures", default=DEFAULT_MEASURES, metavar="NAME,...", help="Errors to show and draw.")
+@options.rows_option
+@options.csv_option
+@options.plot_option
+@options.quiet_option
 def errors(
     scene: str,
-    elements: str,
+    sizes: str,
     accuracies: str,
-    discretisation: str | None,
+    discretisations: str | None,
     degrees: str | None,
-    solver: str,
+    solvers: str,
     meshes: str,
     exponent: float,
     most_elements: int,
@@ -77,10 +79,10 @@ def errors(
     folder: str | None,
     quiet: bool,
 ) -> int:
-    """Measure errors and run times of SCENE over element types, meshes and drivers.
+    """Measure errors and run times of SCENE over element types, meshes and solvers.
 
     Errors are measured against a closed form or a reference solution, or with --over-resolve against a fine solution.
-    The exit code is 1 if a run did not converge.
+    With more than one process, times are not measured. The exit code is 1 if a run did not converge.
     """
     if jobs > 1 and repeat is not None:
         raise click.UsageError("--jobs measures no run times: remove --repeat or --jobs")
@@ -103,25 +105,25 @@ def errors(
         # sharp at the width of a page, and a small file
         outputs = Outputs(texts, folder, figures, FIGURE, dots_per_inch=110)
         reserve(outputs.check(FILE.check(rows)))
-        options = StudyOptions(
-            elements=elements,
+        asked = StudyOptions(
+            sizes=sizes,
             accuracies=accuracies,
-            discretisation=discretisation,
+            discretisations=discretisations,
             degrees=degrees,
             meshes=meshes,
-            solver=solver,
+            solvers=solvers,
             exponent=exponent,
             most_elements=most_elements,
             over_resolve=over_resolve,
             repeat=None if jobs > 1 else repeat or DEFAULT_REPEAT,
         )
-        runs = options.runs(problem)
+        runs = asked.runs(problem)
         shows_tables = not quiet and not outputs.uses_stdout
         with concerning(scene):
-            labels = options.labels(problem)
+            labels = asked.labels(problem)
             finished = FILE.finished(rows, labels)
-            reference = options.reference(problem)
-            tasks = error_tasks(runs, reference, options.repeat)
+            reference = asked.reference(problem)
+            tasks = error_tasks(runs, reference, asked.repeat)
             computed = progress.compute(tasks, "error study", processes=jobs, finished=finished)
             if shows_tables:
                 print_reference(problem.title, reference)
@@ -136,8 +138,8 @@ def errors(
 @study.command()
 @click.argument("scene")
 @click.option("--starts", type=click.IntRange(min=0), default=8, metavar="N", help="Number of starts (8).")
-@click.option("--elements", type=int, metavar="N", help="Number of boundary elements, instead of the scene's.")
-@click.option("--json", "json_file", metavar="FILE", help="Write all summaries as JSON; - is standard output.")
+@options.elements_option
+@options.json_option
 def solutions(scene: str, starts: int, elements: int | None, json_file: str | None) -> int:
     """Look for several solutions of SCENE from several starts."""
     with shown_progress(quiet=False):

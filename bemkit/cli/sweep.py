@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING
 
 import click
 
+from bemkit.cli import options
 from bemkit.cli.exit_codes import NOT_CONVERGED
-from bemkit.cli.options import StudyProgress, reserve, settings_option, study_output
+from bemkit.cli.options import StudyProgress, reserve, study_output
 from bemkit.cli.outputs import Outputs, TextFile
 from bemkit.errors import concerning
 
@@ -23,21 +24,23 @@ DEFAULT_SHOWN = "force_tangential"
 
 @click.command()
 @click.argument("scene")
-@settings_option
-@click.option("--vary", multiple=True, required=True, metavar="KEY=...", help="A:B:N or A,B,...; several make a grid.")
-@click.option("-o", "--output", metavar="FILE", help="Rows as .csv, .json, .md, .h5; .jsonl also resumes.")
-@click.option("--csv", "csv_file", metavar="FILE", help="Write all rows as CSV; - is standard output.")
-@click.option("--json", "json_file", metavar="FILE", help="Write all rows as JSON; - is standard output.")
-@click.option("--plot", "folder", metavar="DIR", help="Draw figures into a folder.")
+@options.settings_option
+@click.option(
+    "--vary", multiple=True, required=True, metavar="KEY=...", help="Values A:B:N or A,B,...; repeat it for a grid."
+)
+@options.rows_option
+@options.csv_option
+@options.json_option
+@options.plot_option
 @click.option("--over", metavar="KEY", help="Abscissa of the figures (the first key).")
-@click.option("--show", multiple=True, metavar="WORD", help=f"What to draw ({DEFAULT_SHOWN}); may be given repeatedly.")
-@click.option("--elements", type=int, metavar="N", help="Number of boundary elements, instead of the scene's.")
-@click.option("--accuracy", type=float, metavar="E", help="Refine each row until the estimated error is below E.")
-@click.option("--discretisation", metavar="WORD", help="Such as linear or constant, instead of the scene's.")
-@click.option("--cold", is_flag=True, help="Start each solve afresh, not at the solution of the row before.")
-@click.option("--jobs", type=click.IntRange(1), metavar="N", help="Spread the rows over processes (1).")
-@click.option("--on", "cluster", metavar="ADDRESS", help="Spread them over a cluster, such as tcp://10.0.0.1:8786.")
-@click.option("-q", "--quiet", is_flag=True, help="Print neither progress nor the table.")
+@click.option("--show", multiple=True, metavar="NAME", help=f"Result to draw ({DEFAULT_SHOWN}); repeatable.")
+@options.elements_option
+@options.accuracy_option
+@options.discretisation_option
+@click.option("--cold", is_flag=True, help="Start each row from zero, not from the row before.")
+@click.option("--jobs", type=click.IntRange(1), metavar="N", help="Number of processes (1).")
+@click.option("--on", "cluster", metavar="ADDRESS", help="Scheduler of a dask cluster, such as tcp://10.0.0.1:8786.")
+@options.quiet_option
 def sweep(
     scene: str,
     settings: tuple[str, ...],
@@ -56,7 +59,7 @@ def sweep(
     cluster: str | None,
     quiet: bool,
 ) -> int:
-    """Solve SCENE under several values of its numbers, such as --vary law.friction_coefficient=0:1:11.
+    """Solve SCENE for several values of its numbers, such as --vary law.friction_coefficient=0:1:11.
 
     The exit code is 1 if a row has no certified result, or one less accurate than asked for.
     """

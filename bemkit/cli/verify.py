@@ -6,6 +6,7 @@ from functools import partial
 
 import click
 
+from bemkit.cli import options
 from bemkit.cli.options import StudyProgress, reserve, study_output
 from bemkit.cli.outputs import Outputs, TextFile
 
@@ -15,10 +16,10 @@ MISSED = 1
 @click.command()
 @click.argument("names", nargs=-1)
 @click.option("--quick", is_flag=True, help="Skip the finest resolutions: at most one minute.")
-@click.option("-o", "--output", metavar="FILE", help="Rows as .csv, .json, .md, .h5; .jsonl also resumes.")
-@click.option("--json", "json_file", metavar="FILE", help="Write the rows as JSON; - is standard output.")
-@click.option("--markdown", metavar="FILE", help="Write the table as Markdown; - is standard output.")
-@click.option("-q", "--quiet", is_flag=True, help="Print neither progress nor the table.")
+@options.rows_option
+@options.json_option
+@options.markdown_option
+@options.quiet_option
 def verify(
     names: tuple[str, ...], quick: bool, output: str | None, json_file: str | None, markdown: str | None, quiet: bool
 ) -> int:

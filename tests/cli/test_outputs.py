@@ -73,7 +73,7 @@ def test_a_report_shows_the_versions_in_its_file() -> None:
         ("sweep", "paper-1", "--elements", "24", "--vary", "law.friction_coefficient=0.1,0.2"),
         ("verify", "westergaard", "--quick"),
         ("stability", "paper-1", "--elements", "24", "--axis", "aspect-ratio"),
-        ("study", "paper-1", "--elements", "12", "--discretisation", "linear", "--meshes", "uniform", "--repeat", "1"),
+        ("study", "paper-1", "--sizes", "12", "--discretisations", "linear", "--meshes", "uniform", "--repeat", "1"),
     ],
     ids=lambda command: command[0],
 )

@@ -124,7 +124,7 @@ print([name for name in ("numpy", "scipy", "h5py", "matplotlib", "rich.progress"
         pytest.param(("verify", "--quick", "cattaneo-mindlin"), marks=pytest.mark.slow),
         pytest.param(("stability", "--random", "1", "--jobs", "1"), marks=pytest.mark.slow),
         pytest.param(
-            ("study", "paper-1", "--elements", "40", "--meshes", "uniform", "--discretisation", "constant"),
+            ("study", "paper-1", "--sizes", "40", "--meshes", "uniform", "--discretisations", "constant"),
             marks=pytest.mark.slow,
         ),
     ],

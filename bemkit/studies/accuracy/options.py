@@ -37,12 +37,12 @@ class StudyOptions:
     solution if its number of elements is given; no run times are measured without a number of repetitions.
     """
 
-    elements: str
+    sizes: str
     accuracies: str
-    discretisation: str | None
+    discretisations: str | None
     degrees: str | None
     meshes: str
-    solver: str
+    solvers: str
     exponent: float
     most_elements: int
     over_resolve: int | None
@@ -56,28 +56,28 @@ class StudyOptions:
         StudyError, SceneError, InputError
             If a word is unknown, a number out of range, or a list empty.
         """
-        elements = tuple(sorted(_numbers(self.elements, "elements", int, "40,80")))
+        elements = tuple(sorted(_numbers(self.sizes, "sizes", int, "40,80")))
         accuracies = tuple(sorted(_numbers(self.accuracies, "accuracies", float, "1e-2,1e-3"), reverse=True))
         sequences: dict[str, MeshSequence] = {
             "uniform": uniform(elements),
             "graded": graded(elements, self.exponent),
             "adaptive": adaptive(accuracies, self.most_elements),
         }
-        drivers = _words(self.solver, "solver")
+        solvers = _words(self.solvers, "solvers")
         return all_runs(
             scene,
             self._element_types(),
             [sequences[word] for word in _known(self.meshes, "meshes", sequences)],
             # the scene's own driver, with its options, if it has that word
-            [scene.solver if type(each) is type(scene.solver) else each for each in map(_solver, drivers)],
+            [scene.solver if type(each) is type(scene.solver) else each for each in map(_solver, solvers)],
         )
 
     def _element_types(self) -> list[Discretisation | str]:
         if self.degrees is None:
-            words = _words(self.discretisation or DEFAULT_ELEMENTS, "discretisation")
+            words = _words(self.discretisations or DEFAULT_ELEMENTS, "discretisations")
             return [word if word == RISING else structure(word, cast(Any, Discretisation)) for word in words]
-        if self.discretisation is not None:
-            raise StudyError(f"degrees is {self.degrees!r} and discretisation is {self.discretisation!r}: give one")
+        if self.discretisations is not None:
+            raise StudyError(f"degrees is {self.degrees!r} and discretisations is {self.discretisations!r}: give one")
         words = _words(self.degrees, "degrees")
         return [word if word == RISING else Galerkin(_numbers(word, "degrees", int, "1,2,4,8,hp")[0]) for word in words]
 

@@ -26,7 +26,7 @@ from bemkit.studies.accuracy.runs import all_runs, error_tasks, uniform
 from bemkit.studies.row_file import RowFileError
 from tests.studies.accuracy.records import row
 
-FEW = ("--elements", "12,24", "--discretisation", "linear", "--solver", "semismooth-newton", "--repeat", "1")
+FEW = ("--sizes", "12,24", "--discretisations", "linear", "--solvers", "semismooth-newton", "--repeat", "1")
 FAST = ("study", "paper-1", *FEW, "--meshes", "uniform")
 
 
@@ -152,17 +152,17 @@ def test_a_run_that_fails_shows_in_the_table_and_the_exit_code(tmp_path: Path) -
     [
         (("study", "paper-3"), "no such file or shipped scene"),
         (("study", "bending"), "no part of the scene is in contact"),
-        (("study", "paper-1", "--elements", "0"), "elements is 0: give a number from 3"),
-        (("study", "paper-1", "--elements", ","), "elements is ',': give at least one"),
-        (("study", "paper-1", "--elements", "40,many"), "elements is '40,many': give numbers with commas"),
-        (("study", "paper-1", "--elements", "40,40"), "of size 40 is given twice"),
+        (("study", "paper-1", "--sizes", "0"), "sizes is 0: give a number from 3"),
+        (("study", "paper-1", "--sizes", ","), "sizes is ',': give at least one"),
+        (("study", "paper-1", "--sizes", "40,many"), "sizes is '40,many': give numbers with commas"),
+        (("study", "paper-1", "--sizes", "40,40"), "of size 40 is given twice"),
         (("study", "paper-1", "--accuracies", "2"), "accuracy is 2.0: give a relative error between 0 and 1"),
-        (("study", "paper-1", "--discretisation", "cubic"), "cubic"),
-        (("study", "paper-1", "--solver", "newton"), "unknown solver 'newton'"),
+        (("study", "paper-1", "--discretisations", "cubic"), "cubic"),
+        (("study", "paper-1", "--solvers", "newton"), "unknown solver 'newton'"),
         (("study", "paper-1", "--meshes", "grade"), "meshes: unknown 'grade': the known ones are uniform, graded"),
         (("study", "paper-1", "--errors", "sigma"), "errors: unknown 'sigma': the known ones are energy, sigma_n"),
         (("study", "paper-1", "--exponent", "0.5"), "exponent is 0.5: give a finite number of at least 1"),
-        (("study", "paper-1", "--meshes", "adaptive", "--discretisation", "constant"), "nothing to run"),
+        (("study", "paper-1", "--meshes", "adaptive", "--discretisations", "constant"), "nothing to run"),
         (("study", "paper-1", "-o", "/nowhere/rows.jsonl"), "create it first"),
         (("study", "paper-1", "--most-elements", "3"), "most_elements is 3"),
     ],

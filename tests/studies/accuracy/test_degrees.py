@@ -9,12 +9,12 @@ from bemkit.studies.accuracy.options import StudyOptions
 from bemkit.studies.engine import StudyError
 
 GIVEN = {
-    "elements": "20",
+    "sizes": "20",
     "accuracies": "1e-1,1e-2",
-    "discretisation": None,
+    "discretisations": None,
     "degrees": "1,2,4,hp",
     "meshes": "uniform,adaptive",
-    "solver": "semismooth-newton",
+    "solvers": "semismooth-newton",
     "exponent": 3.0,
     "most_elements": 200,
     "over_resolve": None,

@@ -17,7 +17,7 @@ from bemkit.studies.accuracy.records import FILE
 from bemkit.studies.row_file import RowFileError
 from tests.studies.accuracy.records import row
 
-ARGUMENTS = ("study", "paper-1", "--elements", "12,16,20", "--meshes", "uniform", "--discretisation", "linear")
+ARGUMENTS = ("study", "paper-1", "--sizes", "12,16,20", "--meshes", "uniform", "--discretisations", "linear")
 STUDY = f"""
 import sys
 from bemkit.cli.main import main
