@@ -16,7 +16,6 @@ NEVER = re.compile(
 """Household words: say "known" or "report", "skip" or "exclude", "warning", "is" or "represents", "any", "only"."""
 ALLOWED = {
     "docs/tutorials/several-bodies.md": ("the thinnest one that stands",),  # an arch, which may fall
-    "docs/large-scenes.md": ("--alone 100000", "--alone 1000000"),  # an option of a benchmark
 }
 FILES = [
     path

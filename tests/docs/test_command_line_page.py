@@ -57,11 +57,19 @@ def test_every_option_is_listed_and_accepted(path: str) -> None:
         if isinstance(parameter, click.Argument):
             assert f"`{path} {parameter.human_readable_name}`" in text
     options = [name for parameter in command.params if isinstance(parameter, click.Option) for name in parameter.opts]
-    assert sorted(all_names(text) if "| option |" in text else []) == sorted(options)
+    shared = re.search(r"^Common options: (.*)\.$", text, re.MULTILINE)
+    common = names_in(shared[1]) if shared else []
+    assert set(common) <= set(all_names(section(PAGE, "Common options")))
+    assert sorted([*common, *(all_names(text) if "| option |" in text else [])]) == sorted(options)
     shown = CliRunner().invoke(cli.commands, [*path.split()[1:], "--help"])
     assert shown.exit_code == 0
     for option in options:
         assert option in shown.output
+
+
+def test_every_common_option_belongs_to_a_command() -> None:
+    used = [name for command in COMMANDS.values() for parameter in command.params for name in parameter.opts]
+    assert all(used.count(name) > 1 for name in all_names(section(PAGE, "Common options")))
 
 
 def test_exit_codes() -> None:

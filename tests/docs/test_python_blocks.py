@@ -22,7 +22,7 @@ PAGES = [ROOT / "README.md", *sorted(set(DOCS.rglob("*.md")) - {DOCS / page for 
 SLOW = [
     DOCS / name
     for name in (
-        *("pictures.md", "reports.md", "error-against-run-time.md", "large-scenes.md", "how-to/large-scenes.md"),
+        *("pictures.md", "reports.md", "error-against-run-time.md", "large-scenes.md"),
         *("tutorials/load-histories.md", "tutorials/a-matrix-free-body.md", "tutorials/rough-surfaces.md"),
         "tutorials/adding-a-driver.md",
     )

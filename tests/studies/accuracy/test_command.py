@@ -152,7 +152,7 @@ def test_a_run_that_fails_shows_in_the_table_and_the_exit_code(tmp_path: Path) -
     [
         (("study", "paper-3"), "no such file or shipped scene"),
         (("study", "bending"), "no part of the scene is in contact"),
-        (("study", "paper-1", "--sizes", "0"), "sizes is 0: give a number from 3"),
+        (("study", "paper-1", "--sizes", "0"), "elements is 0: give a number from 3"),
         (("study", "paper-1", "--sizes", ","), "sizes is ',': give at least one"),
         (("study", "paper-1", "--sizes", "40,many"), "sizes is '40,many': give numbers with commas"),
         (("study", "paper-1", "--sizes", "40,40"), "of size 40 is given twice"),
