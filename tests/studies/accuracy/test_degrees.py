@@ -38,8 +38,8 @@ def test_degrees_are_element_types_with_names_of_their_own() -> None:
 
 def test_wrong_degrees_are_named() -> None:
     scene = bk.load_scene("paper-1")
-    with pytest.raises(StudyError, match=r"degrees is '1,2' and discretisation is 'linear': give one"):
-        options(degrees="1,2", discretisation="linear").runs(scene)
+    with pytest.raises(StudyError, match=r"degrees is '1,2' and discretisations is 'linear': give one"):
+        options(degrees="1,2", discretisations="linear").runs(scene)
     with pytest.raises(StudyError, match=r"degrees is '2\.5': give numbers with commas between them"):
         options(degrees="2.5").runs(scene)
     with pytest.raises(ValueError, match="degree is 13: give a whole number from 1 to 12"):
