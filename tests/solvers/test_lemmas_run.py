@@ -1,4 +1,4 @@
-"""The drivers project with the functions whose lemmas `tests/contact/test_projection.py` proves."""
+"""Solvers project with the functions whose lemmas `tests/solvers/test_lemmas.py` proves."""
 
 import pytest
 
@@ -43,21 +43,3 @@ def test_a_wrong_projection_or_derivative_misleads_newtons_method(name, monkeypa
 def test_a_wrong_derivative_misleads_every_driver(name, solver, monkeypatch):
     """Their linear conditions are those of the sets that the derivatives tell."""
     assert misled(solver, name, monkeypatch)
-
-
-@pytest.mark.parametrize("solver", DRIVERS, ids=lambda solver: type(solver).__name__)
-def test_every_driver_calls_all_four_functions(solver, monkeypatch):
-    calls = dict.fromkeys(WRONG, 0)
-    for name in WRONG:
-        monkeypatch.setattr(active_sets, name, _counted(calls, name))
-    assert solve(PROBLEM, solver).is_converged
-    assert len(set(calls.values())) == 1
-    assert calls["positive_part"] > 3
-
-
-def _counted(calls, name):
-    def function(*arguments):
-        calls[name] += 1
-        return getattr(projection, name)(*arguments)
-
-    return function
