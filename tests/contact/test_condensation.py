@@ -212,18 +212,32 @@ class Heavy:
         light = self.light.condense(replace(conditions, displacement=fixed), force - forces)
         shift = own[conditions.is_retained]
 
-        def recover(retained: FloatArray) -> tuple[FloatArray, FloatArray]:
-            parts = light.recover(retained - shift)
-            return parts[0] + displacement, parts[1] + forces
-
-        def follow(directions: IntArray) -> tuple[FloatArray, FloatArray]:
-            response, at_rest = light.follow(directions)
-            return response, at_rest + own.ravel()[directions] - response @ shift
-
-        load = light.load + light.stiffness @ shift
         x, y = dof_points(self.displacement_space).T
         resultant = -np.array([*forces.sum(axis=0), np.sum(x * forces[:, 1] - y * forces[:, 0])])
-        return replace(light, load=load, recover=recover, follow=follow, volume_force=resultant)
+        return HeavyMap(
+            stiffness=light.stiffness, load=light.load + light.stiffness @ shift, sensitivity=light.sensitivity,
+            work=light.work, volume_force=resultant, light=light, particular=(displacement, forces), own=own,
+            shift=shift,
+        )  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class HeavyMap(CondensedMap):
+    light: CondensedMap
+    particular: tuple[FloatArray, FloatArray]
+    own: FloatArray
+    shift: FloatArray
+
+    def recover(self, retained_displacement: FloatArray) -> tuple[FloatArray, FloatArray]:
+        displacement, force = self.light.recover(retained_displacement - self.shift)
+        return displacement + self.particular[0], force + self.particular[1]
+
+    def under(self, force: FloatArray, displacement: FloatArray) -> CondensedMap:
+        raise NotImplementedError
+
+    def follow(self, directions: IntArray) -> tuple[FloatArray, FloatArray]:
+        response, at_rest = self.light.follow(directions)
+        return response, at_rest + self.own.ravel()[directions] - response @ self.shift
 
 
 def heavy_block(law: FrictionLaw) -> tuple[ContactProblem, DirectBody]:

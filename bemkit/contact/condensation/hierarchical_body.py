@@ -203,7 +203,7 @@ class HierarchicalBody(LinearBody):
         inside = self.inside if inside is None else inside
         conditions = replace(self.conditions, displacement=displacement)
         left, left_force = _left_of(conditions, force, inside)
-        loaded = self.loaded.under(left.displacement, left_force)
+        loaded = self.loaded.under(left_force, left.displacement)
         return replace(self, loaded=loaded, conditions=conditions, force=force, inside=inside)
 
     def recover(self, state: ContactState) -> tuple[FloatArray, FloatArray]:

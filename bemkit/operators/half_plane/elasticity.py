@@ -105,27 +105,57 @@ class _Condensation:
         given, held = data.force.ravel(), data.displacement.ravel()[self.acting]
         rest = self.flexibility @ given
 
-        def response(displaced: FloatArray) -> tuple[FloatArray, FloatArray]:
-            """Return displacements and forces (n_dofs,) in the frames, those of acting directions given."""
-            forces = self.stiffness @ (displaced - rest[self.acting])
-            everywhere, total = rest + self.flexibility[:, self.acting] @ forces, given.copy()
-            everywhere[self.acting], total[self.acting] = displaced, forces
-            return everywhere, total
-
-        def recover(retained_displacement: FloatArray) -> tuple[FloatArray, FloatArray]:
-            displaced = held.copy()
-            displaced[self.retained] = retained_displacement
-            everywhere, total = map(self.conditions.in_plane, response(displaced))
-            return everywhere, total
-
-        def follow(directions: IntArray) -> tuple[FloatArray, FloatArray]:
-            responses = self.flexibility[np.ix_(directions, self.acting)] @ self.stiffness[:, self.retained]
-            return responses, response(held)[0][directions]
-
-        return CondensedMap(
+        return _HalfPlaneMap(
             stiffness=self.stiffness[np.ix_(self.retained, self.retained)],
             load=-(self.stiffness @ (held - rest[self.acting]))[self.retained],
-            recover=recover,
-            under=self.under,
-            follow=follow,
+            condensation=self,
+            given=given,
+            held=held,
+            rest=rest,
         )
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class _HalfPlaneMap(CondensedMap):
+    """The half-plane under one load.
+
+    Parameters
+    ----------
+    condensation : _Condensation
+    given : (n_dofs,) array [N/m]
+        Given forces in the frames.
+    held : (n_acting,) array [m]
+        Displacements of acting directions, the retained ones at rest.
+    rest : (n_dofs,) array [m]
+        What the given forces cause.
+    """
+
+    condensation: _Condensation
+    given: FloatArray
+    held: FloatArray
+    rest: FloatArray
+
+    def recover(self, retained_displacement: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return displacement and force of all elements."""
+        displaced = self.held.copy()
+        displaced[self.condensation.retained] = retained_displacement
+        everywhere, total = map(self.condensation.conditions.in_plane, self._response(displaced))
+        return everywhere, total
+
+    def under(self, force: FloatArray, displacement: FloatArray) -> CondensedMap:
+        """Return the map under other loads."""
+        return self.condensation.under(force, displacement)
+
+    def follow(self, directions: IntArray) -> tuple[FloatArray, FloatArray]:
+        """Return what free directions do."""
+        body = self.condensation
+        responses = body.flexibility[np.ix_(directions, body.acting)] @ body.stiffness[:, body.retained]
+        return responses, self._response(self.held)[0][directions]
+
+    def _response(self, displaced: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return displacements and forces (n_dofs,) in the frames, those of acting directions given."""
+        body = self.condensation
+        forces = body.stiffness @ (displaced - self.rest[body.acting])
+        everywhere, total = self.rest + body.flexibility[:, body.acting] @ forces, self.given.copy()
+        everywhere[body.acting], total[body.acting] = displaced, forces
+        return everywhere, total

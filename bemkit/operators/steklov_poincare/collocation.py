@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import partial
 
 import numpy as np
 
@@ -251,40 +250,31 @@ class MixedSystem:
         traction = self._conditions.in_frames(force).ravel() / self._weights
         at_rest = factor * base.at_rest
         own, retained = self._weights[self._retained], self._retained
-        return CondensedMap(
+        return _MixedMap(
             stiffness=own[:, None] * self._response[retained],
             load=own * (traction[retained] - at_rest[retained]),
-            recover=partial(self._recovered, at_rest, traction, data.displacement.ravel()),
-            under=partial(self._under, base),
-            follow=partial(self._followed, at_rest),
             work=work,
+            system=self,
+            at_rest=at_rest,
+            traction=traction,
+            given=data.displacement.ravel(),
+            base=base,
         )
 
-    def _recovered(
-        self, at_rest: FloatArray, traction: FloatArray, given: FloatArray, retained: FloatArray
-    ) -> tuple[FloatArray, FloatArray]:
-        """Return displacement and force of all elements; see `CondensedMap.recover`.
-
-        Parameters
-        ----------
-        at_rest : (n_dofs,) array
-            The unknowns with the retained displacements at rest.
-        traction, given : (n_dofs,) arrays [Pa], [m]
-            Given tractions and displacements in the frames.
-        retained : (n_retained,) array [m]
-        """
+    def recovered(self, loaded: _MixedMap, retained: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return displacement and force of all elements of a map under retained displacements (n_retained,)."""
         is_free = self._conditions.is_free.ravel()
-        unknowns = at_rest + self._response @ retained
-        local = np.where(is_free, unknowns, given)
+        unknowns = loaded.at_rest + self._response @ retained
+        local = np.where(is_free, unknowns, loaded.given)
         local[self._retained] = retained
-        force = self._weights * np.where(is_free, traction, unknowns)
+        force = self._weights * np.where(is_free, loaded.traction, unknowns)
         return self._conditions.in_plane(local), self._conditions.in_plane(force)
 
-    def _followed(self, at_rest: FloatArray, directions: IntArray) -> tuple[FloatArray, FloatArray]:
-        """Return what free directions do; see `CondensedMap.follow`."""
-        return self._response[directions], at_rest[directions]
+    def followed(self, loaded: _MixedMap, directions: IntArray) -> tuple[FloatArray, FloatArray]:
+        """Return what free directions of a map do; see `CondensedMap.follow`."""
+        return self._response[directions], loaded.at_rest[directions]
 
-    def _under(self, base: _Solved, force: FloatArray, displacement: FloatArray) -> CondensedMap:
+    def under(self, base: _Solved, force: FloatArray, displacement: FloatArray) -> CondensedMap:
         """Return the condensed map under other data; load factors, the usual case, take no other solution."""
         data, work = GivenData.of(self._conditions, force, displacement), OperationCounts()
         factor = data.factor_of(base.data)
@@ -293,6 +283,40 @@ class MixedSystem:
             base, factor = _Solved(data, self._solution(data, known)), 1.0
             work = of_sweep + OperationCounts(right_hand_sides=1)
         return self._condensed(force, data, base, factor, work)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class _MixedMap(CondensedMap):
+    """The body under one load.
+
+    Parameters
+    ----------
+    system : MixedSystem
+    at_rest : (n_dofs,) array
+        The unknowns with the retained displacements at rest.
+    traction, given : (n_dofs,) arrays [Pa], [m]
+        Given tractions and displacements in the frames.
+    base : _Solved
+        A load of which this one is a multiple.
+    """
+
+    system: MixedSystem
+    at_rest: FloatArray
+    traction: FloatArray
+    given: FloatArray
+    base: _Solved
+
+    def recover(self, retained_displacement: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return displacement and force of all elements."""
+        return self.system.recovered(self, retained_displacement)
+
+    def under(self, force: FloatArray, displacement: FloatArray) -> CondensedMap:
+        """Return the map under other loads."""
+        return self.system.under(self.base, force, displacement)
+
+    def follow(self, directions: IntArray) -> tuple[FloatArray, FloatArray]:
+        """Return what free directions do."""
+        return self.system.followed(self, directions)
 
 
 def _dofs(elements: IntArray) -> IntArray:

@@ -84,16 +84,20 @@ class ForcesInside:
             Under what is left of the given data: see `left_of`.
         conditions : NodalConditions
         """
-        heavy = _Heavy(self, weightless, conditions)
-        return replace(
-            weightless,
-            load=weightless.load + weightless.stiffness @ heavy.shift,
-            recover=heavy.recover,
-            under=heavy.under,
-            follow=heavy.follow,
+        along = conditions.in_frames(self.displacement)
+        shift = along[conditions.is_retained]
+        return _HeavyMap(
+            stiffness=weightless.stiffness,
+            load=weightless.load + weightless.stiffness @ shift,
+            sensitivity=weightless.sensitivity,
+            work=weightless.work,
             volume_force=self.volume_force,
             inner_force=self.inner_force,
             weightless=weightless,
+            inside=self,
+            conditions=conditions,
+            along=along,
+            shift=shift,
         )
 
     def left_of(self, conditions: NodalConditions, force: FloatArray) -> tuple[NodalConditions, FloatArray]:
@@ -108,37 +112,41 @@ class ForcesInside:
         return self.add_to(weightless.under(left_force, left.displacement), conditions)
 
 
-@dataclass(frozen=True, eq=False)
-class _Heavy:
-    """A condensed map under forces inside; see `ForcesInside.add_to`."""
+@dataclass(frozen=True, eq=False, kw_only=True)
+class _HeavyMap(CondensedMap):
+    """A condensed map under forces inside; see `ForcesInside.add_to`.
 
-    inside: ForcesInside
+    Parameters
+    ----------
+    weightless : CondensedMap
+        Without what acts inside.
+    inside : ForcesInside
+    conditions : NodalConditions
+    along : (n_nodes, 2) array [m]
+        The particular solution in the frames.
+    shift : (n_retained,) array [m]
+        The same along the retained directions.
+    """
+
     weightless: CondensedMap
+    inside: ForcesInside
     conditions: NodalConditions
-
-    @cached_property
-    def own(self) -> FloatArray:
-        """(n_nodes, 2) array [m]: the particular solution in the frames."""
-        return self.conditions.in_frames(self.inside.displacement)
-
-    @property
-    def shift(self) -> FloatArray:
-        """(n_retained,) array [m]: it along the retained directions."""
-        return np.asarray(self.own[self.conditions.is_retained])
+    along: FloatArray
+    shift: FloatArray
 
     def recover(self, retained_displacement: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """See `CondensedMap`."""
+        """Return displacement and force of all nodes."""
         displacement, force = self.weightless.recover(retained_displacement - self.shift)
         return displacement + self.inside.displacement, force + self.inside.force
 
     def under(self, force: FloatArray, displacement: FloatArray) -> CondensedMap:
-        """See `CondensedMap`."""
+        """Return the map under other loads and the same forces inside."""
         return self.inside.under(self.weightless, replace(self.conditions, displacement=displacement), force)
 
     def follow(self, directions: IntArray) -> tuple[FloatArray, FloatArray]:
-        """See `CondensedMap`."""
+        """Return what free directions do."""
         response, at_rest = self.weightless.follow(directions)
-        return response, at_rest + self.own.ravel()[directions] - response @ self.shift
+        return response, at_rest + self.along.ravel()[directions] - response @ self.shift
 
 
 def condensed_under(

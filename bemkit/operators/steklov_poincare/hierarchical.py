@@ -34,43 +34,41 @@ class InexactEquationsError(SingularMatrixError):
     """Compressed equations that are not as accurate as their tolerance says."""
 
 
-@dataclass(frozen=True, eq=False)
-class _Condensed:
+@dataclass(frozen=True, eq=False, kw_only=True)
+class _EquationsMap(CondensedMap):
     """A body under one load, solved for a unit displacement of each retained direction.
 
     Parameters
     ----------
-    body : HierarchicalCollocation
     loaded : LoadedSystem
-    stiffness : (n_retained, n_retained) array [Pa]
     """
 
-    body: HierarchicalCollocation
     loaded: LoadedSystem
-    stiffness: FloatArray
 
-    def map(self) -> CondensedMap:
-        """Return the condensed map."""
-        loaded, load = self.loaded, np.zeros(0)
-        if loaded.retained.size:
-            _, forces = self.recover(np.zeros(loaded.retained.size))
-            load = -loaded.conditions.in_frames(forces - loaded.force).ravel()[loaded.retained]
-        return CondensedMap(self.stiffness, load, self.recover, self.under, self.follow)
+    @classmethod
+    def of(cls, loaded: LoadedSystem, stiffness: FloatArray) -> _EquationsMap:
+        """Return the map of a body whose stiffness is known."""
+        at_rest = cls(stiffness=stiffness, load=np.zeros(0), loaded=loaded)
+        if not loaded.retained.size:
+            return at_rest
+        _, forces = at_rest.recover(np.zeros(loaded.retained.size))
+        pressed = loaded.conditions.in_frames(forces - loaded.force).ravel()[loaded.retained]
+        return replace(at_rest, load=-pressed)
 
     def recover(self, retained_displacement: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """See `CondensedMap`."""
+        """Return displacement and force of all elements."""
         displacement, traction = self.loaded.recovered(retained_displacement)
-        return displacement, traction * self.body.mesh.lengths[:, None]
+        return displacement, traction * self.loaded.map.mesh.lengths[:, None]
 
     def follow(self, directions: IntArray) -> tuple[FloatArray, FloatArray]:
-        """See `CondensedMap`."""
+        """Return what free directions do."""
         displacement, _ = self.recover(np.zeros(self.loaded.retained.size))
         at_rest = self.loaded.conditions.in_frames(displacement).ravel()[directions]
         return self.loaded.responses(directions)[1], at_rest
 
     def under(self, force: FloatArray, displacement: FloatArray) -> CondensedMap:
-        """See `CondensedMap`."""
-        return _Condensed(self.body, self.loaded.under(displacement, force), self.stiffness).map()
+        """Return the map under other loads."""
+        return _EquationsMap.of(self.loaded.under(force, displacement), self.stiffness)
 
 
 class HierarchicalCollocation(CollocationElasticity):
@@ -132,7 +130,7 @@ class HierarchicalCollocation(CollocationElasticity):
                 "the linear solver MatrixFree forms no stiffness: condense this body with Hierarchical() or densely"
             )
         loaded = LoadedSystem.of(self, conditions, force)
-        condensed = _Condensed(self, loaded, loaded.stiffness()).map()
+        condensed = _EquationsMap.of(loaded, loaded.stiffness())
         residual = loaded.residual(np.cos(np.arange(loaded.retained.size)))
         if residual > _LARGEST_RESIDUAL * self.options.tolerance:
             raise InexactEquationsError(
@@ -195,12 +193,12 @@ class LoadedSystem:
         nothing = ElementLaws(np.zeros((0, 4, 2)), np.zeros((0, 4)))
         loaded = cls(map, conditions, system, nothing, may_be_loaded, may_move, force, motions, at_rest).moved(at_rest)
         if conditions.later and isinstance(map.options, Hierarchical):
-            later = (loaded.under(given.displacement, conditions.in_plane(given.force)) for given in conditions.later)
+            later = (loaded.under(conditions.in_plane(given.force), given.displacement) for given in conditions.later)
             system.expect(each.known.given for each in (loaded, *later))
         return loaded
 
-    def under(self, displacement: FloatArray, force: FloatArray) -> LoadedSystem:
-        """Return the same body under other given displacements, in the frames, and forces in x and y."""
+    def under(self, force: FloatArray, displacement: FloatArray) -> LoadedSystem:
+        """Return the same body under other forces in x and y, and given displacements in the frames."""
         conditions = replace(self.conditions, displacement=displacement)
         is_loaded, is_moved = _loaded(conditions, force)
         if np.any(is_loaded & ~self.may_be_loaded) or np.any(is_moved & ~self.may_move):

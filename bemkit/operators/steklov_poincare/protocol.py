@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
 from typing import Protocol
 
@@ -13,8 +13,8 @@ from bemkit.operators.material import Material
 from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions
 
 
-@dataclass(frozen=True, eq=False)
-class CondensedMap:
+@dataclass(frozen=True, eq=False, kw_only=True)
+class CondensedMap(ABC):
     """A body reduced to its retained directions: force = stiffness @ displacement - load.
 
     Parameters
@@ -23,15 +23,6 @@ class CondensedMap:
         In weak form (forces, not tractions).
     load : (n_retained,) array
         What the given loads and supports press onto the retained directions.
-    recover : callable
-        (n_retained,) displacements -> displacement (n_nodes, 2) and total boundary force (n_nodes, 2) of all nodes, in
-        x and y.
-    under : callable
-        Other given forces (n_nodes, 2) in x and y and prescribed displacements (n_nodes, 2) in the frames of the
-        nodes -> the same body under them, without another factorisation.
-    follow : callable
-        (k,) numbers (2 node + component) of free directions -> response (k, n_retained) and at_rest (k,) of the
-        displacements there: ``at_rest + response @ retained_displacement``.
     sensitivity : (n_nodes, 2) array, optional
         Sum of the sizes of all forces that a unit displacement of each node causes. Of thin bodies it is many orders
         above the forces themselves, which then are differences and carry its round-off.
@@ -49,14 +40,34 @@ class CondensedMap:
 
     stiffness: FloatArray
     load: FloatArray
-    recover: Callable[[FloatArray], tuple[FloatArray, FloatArray]]
-    under: Callable[[FloatArray, FloatArray], CondensedMap]
-    follow: Callable[[IntArray], tuple[FloatArray, FloatArray]]
     sensitivity: FloatArray | None = None
     work: OperationCounts = field(default_factory=OperationCounts)
     volume_force: FloatArray | None = None
     inner_force: float = 0.0
     weightless: CondensedMap | None = None
+
+    @abstractmethod
+    def recover(self, retained_displacement: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return displacement (n_nodes, 2) and total boundary force (n_nodes, 2) of all nodes, in x and y."""
+
+    @abstractmethod
+    def under(self, force: FloatArray, displacement: FloatArray) -> CondensedMap:
+        """Return the same body under other loads, without another factorisation.
+
+        Parameters
+        ----------
+        force : (n_nodes, 2) array [N/m]
+            In x and y.
+        displacement : (n_nodes, 2) array [m]
+            Prescribed displacements in the frames of the nodes.
+        """
+
+    @abstractmethod
+    def follow(self, directions: IntArray) -> tuple[FloatArray, FloatArray]:
+        """Return response (k, n_retained) and at_rest (k,) of displacements of free directions (2 node + component).
+
+        They are ``at_rest + response @ retained_displacement``.
+        """
 
 
 class SteklovPoincare(Protocol):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from functools import partial
 
 import numpy as np
 
@@ -77,38 +76,59 @@ class SchurCondensation:
         known = self.conditions.in_frames(force).ravel() - self._of_fixed @ prescribed
         at_rest, pressure = self._held.solve(known[self._free], -self._volume[self._fixed].T @ prescribed)
         load = known[self._retained] - self._coupling.T @ at_rest - self._volume[self._retained] @ pressure
-        return CondensedMap(
-            self._stiffness,
-            load,
-            partial(self._recovered, prescribed, at_rest, pressure),
-            self.under,
-            partial(self._followed, at_rest),
-            self._sensitivity,
+        return _SchurMap(
+            stiffness=self._stiffness,
+            load=load,
+            sensitivity=self._sensitivity,
             work=OperationCounts(right_hand_sides=1),
+            condensation=self,
+            prescribed=prescribed,
+            at_rest=at_rest,
+            pressure=pressure,
         )
 
-    def _recovered(
-        self, prescribed: FloatArray, at_rest: FloatArray, pressure: FloatArray, retained: FloatArray
-    ) -> tuple[FloatArray, FloatArray]:
-        """Return displacement and force of all nodes; see `CondensedMap.recover`.
-
-        Parameters
-        ----------
-        prescribed, at_rest : (n_fixed,), (n_free,) arrays [m]
-            Displacements of fixed directions, and of free ones with the retained ones at rest.
-        pressure : (n_pressures,) array
-            As `VolumeConstraint.solve` gives it.
-        retained : (n_retained,) array [m]
-        """
+    def recovered(self, loaded: _SchurMap, retained: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return displacement and force of all nodes of a map under retained displacements (n_retained,)."""
         local = np.empty(len(self.matrix))
-        local[self._fixed], local[self._retained] = prescribed, retained
-        local[self._free] = at_rest + self._response @ retained
+        local[self._fixed], local[self._retained] = loaded.prescribed, retained
+        local[self._free] = loaded.at_rest + self._response @ retained
         displacement = self.conditions.in_plane(local)
         force = self.matrix @ displacement.ravel()
-        force += self.volume.change @ (pressure + self._pressures @ retained)
+        force += self.volume.change @ (loaded.pressure + self._pressures @ retained)
         return displacement, force.reshape(-1, 2)
 
-    def _followed(self, at_rest: FloatArray, directions: IntArray) -> tuple[FloatArray, FloatArray]:
-        """Return what free directions do; see `CondensedMap.follow`."""
+    def followed(self, loaded: _SchurMap, directions: IntArray) -> tuple[FloatArray, FloatArray]:
+        """Return what free directions of a map do; see `CondensedMap.follow`."""
         rows = np.searchsorted(self._free, directions)
-        return self._response[rows], at_rest[rows]
+        return self._response[rows], loaded.at_rest[rows]
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class _SchurMap(CondensedMap):
+    """The body under one load.
+
+    Parameters
+    ----------
+    condensation : SchurCondensation
+    prescribed, at_rest : (n_fixed,), (n_free,) arrays [m]
+        Displacements of fixed directions, and of free ones with the retained ones at rest.
+    pressure : (n_pressures,) array
+        As `VolumeConstraint.solve` gives it.
+    """
+
+    condensation: SchurCondensation
+    prescribed: FloatArray
+    at_rest: FloatArray
+    pressure: FloatArray
+
+    def recover(self, retained_displacement: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return displacement and force of all nodes."""
+        return self.condensation.recovered(self, retained_displacement)
+
+    def under(self, force: FloatArray, displacement: FloatArray) -> CondensedMap:
+        """Return the map under other loads."""
+        return self.condensation.under(force, displacement)
+
+    def follow(self, directions: IntArray) -> tuple[FloatArray, FloatArray]:
+        """Return what free directions do."""
+        return self.condensation.followed(self, directions)
