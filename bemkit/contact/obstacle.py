@@ -16,9 +16,9 @@ from bemkit.arrays import FloatArray
 from bemkit.errors import InputError
 from bemkit.formulas import ScalarField, check_field, evaluate_field
 
-FACING_TOLERANCE = 1e-12
+FACING_TOLERANCE = 1e-3
 """Cosine of the angle between the body's normal and the direction of contact up to which a point does not face the
-obstacle: it is zero, but for round-off, where a side runs along the direction of contact."""
+obstacle: it would have to slide a thousand times as far as it approaches."""
 
 
 class Obstacle(Protocol):

@@ -19,6 +19,7 @@ from bemkit.geometry.spaces import dof_points
 from bemkit.model.assembled.model import AssembledModel, build_assembled_model
 from bemkit.model.assembled.prepared import PreparedAssembly, prepare_assembly_steps
 from bemkit.model.assembled.turning import with_turning_checked
+from bemkit.model.finite_sliding import with_sliding_checked
 from bemkit.model.solved_contact import with_energies_checked
 from bemkit.plan import Plan
 from bemkit.plan.assembly_plan import plan_assembly
@@ -117,7 +118,7 @@ def _prepared(
 
 
 def _checked(model: AssembledModel, result: ContactSolution) -> ContactSolution:
-    return with_turning_checked(model, with_energies_checked(model, result))
+    return with_sliding_checked(model, with_turning_checked(model, with_energies_checked(model, result)))
 
 
 def _explained(model: AssembledModel, load: UnsolvableLoad) -> str:

@@ -54,6 +54,10 @@ class Status(Enum):
         "The elastic energy is negative or can become so, because the elements are too long for collocation; "
         "use more elements, at least two for the thickness of a thin body, or linear or quadratic Galerkin elements."
     )
+    FINITE_SLIDING = (
+        "Contacts move so far along their surfaces that gaps and directions of the undeformed bodies no longer hold; "
+        "draw the bodies where they come to rest, or move them less."
+    )
     NOT_FINITE = "Numbers overflowed or became undefined; check stiffness, load and friction law for huge entries."
 
 

@@ -150,6 +150,7 @@ def test_every_status_has_a_case():
         Status.UNFINISHED,
         Status.LOAD_NOT_REACHED,
         Status.MISSED_CONTACT,
+        Status.FINITE_SLIDING,
     }
     assert {case[0] for case in CASES.values()} == set(Status) - by_run
 

@@ -1,0 +1,139 @@
+"""Contacts that move so far along their surfaces that gaps and directions of the undeformed bodies no longer hold.
+
+Contact is linearised about the undeformed bodies: each node keeps its partner, its gap and its direction. A motion
+along a plane changes none of these. Any other motion that is long beside the deformation puts the contact forces in
+the wrong place: bodies may then come to rest where there is no equilibrium.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from bemkit.arrays import BoolArray, FloatArray
+from bemkit.contact.obstacle import Cavity, Circle, HalfPlane, Obstacle, measure_contact
+from bemkit.contact.polygon import PolygonalObstacle
+from bemkit.contact.signed_distance import SignedDistance
+from bemkit.contact.spline import SplineObstacle
+from bemkit.geometry.spaces import element_nodes
+from bemkit.geometry.vectors import norms
+from bemkit.model.assembled.contacts import ContactRows
+from bemkit.model.assembled.model import AssembledModel
+from bemkit.model.assembled.placed import PlacedBody
+from bemkit.model.assembled.prepared import PreparedAssembly
+from bemkit.scene.conditions import Contact
+from bemkit.scene.unit_names import amount
+from bemkit.solvers.base import ContactSolution, Status
+
+IN_THE_PLANE = (HalfPlane, Circle, Cavity, PolygonalObstacle, SplineObstacle, SignedDistance)
+"""Obstacles with a position in the plane, so that their distance from a point that has moved is known."""
+_BY_DEFORMATION = 5.0
+"""Displacements by contact forces, up to which a motion along a contact is one of deformation."""
+_OFF = 0.2
+"""Change of gaps beside the displacement by contact forces from which on pressures are wrong."""
+_LEAST_COSINE = 0.866
+"""Cosine of the angle by which a direction of contact may turn: 30 degrees."""
+_LEAST_FACING = 0.5
+"""Cosine of 60 degrees between the normal of a body and the direction of contact, below which contact is oblique."""
+_SHARE_OF_ZONE = 0.05
+"""Part of the length of contact that a motion may take where it is longer than an element."""
+
+
+def with_sliding_checked(model: AssembledModel, result: ContactSolution) -> ContactSolution:
+    """Return the outcome of a solve, named FINITE_SLIDING if a contact has moved too far along its surface."""
+    prepared = model.prepared
+    if not result.is_converged or not prepared.n_contact:
+        return result
+    ends = np.cumsum([rows.n_contact for rows in prepared.rows])[:-1]
+    displacements = np.split(result.state.displacement * prepared.units.displacement, ends)
+    tractions = np.split(result.state.traction * prepared.units.stress, ends)
+    forces = [rows.weights @ norms(traction) for rows, traction in zip(prepared.rows, tractions, strict=True)]
+    softest = min(body.material.plane_modulus for body in prepared.bodies)
+    deformation = float(max(forces)) / softest
+    for rows, displacement, traction in zip(prepared.rows, displacements, tractions, strict=True):
+        reason = _moved(prepared, rows, displacement, norms(traction) > 0.0, deformation)
+        if reason:
+            status = Status.FINITE_SLIDING
+            return replace(result, status=status, message=f"{status.value} [{reason}]")
+    return result
+
+
+def _moved(
+    prepared: PreparedAssembly, rows: ContactRows, displacement: FloatArray, is_pressed: BoolArray, deformation: float
+) -> str:
+    """Say how far the pressed nodes of a contact move along it; empty if gaps and directions still hold.
+
+    Parameters
+    ----------
+    prepared : PreparedAssembly
+    rows : ContactRows
+    displacement : (n, 2) array [m]
+        Relative, normal and tangential.
+    is_pressed : (n,) bool array
+    deformation : float [m]
+        The displacement that contact forces cause.
+    """
+    if not is_pressed.any() or norms(displacement[is_pressed]).max() <= _BY_DEFORMATION * deformation:
+        return ""
+    number = rows.other - len(prepared.bodies)
+    if number < 0 <= rows.other:
+        is_off = _is_off_side(rows, displacement[:, 1], is_pressed, deformation)
+    else:
+        obstacle = _fixed_obstacle(prepared, rows) if number < 0 else prepared.assembly.rigid[number].obstacle
+        is_off = _is_off_obstacle(rows, obstacle, displacement, is_pressed, deformation)
+        is_off = is_off or _is_oblique(prepared.bodies[rows.body], rows, is_pressed)
+    if not is_off:
+        return ""
+    units = prepared.assembly.units
+    length = amount(float(norms(displacement[is_pressed]).max()), "length", units, 3)
+    beside = amount(deformation, "length", units, 3)
+    return (
+        f"contact {rows.name!r}: the sides move by {length} along each other, and contact forces displace by {beside}: "
+        "draw the bodies where they come to rest, hold what slides, or move it less"
+    )
+
+
+def _is_off_side(rows: ContactRows, slide: FloatArray, is_pressed: BoolArray, deformation: float) -> bool:
+    """Whether another elastic body has moved (n,) [m] by more than its elements, or to where the gap is another one."""
+    longest = np.abs(slide[is_pressed]).max()
+    zone = rows.weights[is_pressed]
+    if longest > max(float(zone.mean()), _SHARE_OF_ZONE * float(zone.sum())):
+        return True
+    # both sides turn by the same angle from their mean normal: half of the change of the gap belongs to the partner
+    order = np.argsort(rows.arc_length)
+    s, gap = rows.arc_length[order], rows.gap[order]
+    changes = [np.interp(rows.arc_length + sign * slide, s, gap) - rows.gap for sign in (-1.0, 1.0)]
+    return bool(0.5 * np.abs(changes)[:, is_pressed].max() > _OFF * deformation)
+
+
+def _is_off_obstacle(
+    rows: ContactRows, obstacle: Obstacle, displacement: FloatArray, is_pressed: BoolArray, deformation: float
+) -> bool:
+    """Whether pressed nodes have come to where the obstacle is elsewhere, or faces them in another direction."""
+    if not isinstance(obstacle, IN_THE_PLANE):
+        return False
+    points, frame, moved = rows.points[is_pressed], rows.frame[is_pressed], displacement[is_pressed]
+    gap, _ = measure_contact(obstacle, points, frame[:, 0])
+    followed, direction = measure_contact(obstacle, points + np.einsum("nk,nkc->nc", moved, frame), frame[:, 0])
+    off = np.abs(followed - (gap - moved[:, 0]))
+    turned = np.sum(direction * frame[:, 0], axis=1)
+    return bool((off > _OFF * deformation).any() or (turned < _LEAST_COSINE).any())
+
+
+def _is_oblique(body: PlacedBody, rows: ContactRows, is_pressed: BoolArray) -> bool:
+    """Whether a pressed node touches at a large angle to the sides of the body that meet there."""
+    elements, space = rows.elements, body.space
+    normals = body.mesh.normals_at(elements, element_nodes(space)[elements])
+    towards = np.zeros((space.n_dofs // 2, 2))
+    towards[rows.nodes] = rows.frame[:, 0]
+    facing = np.full(len(towards), -1.0)
+    np.maximum.at(facing, space.element_dofs[elements], np.sum(normals * towards[space.element_dofs[elements]], axis=2))
+    return bool((facing[rows.nodes[is_pressed]] < _LEAST_FACING).any())
+
+
+def _fixed_obstacle(prepared: PreparedAssembly, rows: ContactRows) -> Obstacle:
+    """Return the fixed obstacle of a contact."""
+    parts = prepared.bodies[rows.body].scene.parts
+    stated = {part.name: part.condition for part in parts if isinstance(part.condition, Contact)}
+    return stated[rows.part].obstacle

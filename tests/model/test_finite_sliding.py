@@ -1,0 +1,119 @@
+"""Bodies that move along their contacts beyond what undeformed gaps and directions describe are never converged."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import bemkit as bk
+from bemkit.runs.steps import UnsolvableSceneError
+
+BLOCK = bk.Body(
+    name="block",
+    shape=bk.Rectangle(4.0, 1.5, (-2.0, -1.5)),
+    material=bk.Material(1.0, 0.3),
+    parts=(bk.Part("base", bk.Clamped(), ("bottom",)),),
+)
+SLIDES = "contact 'block.top / .*': the sides move by .* along each other, and contact forces displace by"
+
+
+def square(bottom: float) -> bk.PolygonalObstacle:
+    return bk.PolygonalObstacle(((-0.8, bottom), (0.8, bottom), (0.8, 1.0), (-0.8, 1.0)))
+
+
+def pressed(obstacle: bk.Obstacle, law: bk.FrictionLaw, **motion: float) -> bk.Assembly:
+    """Return a rigid body above a block."""
+    punch = bk.RigidBody(name="punch", obstacle=obstacle, centre=(0.0, 0.0), **motion)
+    return bk.Assembly(
+        title="Pressed",
+        bodies=(BLOCK,),
+        rigid=(punch,),
+        contacts=(bk.ContactPair(("block.top", "punch")),),
+        law=law,
+        discretisation=bk.Galerkin(2),
+        mesh=bk.MeshOptions(elements=96),
+    )
+
+
+def on_block(shape: bk.Shape, sides: tuple[str, ...], held: tuple[str, ...], drag: float) -> bk.Assembly:
+    """Return an elastic body that is pressed onto a block and dragged."""
+    upper = bk.Body(
+        name="upper",
+        shape=shape,
+        material=bk.Material(1.0, 0.3),
+        parts=(
+            bk.Part("foot", bk.Free(), sides),
+            bk.Part("held", bk.PrescribedDisplacement(drag, -1e-3), held),
+        ),
+    )
+    contact = bk.ContactPair(("block.top", "upper.foot"), reach=0.3)
+    return replace(pressed(square(0.0), bk.Frictionless(), x=0.0), bodies=(BLOCK, upper), rigid=(), contacts=(contact,))
+
+
+def refused(assembly: bk.Assembly) -> None:
+    solution = bk.run(assembly)
+    assert solution.status is bk.Status.FINITE_SLIDING, solution.message
+    assert "draw the bodies where they come to rest" in solution.message
+    assert not solution.is_certified
+    assert not any("more elements" in warning.text for warning in solution.warnings)
+
+
+@pytest.mark.parametrize("gap", [0.0, 1e-7, 1e-5])
+def test_a_punch_pushed_sideways_without_friction_has_no_equilibrium_whatever_its_gap(gap: float) -> None:
+    push = pressed(square(gap), bk.Frictionless(), force_x=2e-8, force_y=-1e-6)
+    with pytest.raises(UnsolvableSceneError, match="the load slides body 'punch' along body 'block'"):
+        bk.run(push)
+
+
+def test_a_punch_that_slides_until_its_side_meets_a_node_is_refused() -> None:
+    refused(pressed(square(1e-3), bk.Frictionless(), force_x=2e-8, force_y=-1e-6))
+
+
+@pytest.mark.parametrize("drag", [0.0, 1e-3])
+def test_a_rigid_cylinder_may_move_by_a_share_of_its_contact(drag: float) -> None:
+    assert bk.run(pressed(bk.Circle((0.0, 1.0), 1.0), bk.Frictionless(), x=drag, y=-1e-3)).is_converged
+
+
+@pytest.mark.parametrize("obstacle", [bk.Circle((0.0, 1.0), 1.0), square(0.0)])
+def test_a_rigid_body_moves_by_more_than_its_contact(obstacle: bk.Obstacle) -> None:
+    refused(pressed(obstacle, bk.Frictionless(), x=0.1, y=-1e-3))
+
+
+def test_a_rigid_plane_moves_along_itself_without_limit_and_drags_by_friction() -> None:
+    plane = bk.HalfPlane((0.0, 0.0), (0.0, -1.0))
+    solution = bk.run(pressed(plane, bk.Coulomb(0.3), x=0.5, y=-1e-3))
+    assert solution.is_converged, solution.message
+    punch = solution.rigid["punch"]
+    assert punch.force_x == pytest.approx(-0.3 * punch.force_y, rel=1e-9)  # all nodes slip
+
+
+@pytest.mark.parametrize("drag", [0.0, 1e-3])
+def test_two_bodies_may_move_by_less_than_an_element(drag: float) -> None:
+    assert bk.run(on_block(bk.Disk(1.0, (0.0, 1.0)), ("arc-3", "arc-4"), ("arc-1", "arc-2"), drag)).is_converged
+    assert bk.run(on_block(bk.Rectangle(2.0, 1.0, (-1.0, 0.0)), ("bottom",), ("top",), 20.0 * drag)).is_converged
+
+
+def test_two_bodies_are_dragged_by_more_than_their_contact() -> None:
+    refused(on_block(bk.Disk(1.0, (0.0, 1.0)), ("arc-3", "arc-4"), ("arc-1", "arc-2"), 0.1))
+    refused(on_block(bk.Rectangle(2.0, 1.0, (-1.0, 0.0)), ("bottom",), ("top",), 0.5))
+
+
+def test_the_rule_does_not_depend_on_units_and_position() -> None:
+    """The same cylinder in millimetres and MPa, a hundred radii away."""
+    for drag, status in ((1e-3, bk.Status.CONVERGED), (0.1, bk.Status.FINITE_SLIDING)):
+        near = pressed(bk.Circle((0.0, 1.0), 1.0), bk.Frictionless(), x=drag, y=-1e-3)
+        block = replace(BLOCK, shape=bk.Rectangle(4e3, 1.5e3, (98e3, -1.5e3)), material=bk.Material(1e-6, 0.3))
+        far_away = bk.RigidBody(
+            name="punch", obstacle=bk.Circle((1e5, 1e3), 1e3), centre=(1e5, 0.0), x=1e3 * drag, y=-1.0
+        )
+        assert bk.run(near).status is bk.run(replace(near, bodies=(block,), rigid=(far_away,))).status is status
+
+
+def test_loads_of_any_size_deform_without_sliding() -> None:
+    """Displacements grow with the load, and so does what contact forces displace."""
+    for force in (1e-9, 1e-3):
+        solution = bk.run(pressed(square(0.0), bk.Coulomb(0.3), force_x=0.1 * force, force_y=-force))
+        assert solution.is_converged, solution.message
+        assert np.isfinite(solution.contact.sigma_n).all()
