@@ -54,10 +54,7 @@ class Status(Enum):
         "The elastic energy is negative or can become so, because the elements are too long for collocation; "
         "use more elements, at least two for the thickness of a thin body, or linear or quadratic Galerkin elements."
     )
-    FINITE_SLIDING = (
-        "Contacts move so far along their surfaces that gaps and directions of the undeformed bodies no longer hold; "
-        "draw the bodies where they come to rest, or move them less."
-    )
+    FINITE_SLIDING = "Contacts slide farther than small displacements describe; draw bodies where they come to rest."
     NOT_FINITE = "Numbers overflowed or became undefined; check stiffness, load and friction law for huge entries."
 
 
