@@ -15,6 +15,11 @@ def surface_body(
 ) -> SurfaceBody:
     """Return a half-plane as contact sees it; the parameters are those of `SurfaceBody`."""
     if isinstance(elastic, HalfPlaneElasticity):
+        from bemkit.contact.half_plane.large_strip_body import LargeStripBody
+        from bemkit.operators.half_plane.large import LargeHalfPlane
+
+        if isinstance(elastic, LargeHalfPlane) and not conditions.is_fixed.any():
+            return LargeStripBody(elastic, conditions, nodes, force)
         from bemkit.contact.half_plane.strip_body import StripBody
 
         return StripBody(elastic, conditions, nodes, force)

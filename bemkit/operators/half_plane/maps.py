@@ -4,11 +4,18 @@ from __future__ import annotations
 
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.operators.half_plane.elasticity import HalfPlaneElasticity, half_plane_work
+from bemkit.operators.half_plane.large import LargeHalfPlane
 from bemkit.operators.half_plane.periodic import PeriodicElasticity
 from bemkit.operators.material import Material
 from bemkit.operators.steklov_poincare.needs import CONTACT_STEPS, BodyCase, BodyNeeds, PlanItem
 
 _BYTES = 8
+LARGEST_DENSE = 1500
+"""Elements up to which the flexibility of a strip is kept as a matrix."""
+_BYTES_OF_TREE = 10_000
+"""Of an element beyond that."""
+_FLOPS_OF_TREE = 6e5
+"""Of an element there: all responses together."""
 _BASIS = 120
 """Vectors that the iteration for a response keeps, all others included."""
 _RESPONSES, _ITERATIONS, _FLOPS_OF_TRANSFORM = 20, 40, 500.0
@@ -17,8 +24,9 @@ _RESPONSES, _ITERATIONS, _FLOPS_OF_TRANSFORM = 20, 40, 500.0
 
 def half_plane_map(mesh: BoundaryMesh, material: Material) -> HalfPlaneElasticity | PeriodicElasticity:
     """Return the map of the half-plane whose surface the mesh is."""
-    is_periodic = mesh.surface is not None and mesh.surface.is_periodic
-    return (PeriodicElasticity if is_periodic else HalfPlaneElasticity)(mesh, material)
+    if mesh.surface is not None and mesh.surface.is_periodic:
+        return PeriodicElasticity(mesh, material)
+    return (HalfPlaneElasticity if mesh.n_elements <= LARGEST_DENSE else LargeHalfPlane)(mesh, material)
 
 
 def half_plane_needs(case: BodyCase) -> BodyNeeds:
@@ -41,6 +49,16 @@ def half_plane_needs(case: BodyCase) -> BodyNeeds:
             kept=8 * matrix + 2 * square,
             evaluations=4.0 * n**2,
             flops=4.0 / 3.0 * float(n_acting) ** 3,
+        )
+    if n > LARGEST_DENSE and not case.n_fixed:
+        leaves = PlanItem("tree of clusters", True, f"{n} elements are more than {LARGEST_DENSE}: one factor over them")
+        kept = _BYTES_OF_TREE * n
+        return BodyNeeds(
+            items=(*items, leaves),
+            memory=kept,
+            kept=kept,
+            flops=_FLOPS_OF_TREE * n,
+            is_matrix_free=True,
         )
     kept = matrix + 3 * square  # the equations of closed nodes, at most all, and their factor
     flops = CONTACT_STEPS * 2.0 / 3.0 * float(n_acting) ** 3

@@ -40,7 +40,12 @@ class Compression:
 
     @classmethod
     def of(
-        cls, equations: BoundaryEquations, tree: ClusterTree, may_differ: BoolArray, tolerance: float
+        cls,
+        equations: BoundaryEquations,
+        tree: ClusterTree,
+        may_differ: BoolArray,
+        tolerance: float,
+        level_view: type[LevelView] = LevelView,
     ) -> Compression:
         """Compress the equations.
 
@@ -53,6 +58,8 @@ class Compression:
             By place: which tractions and displacements may differ from zero.
         tolerance : float
             Of the skeletons of leaves; those above are finer, so that errors do not grow with the number of elements.
+        level_view : type of LevelView
+            How skeletons are chosen.
         """
         n, supports = equations.points.size, equations.supports
         every = np.arange(4 * n).reshape(-1, 4)
@@ -64,7 +71,7 @@ class Compression:
         levels: list[tuple[Skeleton, ...]] = []
         for level in range(tree.n_levels):
             discs = Discs.around(tree, level, supports)
-            view = LevelView(equations, discs, rows, candidates, extent, tolerance, is_lowest=level == 0)
+            view = level_view(equations, discs, rows, candidates, extent, tolerance, is_lowest=level == 0)
             n_integrals = n * n_proxies(tolerance)
             skeletons = tuple(for_each_chunk(view.skeleton, range(len(rows)), n_integrals=n_integrals))
             levels.append(skeletons)

@@ -23,7 +23,7 @@ from bemkit.operators.hierarchy.compression import Compression
 from bemkit.operators.hierarchy.element_laws import ElementLaws
 from bemkit.operators.hierarchy.equations import BoundaryEquations
 from bemkit.operators.hierarchy.known_loads import KnownLoads
-from bemkit.operators.hierarchy.skeletons import Skeleton
+from bemkit.operators.hierarchy.skeletons import LevelView, Skeleton
 from bemkit.operators.hierarchy.tree import ClusterTree
 from bemkit.operators.linear.dense import SingularMatrixError, SmallLU
 from bemkit.operators.linear.threads import for_each_chunk
@@ -104,6 +104,13 @@ class Factor:
         Nodes whose conditions change by themselves, by default all. Clusters without any are merged once, and keep no
         scattering matrices: if something changes there all the same, the whole cluster is factored again, but for loads
         that were expected, and sums of them.
+    level_view : type of LevelView, optional
+        How skeletons are chosen.
+
+    Attributes
+    ----------
+    border_load : (n_border,) array
+        Right-hand sides of the equations of the boundary as a whole, zero unless set.
 
     Notes
     -----
@@ -118,11 +125,13 @@ class Factor:
         *,
         may_differ: BoolArray | None = None,
         may_change: BoolArray | None = None,
+        level_view: type[LevelView] = LevelView,
     ) -> None:
         n = equations.points.size
         may_differ = np.ones((n, 4), bool) if may_differ is None else may_differ
         self.equations, self.tree = equations, tree
-        self.compression = Compression.of(equations, tree, may_differ, tolerance)
+        self.compression = Compression.of(equations, tree, may_differ, tolerance, level_view)
+        self.border_load = np.zeros(equations.border.own.shape[0])
         self.laws: ElementLaws | None = None
         self.n_updates = self.n_factored = 0
         changing = tree.leaves_of(np.arange(n) if may_change is None else np.flatnonzero(may_change))
@@ -259,7 +268,8 @@ class Factor:
 
     def errors(self) -> FloatArray:
         """Return the unknowns (n_border,) of the boundary as a whole."""
-        return self._of_border(self._loaded(-1, 0))[:, 0]
+        root = self._loaded(-1, 0)
+        return self._of_border(replace(root, of_loads=root.of_loads - self.border_load[:, None]))[:, 0]
 
     @property
     def is_current(self) -> bool:

@@ -1,0 +1,94 @@
+"""A strip of thousands of elements as a `LinearBody`: its equations are compressed over a tree and factored there."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from bemkit.arrays import ComplexArray, FloatArray, IntArray
+from bemkit.contact.body import SingularResponse
+from bemkit.contact.half_plane.surface_body import SurfaceBody
+from bemkit.contact.reduced_conditions import ReducedConditions, as_pairs
+from bemkit.operators.half_plane.large import LargeHalfPlane
+from bemkit.operators.hierarchy.element_laws import ElementLaws
+from bemkit.operators.hierarchy.system import NodeConditions
+from bemkit.operators.linear.dense import SingularMatrixError
+
+_SAMPLED = 24
+"""Elements in contact whose equations are evaluated without compression for the certificate."""
+
+
+@dataclass(frozen=True, eq=False)
+class LargeStripBody(SurfaceBody):
+    """A large strip of a half-plane with its contact nodes, without supports; see `SurfaceBody`.
+
+    Notes
+    -----
+    A response factors the leaves of the tree whose conditions differ from those of the last one, and the clusters above
+    them.
+    """
+
+    elastic: LargeHalfPlane
+
+    is_costly = True
+
+    @property
+    def accuracy(self) -> float:  # type: ignore[override]
+        """The tolerance of the compression."""
+        return self.elastic.tolerance
+
+    def solve(
+        self, reduced: ReducedConditions, right: FloatArray, motions: ComplexArray, load: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Solve over the tree; see `SurfaceBody.solve`."""
+        factor = self.elastic.factor
+        try:
+            factor.update(self._laws(reduced, right))
+            factor.border_load = load
+            unknowns, amounts = factor.unknowns(np.arange(factor.tree.n_leaves)), factor.errors()
+        except SingularMatrixError as error:
+            raise SingularResponse(str(error)) from error
+        assert factor.laws is not None  # `update` has set them
+        components = (factor.laws.factors[:, :2] @ unknowns[:, :, None])[:, :, 0]
+        traction = self.at_acting(components[:, 0] + 1j * components[:, 1])
+        return (reduced.direction.conj() * traction[reduced.node]).real, amounts
+
+    def _laws(self, reduced: ReducedConditions, right: FloatArray) -> ElementLaws:
+        """Return what the equations make of tractions and displacements on all elements; free ones have no traction."""
+        n = self.elastic.mesh.n_elements
+        factors, given = np.zeros((n, 4, 2)), np.zeros((n, 4))
+        factors[:, 2:] = np.eye(2)
+        on_traction, on_displacement = np.zeros((2, self.n_contact, 2, 2))
+        on_traction[:] = np.eye(2)
+        value = np.zeros((self.n_contact, 2))
+        # one unknown of a node leaves a condition on the traction across it, two leave none
+        node, turn = reduced.node, self.turn[reduced.node]
+        row = np.where(np.append(node[1:] == node[:-1], False), 0, 1)
+        on_traction[node, 0] = _along(1j * reduced.direction * turn)
+        on_traction[node, row] = _along(reduced.on_traction * turn)
+        on_displacement[node, row] = _along(reduced.on_displacement * turn)
+        value[node, row] = right
+        local = NodeConditions(on_traction, on_displacement, value).solved(1.0 / self.stiffness_scale).in_full()
+        factors[self.acting], given[self.acting] = local.factors, local.given
+        return ElementLaws(factors, given)
+
+    def missing(self, misfit: ComplexArray, traction: ComplexArray, size: float) -> float:
+        """Return the displacements that are missing, or that the compression misses at some elements; relative."""
+        nodes = self._sampled
+        field = self.on_surface(traction)
+        components = np.stack([field.real, field.imag], axis=1)
+        displaced = self.elastic.displaced(field)
+        left = self.elastic.factor.equations.residual(nodes, components, np.stack([displaced.real, displaced.imag], 1))
+        return max(super().missing(misfit, traction, size), float(np.abs(left).max()) / size)
+
+    @cached_property
+    def _sampled(self) -> IntArray:
+        places = (np.arange(_SAMPLED) + 0.5) / _SAMPLED * self.n_contact
+        return np.unique(self.acting[places.astype(int)])
+
+
+def _along(numbers: ComplexArray) -> FloatArray:
+    """Return factors (n, 2) of components along tangent and normal of which the real part of a product is a sum."""
+    return as_pairs(numbers)[:, ::-1]

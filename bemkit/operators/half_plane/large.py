@@ -1,0 +1,73 @@
+"""The half-plane of thousands of elements as an elastic map, by equations that are compressed over a tree."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Self
+
+import numpy as np
+
+from bemkit.arrays import ComplexArray
+from bemkit.operators.counts import OperationCounts
+from bemkit.operators.half_plane.elasticity import HalfPlaneElasticity
+from bemkit.operators.half_plane.equations import HalfPlaneEquations, StripView, potential_of
+from bemkit.operators.half_plane.far_drive import FarDrive
+from bemkit.operators.hierarchy.factor import Factor
+from bemkit.operators.hierarchy.tree import ClusterTree
+
+_LEAF = 96
+"""Elements of a leaf."""
+
+
+@dataclass(frozen=True, eq=False)
+class LargeHalfPlane(HalfPlaneElasticity):
+    """Elasticity of a half-plane seen from a strip of thousands of elements; see `SurfaceElasticity`.
+
+    Parameters
+    ----------
+    tolerance : float
+        Of the compression.
+    last : list
+        The last tractions and what they displace: a response, its certificate and its fields ask for the same.
+    """
+
+    tolerance: float = 1e-10
+    last: list[tuple[ComplexArray, ComplexArray]] = field(default_factory=list, repr=False)
+
+    @property
+    def work(self) -> OperationCounts:
+        """Nothing is counted: no whole matrix is formed."""
+        return OperationCounts()
+
+    @cached_property
+    def factor(self) -> Factor:
+        """The compressed equations, bordered by the driven motions."""
+        drive = self.drive
+        at_elements = drive.motions_at(self.mesh.centres)[:, :, list(drive.driven)]
+        motions = np.einsum("c,ncm->mn", self.axes, at_elements)
+        equations = HalfPlaneEquations(self.places, self.material, motions)
+        points = np.stack([equations.points.real, np.zeros(self.mesh.n_elements)], axis=1)
+        return Factor(equations, ClusterTree.of(points, _LEAF), self.tolerance, level_view=StripView)
+
+    def driven_by(self, drive: FarDrive) -> Self:
+        """Return the same half-plane under another drive; under loads on the same motions, the factor is kept."""
+        other = super().driven_by(drive)
+        if (drive.driven, drive.centre) == (self.drive.driven, self.drive.centre) and "factor" in self.__dict__:
+            other.__dict__["factor"] = self.factor
+        return other
+
+    def displaced(self, traction: ComplexArray) -> ComplexArray:
+        """Return the displacements (n_elements,) [m] that tractions (n_elements,) [Pa] cause."""
+        if not traction.any():
+            return np.zeros_like(traction)
+        if self.last and np.array_equal(self.last[0][0], traction):
+            return self.last[0][1]
+        equations, force = self.factor.equations, self.mesh.lengths * traction
+        along = potential_of(self.factor.compression, np.stack([force.real, force.imag], axis=1))
+        sums = np.cumsum(force)
+        across = 2.0 * sums - force - sums[-1]
+        assert isinstance(equations, HalfPlaneEquations)
+        displacement = np.asarray(equations.along * (along[:, 0] + 1j * along[:, 1]) - 1j * equations.across * across)
+        self.last[:] = [(traction, displacement)]
+        return displacement
