@@ -5,6 +5,7 @@ It takes some minutes. Run it on a machine that does nothing else: the figures s
 
 from __future__ import annotations
 
+import csv
 import io
 import math
 import sys
@@ -24,6 +25,7 @@ from bemkit.studies.engine import compute
 
 PAGE = Path(__file__).parent / "error-against-run-time.md"
 IMAGES = Path(__file__).parent / "images"
+TABLES = Path(__file__).parent / "tables"
 SCENES = ("paper-1", "paper-2", "wavy-obstacle", "disc-between-plates", "clamped-angle")
 ELEMENTS = (40, 80, 160, 320, 640)
 ACCURACIES = (1e-2, 1e-3, 1e-4)
@@ -46,7 +48,7 @@ def main() -> None:
         figure = draw_errors(rows, PANELS, title=scene.title)
         save_small(figure, IMAGES / f"error-study-{name}.png")
         text = PAGE.read_text("utf-8")
-        text = between(text, f"{name}-orders", orders_table(rows))
+        write_orders(rows, TABLES / f"orders-{name}.csv")
         text = between(text, f"{name}-choice", choice_table(rows))
         text = between(text, f"{name}-reference", reference_sentence(reference))
         PAGE.write_text(text, "utf-8")
@@ -82,17 +84,15 @@ def reference_sentence(reference: Reference) -> str:
     return f"Reference: {reference.source}." + (f" Its own errors are at most: {', '.join(own)}." if own else "")
 
 
-def orders_table(rows: Sequence[ErrorRecord]) -> str:
-    """Return the observed rates in the number of unknowns, Newton only: other drivers reach the same state."""
-    lines = [
-        f"| elements | meshes | {' | '.join(MEASURES[name] for name in PANELS)} |",
-        "|---|---|" + "---:|" * len(PANELS),
-    ]
-    for series in by_series(rows):
-        if series[0].solver == "semismooth-newton":
-            cells = [str(fitted_rate(series, name)) for name in PANELS]
-            lines.append(f"| {series[0].discretisation} | {series[0].meshes} | {' | '.join(cells)} |")
-    return "\n".join(lines)
+def write_orders(rows: Sequence[ErrorRecord], path: Path) -> None:
+    """Write the observed rates in the number of unknowns, Newton only: other solvers reach the same state."""
+    with path.open("w", newline="") as stream:
+        table = csv.writer(stream, lineterminator="\n")
+        table.writerow(["elements", "meshes", *(MEASURES[name] for name in PANELS)])
+        for series in by_series(rows):
+            if series[0].solver == "semismooth-newton":
+                rates = [str(fitted_rate(series, name)) for name in PANELS]
+                table.writerow([series[0].discretisation, series[0].meshes, *rates])
 
 
 def choice_table(rows: Sequence[ErrorRecord]) -> str:

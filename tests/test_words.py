@@ -51,6 +51,11 @@ def test_household_words_are_not_used(directory: str) -> None:
     assert {name: words for name, words in found.items() if words} == {}
 
 
+def test_the_documentation_has_at_most_48000_words() -> None:
+    pages = [path for path in TOP.glob("docs/**/*.md") if not {"_build", "generated"} & set(path.parts)]
+    assert 40000 < sum(len(path.read_text("utf-8").split()) for path in pages) <= 48000
+
+
 @pytest.mark.parametrize("name", ALLOWED)
 def test_allowed_uses_exist(name: str) -> None:
     assert all(words in (TOP / name).read_text("utf-8") for words in ALLOWED[name])
