@@ -9,7 +9,7 @@ from pathlib import Path
 
 
 class BemkitError(Exception):
-    """An error that bemkit names: its message says what is wrong, with its value, and what to do about it.
+    """Base class of all errors of bemkit; the message gives the cause, the value and the remedy.
 
     Every error class of the package derives from it, most of them from a built-in class such as ``ValueError`` as
     well. The command line prints the message of such an error; anything else is a defect and keeps its traceback.
@@ -17,11 +17,11 @@ class BemkitError(Exception):
 
 
 class InputError(BemkitError, ValueError):
-    """A value that bemkit was given and cannot work with."""
+    """An invalid value of an argument or a key."""
 
 
 class NoResultError(BemkitError, RuntimeError):
-    """A calculation that ended without a result: the input is well posed, but the method did not get there."""
+    """A calculation without a result: the input is valid, but the method failed."""
 
 
 CANNOT_BE_SENT = (pickle.PicklingError, AttributeError, TypeError)

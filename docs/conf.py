@@ -51,6 +51,8 @@ napoleon_use_param = False  # types are words and shapes: nothing to link
 PUBLISHED = Path(__file__).parent / "_build" / "published"
 PUBLISHED.mkdir(parents=True, exist_ok=True)
 html_extra_path = [str(PUBLISHED)]
+html_static_path = ["static"]
+html_css_files = ["gallery.css"]
 html_theme = "furo"
 html_title = f"bemkit {release}"
 

@@ -38,7 +38,7 @@ _COMMANDS = {
     "stability": ("stability", "Solve extreme variants of a scene and check the results."),
     "study": ("study", "Measure error against run time; make the tables of the paper."),
     "sweep": ("sweep", "Solve a scene for several values of its numbers."),
-    "verify": ("verify", "Compare with closed forms and other known answers."),
+    "verify": ("verify", "Compare results with closed forms and other known solutions."),
 }
 """Module of each command, imported on use, and its line in the list of commands."""
 

@@ -105,7 +105,7 @@ def _measured(obstacle: Obstacle, method: str, values: object, shape: tuple[int,
 
 @dataclass(frozen=True)
 class HalfPlane:
-    """The obstacle fills the half-plane (x - point) . normal <= 0.
+    """The obstacle fills the half-plane behind a line, with the inner product (x - point, normal) <= 0.
 
     Parameters
     ----------

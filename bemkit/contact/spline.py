@@ -23,7 +23,7 @@ _MOST_STEPS = 60
 
 @dataclass(frozen=True)
 class SplineObstacle:
-    """The obstacle fills what lies to the left of a smooth curve through points, in the order of the points.
+    """The obstacle fills the left side of a smooth curve through points.
 
     So a closed curve is filled inside if its points run anticlockwise, and outside (a cavity) if they run clockwise. An
     open curve goes on straight beyond its ends.

@@ -33,7 +33,7 @@ _N_LENGTH_POINTS = 16
 
 @dataclass(frozen=True, eq=False)
 class BoundaryMesh:
-    """The boundary of one body, cut into elements.
+    """The boundary of one body, divided into elements.
 
     Every loop is traversed with the body on its left: the outer loop anticlockwise, holes clockwise. The tangent t
     points along the traversal, the normal n = (t_y, -t_x) out of the body.

@@ -182,7 +182,7 @@ class Outline:
 
 @dataclass(frozen=True)
 class Selection:
-    """A choice of boundary: some sides, or the pieces of them where a predicate holds.
+    """A selection of the boundary: sides, or the pieces of sides where a predicate holds.
 
     Parameters
     ----------

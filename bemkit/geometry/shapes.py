@@ -113,7 +113,7 @@ class Polygon(CheckedShape):
 
 @dataclass(frozen=True)
 class Disk(CheckedShape):
-    """A disk with the sides arc-1 ... arc-4, one for each quadrant, from angle 0 on.
+    """A disk with the sides arc-1 to arc-4, one for each quadrant, from angle 0 on.
 
     Parameters
     ----------
@@ -175,7 +175,7 @@ class Sector(CheckedShape):
 
 @dataclass(frozen=True)
 class Ring(CheckedShape):
-    """A ring with the sides outer-1 ... outer-4 and inner-1 ... inner-4, numbered by quadrant.
+    """A ring with the sides outer-1 to outer-4 and inner-1 to inner-4, numbered by quadrant.
 
     Parameters
     ----------
@@ -207,7 +207,7 @@ class Ring(CheckedShape):
 
 @dataclass(frozen=True)
 class PlateWithHole(CheckedShape):
-    """A rectangle with a round hole in the middle; sides bottom, right, top, left and hole-1 ... hole-4 by quadrant.
+    """A rectangle with a round hole in the middle; sides bottom, right, top, left and hole-1 to hole-4 by quadrant.
 
     Parameters
     ----------

@@ -178,7 +178,7 @@ class Mass(BoundaryOperator):
 
 
 def single_layer(trial: BoundarySpace, test: BoundarySpace, material: Material) -> PairOperator:
-    """Return V, the single layer operator: <V t, q> ([Paper], eq. 27).
+    """Return V, the single layer operator: <V t, q> ([Paper], equation 27).
 
     Parameters
     ----------
@@ -200,7 +200,7 @@ def single_layer(trial: BoundarySpace, test: BoundarySpace, material: Material) 
 
 
 def double_layer(trial: BoundarySpace, test: BoundarySpace, material: Material) -> PairOperator:
-    """Return K, the double layer operator: <K u, q> ([Paper], eq. 27).
+    """Return K, the double layer operator: <K u, q> ([Paper], equation 27).
 
     Parameters
     ----------
@@ -228,7 +228,7 @@ def double_layer(trial: BoundarySpace, test: BoundarySpace, material: Material) 
 
 
 def adjoint_double_layer(trial: BoundarySpace, test: BoundarySpace, material: Material) -> Transposed:
-    """Return K', the adjoint double layer operator: <K' t, v> ([Paper], eq. 27).
+    """Return K', the adjoint double layer operator: <K' t, v> ([Paper], equation 27).
 
     Parameters
     ----------
@@ -252,7 +252,7 @@ def adjoint_double_layer(trial: BoundarySpace, test: BoundarySpace, material: Ma
 
 
 def hypersingular(trial: BoundarySpace, test: BoundarySpace, material: Material) -> PairOperator:
-    """Return W, the hypersingular operator: <W u, v> ([Paper], eq. 27), integrated by parts.
+    """Return W, the hypersingular operator: <W u, v> ([Paper], equation 27), integrated by parts.
 
     Parameters
     ----------

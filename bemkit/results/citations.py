@@ -93,7 +93,7 @@ class Citations:
 
 
 def cite(subject: Scene | Assembly | Solution | AssemblySolution) -> Citations:
-    """Name the works to cite for a scene, or for what a run of it used.
+    """Return the references of the methods of a scene or of a result.
 
     Parameters
     ----------

@@ -69,7 +69,7 @@ def format_of(path: str | Path, inside: int = 0) -> Format:
 
 
 def export_result(path: str | Path, solution: Solution | AssemblySolution, *, inside: int = 0) -> None:
-    """Write a solution in the format that the ending of the file name asks for, all or nothing.
+    """Write a solution in the format of the file ending, completely or not at all.
 
     Parameters
     ----------

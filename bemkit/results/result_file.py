@@ -96,7 +96,7 @@ def check_result_target(path: str | Path) -> Path:
 
 
 def write_result(path: str | Path, solution: Solution | AssemblySolution) -> None:
-    """Write a solution to an HDF5 file; an older result of that name is replaced as a whole, or not at all.
+    """Write a solution to an HDF5 file, completely or not at all.
 
     Parameters
     ----------

@@ -81,7 +81,7 @@ class Iterate:
 
 
 class ContactSolver(Protocol):
-    """A driver: frozen options and two pure functions.
+    """A contact solver: frozen options and two pure functions.
 
     A driver never decides that it has converged; `solve` does, by the certificate.
     """
@@ -203,7 +203,7 @@ def solve(
     throw: bool = True,
     callback: Callable[[StepRecord], None] | None = None,
 ) -> ContactSolution:
-    """Run a driver until the certificate is below the tolerance, or until it cannot go on.
+    """Run a solver until the certificate is below the tolerance or the solver fails.
 
     Parameters
     ----------

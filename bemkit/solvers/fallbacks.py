@@ -37,7 +37,7 @@ class FallbackIterate(Iterate):
 
 @dataclass(frozen=True)
 class Fallbacks:
-    """Drivers one after the other, each from where the one before has ended or has run out of its steps.
+    """Solvers in turn, each from the last state of the one before.
 
     Parameters
     ----------

@@ -25,7 +25,7 @@ _ROUND_OFF = 1e-11
 
 @dataclass(frozen=True)
 class LemkePivoting:
-    """Complementary pivoting in the pressing forces, friction forces and slips of all contact nodes.
+    """Lemke's complementary pivoting in the normal forces, friction forces and slips of all contact nodes.
 
     Parameters
     ----------

@@ -44,7 +44,7 @@ class SpringIterate(Iterate):
 
 @dataclass(frozen=True)
 class Springs:
-    """Newton steps with springs on all bodies, each spring without force where the last, stiffer one has led.
+    """Proximal point method: Newton steps with springs on all bodies, which become weaker from step to step.
 
     Parameters
     ----------

@@ -35,7 +35,7 @@ class NewtonIterate(Iterate):
 
 @dataclass(frozen=True)
 class SemismoothNewton:
-    """Newton's method on the projection equations (15), (16): Algorithm 2 of the paper and nothing else.
+    """Newton's method for the projection equations (15), (16): Algorithm 2 of the paper.
 
     Parameters
     ----------

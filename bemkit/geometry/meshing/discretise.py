@@ -128,7 +128,7 @@ def discretise(
     density: Mapping[str, float] | None = None,
     symmetry: Symmetry | None = None,
 ) -> BoundaryMesh:
-    """Cut an outline into elements.
+    """Divide an outline into elements.
 
     Parameters
     ----------

@@ -53,7 +53,7 @@ class DenseCholesky:
 
 @dataclass(frozen=True)
 class Automatic:
-    """Dense equations or compressed ones, whichever takes less time and fits into memory."""
+    """Dense or compressed equations, whichever take less time and fit into memory."""
 
 
 @dataclass(frozen=True)
@@ -95,7 +95,7 @@ class Hierarchical:
 
 @dataclass(frozen=True)
 class MatrixFree:
-    """Boundary equations solved by iteration, with products by the fast multipole method: a fraction of the memory.
+    """Boundary equations solved by GMRES with products by the fast multipole method, in a fraction of the memory.
 
     For constant collocation on straight elements. Other equations are solved as by `Automatic`; the plan says why.
     Every response takes up to about seventeen products, for any number of elements.

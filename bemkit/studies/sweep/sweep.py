@@ -43,7 +43,7 @@ def sweep(
     executor: Executor | None = None,
     cold: bool = False,
 ) -> Sweep:
-    """Solve a scene under all combinations of some of its numbers, each as `bemkit.run` would.
+    """Solve a scene for all combinations of values of some of its numbers.
 
     Rows that differ only in laws, loads and obstacles share their bodies, which are assembled and factored once.
 

@@ -22,7 +22,7 @@ from bemkit.table import Column, Table, columns_of, json_text
 
 @dataclass(frozen=True)
 class Sweep:
-    """What `bemkit.sweep` returns and ``bemkit sweep -o`` keeps.
+    """Result of `bemkit.sweep` and of ``bemkit sweep -o``.
 
     Parameters
     ----------

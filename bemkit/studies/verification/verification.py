@@ -41,7 +41,7 @@ def verify(
     file: str | Path | None = None,
     cases: Mapping[str, Callable[[], Case]] = CASES,
 ) -> Verification:
-    """Compare with closed forms and other known answers.
+    """Compare results with closed forms and other known solutions.
 
     Parameters
     ----------
