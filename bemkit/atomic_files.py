@@ -128,8 +128,7 @@ def _reserved(target: Path) -> Iterator[None]:
         lock = FileLock(path)
     except HeldElsewhereError as error:
         raise OutputFileError(
-            f"{shown_path(target)}: another process is computing what it will write there: wait for it to end, or "
-            "choose another name"
+            f"{shown_path(target)}: another process will write this file: wait for it to end, or choose another name"
         ) from error
     except OSError as error:
         raise OutputFileError(f"{shown_path(target)}: cannot be written ({error.strerror}): choose another") from error

@@ -80,7 +80,7 @@ def test_a_link_is_followed_not_replaced(tmp_path: Path) -> None:
 def test_a_reserved_file_is_refused_to_others(tmp_path: Path) -> None:
     target, other = tmp_path / "a.h5", tmp_path / "b.h5"
     with reserved([target, other]):
-        with pytest.raises(OutputFileError, match=r"a\.h5: another process is computing .*: wait for it to end"):
+        with pytest.raises(OutputFileError, match=r"a\.h5: another process will write this file: wait for it to end"):
             with reserved([target]):
                 pass
         with replacing(target) as temporary:  # what its holder writes in the meantime

@@ -250,7 +250,7 @@ def _history_rows(solution: Solution | AssemblySolution) -> Iterator[tuple[str, 
         work, units = loading.total(), solution.units
         yield "load history", f"{len(loading.steps)} of {loading.n_steps} steps, up to t = {loading.times[-1]:.6g}"
         yield "external work", f"{_amount(work.external_work, 'energy', units)}  in all steps"
-        yield "friction took", f"{_amount(work.dissipation, 'energy', units)}  in all steps"
+        yield "dissipation", f"{_amount(work.dissipation, 'energy', units)}  in all steps"
         if loading.has_coarse_increments:
             left = _amount(work.increment_work, "energy", units)
             yield "increment error", f"{left}  decreases with smaller increments"

@@ -30,7 +30,7 @@ def degree_of(context: click.Context, parameter: click.Parameter, value: str | N
     if value == "hp":
         return "hp"
     if not value.lstrip("+-").isdecimal():
-        raise click.BadParameter(f"{value} is no whole number: give one from 1 to 12, or hp", context, parameter)
+        raise click.BadParameter(f"{value} is not a whole number: give one from 1 to 12, or hp", context, parameter)
     return int(value)
 
 

@@ -152,7 +152,7 @@ class Outputs(Generic[Content]):
         places = [text.place for text in self.texts if text.place is not None]
         if len(set(targets)) < len(targets) or places.count(STDOUT) > 1:
             shown = ", ".join([*map(str, others), *places])
-            raise OutputFileError(f"two outputs go to the same place ({shown}): give each its own")
+            raise OutputFileError(f"two outputs go to the same file ({shown}): name two files")
         if self.folder is not None:
             from bemkit.pictures.figure_files import check_figure_folder
 

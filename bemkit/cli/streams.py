@@ -126,7 +126,7 @@ class GuardedStream(io.TextIOBase):
             if isinstance(error, BrokenPipeError):
                 raise PipeClosedError("standard output: the reader has closed the pipe") from None
             reason = getattr(error, "strerror", None) or error
-            raise StreamError(f"standard output: cannot be written ({reason}): send it to another place") from error
+            raise StreamError(f"standard output: cannot be written ({reason}): redirect it") from error
 
     def _drop_rest(self) -> None:
         """Send what is still in the buffer nowhere, or the interpreter would fail on it at its end."""

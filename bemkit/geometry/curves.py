@@ -218,7 +218,7 @@ class ParametricCurve:
         if not speed.min() > 0.0:
             raise GeometryError(
                 f"ParametricCurve: derivative_function vanishes at s={s[speed.argmin()]:.6g}: "
-                "choose a parameter along which the curve moves everywhere"
+                "choose a parameter with a nonzero derivative everywhere"
             )
         steps = np.diff(self._place(ends), axis=0)
         integrals = half * np.einsum("q,iqk->ik", weights, velocity.reshape(_N_CHECK_INTERVALS, _N_CHECK_POINTS, 2))

@@ -44,7 +44,7 @@ def element_images(space: BoundarySpace) -> Iterator[tuple[slice, FloatArray, In
     nodes = space.local_nodes
     if not np.array_equal(nodes, -nodes[::-1]):
         raise GeometryError(
-            f"symmetry: {type(space).__name__} has the local nodes {nodes.tolist()}, which an image does not share: "
+            f"symmetry: {type(space).__name__} has the local nodes {nodes.tolist()}, which its image does not have: "
             "choose local nodes that are symmetric about 0, or remove the symmetry"
         )
     for g, signs in enumerate(symmetry.images):

@@ -259,7 +259,7 @@ class ExteriorOf(CheckedShape):
             raise GeometryError("ExteriorOf: shape is already an exterior: give the bounded shape itself")
         if len(outline.loops) > 1:
             raise GeometryError(
-                f"ExteriorOf: shape has {len(outline.loops) - 1} hole(s), and what lies in them is not part of the "
+                f"ExteriorOf: shape has {len(outline.loops) - 1} hole(s), which are not part of the "
                 "exterior: give a shape without holes"
             )
 

@@ -44,7 +44,7 @@ class Symmetry:
     def __post_init__(self) -> None:
         if self.x is None and self.y is None:
             raise GeometryError(
-                "Symmetry: neither x nor y is given: give the place of at least one line, such as x=0.5"
+                "Symmetry: neither x nor y is given: give the position of at least one line, such as x=0.5"
             )
         for name, value in (("x", self.x), ("y", self.y)):
             if value is not None and not math.isfinite(value):

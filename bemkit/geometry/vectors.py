@@ -49,5 +49,5 @@ def check_magnitude(points: FloatArray, owner: str) -> None:
     if not (farthest <= LARGEST and size >= SMALLEST):
         raise GeometryError(
             f"{owner}: the boundary measures {size:.3g} and its coordinates reach {farthest:.3g}, the squares of which "
-            f"are no numbers any more: choose a unit of length in which both lie between {SMALLEST:g} and {LARGEST:g}"
+            f"overflow: choose a unit of length in which both lie between {SMALLEST:g} and {LARGEST:g}"
         )

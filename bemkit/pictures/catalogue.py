@@ -103,7 +103,7 @@ def default_pictures(result: Result) -> list[Picture]:
 def find_picture(name: str) -> Picture:
     """Return a picture by its name; InputError if it is unknown."""
     if name not in PICTURES:
-        raise InputError(f"{name!r} is no picture: the pictures are {', '.join(PICTURES)}{closest(name, [*PICTURES])}")
+        raise InputError(f"{name!r} is not a picture: choose from {', '.join(PICTURES)}{closest(name, [*PICTURES])}")
     return PICTURES[name]
 
 

@@ -106,7 +106,7 @@ def _directions(
         return np.asarray(found / np.hypot(*found.T)[:, None])
     (condition,) = (each.condition for each in solution.scene.contact_parts if each.name == part)
     if not isinstance(condition, Contact):
-        raise TypeError(f"part {part!r} is no contact")
+        raise TypeError(f"part {part!r} is not in contact")
     points, normals = body.mesh.points(elements, xi), body.mesh.normals_at(elements, xi)
     _, directions = measure_contact(condition.obstacle, points.reshape(-1, 2), normals.reshape(-1, 2))
     return directions

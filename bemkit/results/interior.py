@@ -41,7 +41,7 @@ def interior_fields(solution: SolvedBody) -> InteriorFields:
         If the body is a half-plane.
     """
     if solution.mesh.surface is not None:
-        raise InputError("the body is a half-plane, of which only the surface is known: take a block for fields inside")
+        raise InputError("half-planes have no fields inside: use a block")
     material, background = solution.scene.material, solution.particular
     return InteriorFields(solution.mesh.whole, material, *whole_boundary(solution), background)
 

@@ -192,8 +192,8 @@ def _large_strains(body: SolvedBody) -> Iterator[ResultWarning]:
         yield ResultWarning(
             "large strain",
             "",
-            f"Strains and rotations exceed {strain:.2g} on {100.0 * STRAINED_SHARE:.0f} % of the boundary, far outside "
-            "small displacements, where results are proportional to loads but not true: check the units of loads "
+            f"Strains and rotations exceed {strain:.2g} on {100.0 * STRAINED_SHARE:.0f} % of the boundary, outside "
+            "the theory of small displacements: check the units of loads "
             "and of Young's modulus, or load less.",
             float(strain),
         )
@@ -212,7 +212,7 @@ def _moved_contacts(body: SolvedBody, units: UnitNames | None) -> Iterator[Resul
             yield ResultWarning(
                 "moved contact",
                 name,
-                f"Part {name!r} moves so far that its contact ends {distance} off the obstacle, {share} the "
+                f"Part {name!r} moves so far that its contact is {distance} off the obstacle, {share} the "
                 "displacement that its contact force causes: gaps and normals are those of the undeformed body. "
                 "Model the body in its final position.",
                 off,
@@ -248,8 +248,8 @@ def _coarse_curves(mesh: BoundaryMesh) -> Iterator[ResultWarning]:
         yield ResultWarning(
             "coarse curve",
             "",
-            f"The boundary turns by {turn.max():.0f} degrees on one element, near ({x:.4g}, {y:.4g}), where no error "
-            "estimate holds: use more elements there.",
+            f"The boundary turns by {turn.max():.0f} degrees on one element, near ({x:.4g}, {y:.4g}); no error "
+            "estimate holds there: use more elements.",
             float(turn.max()),
         )
 

@@ -111,7 +111,7 @@ class AugmentedLagrangian:
     def step(self, problem: ContactProblem, iterate: Iterate) -> OuterIterate:
         """Do Steps 1 and 2 once."""
         if not isinstance(iterate, OuterIterate):
-            raise TypeError(f"iterate is a {type(iterate).__name__}; give what init or step of this driver returned")
+            raise TypeError(f"iterate is a {type(iterate).__name__}; give a result of init or step of this solver")
         # Step 1: solve with the multiplier sigma^(k) = present traction fixed, and its bound
         inner = self.inner.solved(self._equations(problem, iterate.state.traction), iterate.state)
         if inner.ended is not None:

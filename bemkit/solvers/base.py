@@ -20,42 +20,42 @@ from bemkit.solvers.newton import FloatingResponse, consistent_state, untouched_
 class Status(Enum):
     """How a solve ended; the value is a sentence of advice."""
 
-    CONVERGED = "The state satisfies contact and friction to the tolerance asked for."
+    CONVERGED = "The state satisfies contact and friction to the tolerance."
     MAX_STEPS = "The steps ran out before the certificate was met; raise max_steps or start from a nearby solution."
     STALLED = (
-        "The certificate no longer improves; try another driver, a larger rho, a nearby start or a looser tolerance."
+        "The certificate no longer improves; try another solver, a larger rho, a nearby start or a looser tolerance."
     )
     CYCLING = (
-        "The iterates repeat themselves; add drivers such as SolutionPath to Fallbacks, or try another one: "
+        "The iterates repeat themselves; add solvers such as SolutionPath to Fallbacks, or try another one: "
         "the problem may have no solution, or several."
     )
     SINGULAR = "The body can move freely for every state of its contact nodes; hold it by its boundary conditions."
     UNSOLVABLE_LOAD = "No contact tractions can balance this load; change the load or hold the body."
     TOO_FAR = (
-        "The load must first carry the body so far to an obstacle that numbers do not hold the deformation beside the "
-        "travel; move body and obstacle together, so that they nearly touch."
+        "The load first moves the body so far to an obstacle that round-off hides the deformation; move body and "
+        "obstacle together, so that they nearly touch."
     )
     INNER_FAILED = "An inner solve failed, for the reason given in the message; change the options of the inner solver."
     ACCURACY_NOT_REACHED = (
-        "The state satisfies contact and friction on its mesh, but the accuracy asked for was not reached; allow more "
-        "elements or more time, or ask for less."
+        "The state satisfies contact and friction on its mesh, but not the requested accuracy; allow more "
+        "elements or more time, or request less."
     )
     LOAD_NOT_REACHED = "Ever smaller increments reached only a part of this load; load less, or give more load steps."
     UNFINISHED = (
-        "The load history has not come to its end; run its scene with the same result file again to go on from the "
-        "last step that is finished."
+        "The load history is incomplete; run its scene again with the same result file to resume from the "
+        "last finished step."
     )
     TOO_COSTLY = (
-        "This driver asks for several responses for each contact node, and those of this body are costly; use "
+        "This solver needs several responses for each contact node, which are expensive for this body; use "
         "SemismoothNewton, AugmentedLagrangian or FixedPoint."
     )
     MISSED_CONTACT = "The elements are too long to find the contact; use more elements there, or give an accuracy."
     NEGATIVE_ENERGY = (
-        "The elastic energy is negative or can become so, because the elements are too long for collocation; "
+        "The elastic energy is, or can become, negative, because the elements are too long for collocation; "
         "use more elements, at least two for the thickness of a thin body, or linear or quadratic Galerkin elements."
     )
     FINITE_SLIDING = "Contacts slide farther than small displacements describe; draw bodies where they come to rest."
-    NOT_FINITE = "Numbers overflowed or became undefined; check stiffness, load and friction law for huge entries."
+    NOT_FINITE = "Numbers overflowed or are undefined; check stiffness, load and friction law for huge entries."
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -66,7 +66,7 @@ class Fallbacks:
     def __post_init__(self) -> None:
         object.__setattr__(self, "drivers", tuple(self.drivers))
         if not self.drivers:
-            raise InputError("drivers is empty; give at least one driver, such as SemismoothNewton()")
+            raise InputError("drivers is empty; give at least one solver, such as SemismoothNewton()")
 
     @property
     def max_steps(self) -> int:
@@ -92,7 +92,7 @@ class Fallbacks:
     def step(self, problem: ContactProblem, iterate: Iterate) -> FallbackIterate:
         """Take a step of the driver at work; hand on to the next one if it ends."""
         if not isinstance(iterate, FallbackIterate):
-            raise TypeError(f"iterate is a {type(iterate).__name__}; give what init or step of this driver returned")
+            raise TypeError(f"iterate is a {type(iterate).__name__}; give a result of init or step of this solver")
         driver, n_steps = self.drivers[iterate.index], iterate.n_steps + 1
         inner = driver.step(problem, iterate.inner)
         if inner.ended is None and n_steps >= driver.max_steps:

@@ -46,7 +46,7 @@ class FixedPoint:
     def step(self, problem: ContactProblem, iterate: Iterate) -> OuterIterate:
         """Solve one Tresca problem."""
         if not isinstance(iterate, OuterIterate):
-            raise TypeError(f"iterate is a {type(iterate).__name__}; give what init or step of this driver returned")
+            raise TypeError(f"iterate is a {type(iterate).__name__}; give a result of init or step of this solver")
         sigma_n = iterate.state.sigma_n
         bound = problem.friction_bound(sigma_n, is_closed=sigma_n < 0.0)
         tresca = problem.with_law(Tresca(bound))

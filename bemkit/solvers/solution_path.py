@@ -66,7 +66,7 @@ class SolutionPath:
         from bemkit.solvers.homotopy import AffineBound, follow_path
 
         if not isinstance(iterate, PathIterate):
-            raise TypeError(f"iterate is a {type(iterate).__name__}; give what init or step of this driver returned")
+            raise TypeError(f"iterate is a {type(iterate).__name__}; give a result of init or step of this solver")
         bound = AffineBound.tangent(problem, iterate.state.sigma_n)
         if self.from_start and iterate.n_paths == 0:
             end = follow_path(problem, bound)

@@ -91,7 +91,7 @@ class Springs:
     def step(self, problem: ContactProblem, iterate: Iterate) -> SpringIterate:
         """Take a step with springs, or, when they have become weak enough, one without."""
         if not isinstance(iterate, SpringIterate):
-            raise TypeError(f"iterate is a {type(iterate).__name__}; give what init or step of this driver returned")
+            raise TypeError(f"iterate is a {type(iterate).__name__}; give a result of init or step of this solver")
         if iterate.released is not None:
             return self._released(iterate, self.then.step(problem, iterate.released))
         equations, stiffness = self._equations(problem), iterate.spring * problem.body.stiffness_scale

@@ -73,7 +73,7 @@ class SemismoothNewton:
     def step(self, problem: ContactProblem, iterate: Iterate) -> NewtonIterate:
         """Do Steps 1 to 3 once."""
         if not isinstance(iterate, NewtonIterate):
-            raise TypeError(f"iterate is a {type(iterate).__name__}; give what init or step of this driver returned")
+            raise TypeError(f"iterate is a {type(iterate).__name__}; give a result of init or step of this solver")
         following = newton_step(self._equations(problem), iterate)
         # Equal sets give equal steps, unless springs or a nonlinear law remember the state.
         if following.is_regularised or following.sets.key not in iterate.visited:

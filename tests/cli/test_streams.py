@@ -73,7 +73,7 @@ def test_data_are_utf_8_in_any_encoding(monkeypatch: pytest.MonkeyPatch) -> None
 @pytest.mark.parametrize(
     ("stream", "kind", "message"),
     [
-        (None, StreamError, r"standard output: cannot be written \(.*closed.*\): send it to another place"),
+        (None, StreamError, r"standard output: cannot be written \(.*closed.*\): redirect it"),
         (Terminal("utf-8", OSError(28, "No space left")), StreamError, r"cannot be written \(No space left\)"),
         (Terminal("utf-8", BrokenPipeError()), PipeClosedError, "the reader has closed the pipe"),
     ],

@@ -213,7 +213,7 @@ REFUSED = {
     "hole outside": (lambda: Outline((square(1.0), hole(0.5, 3.0))), r"is a hole that lies outside of the outer loop"),
     "hole in hole": (
         lambda: Outline((square(3.0), hole(2.0), hole(1.0, name="g"))),
-        r"loop of sides g1.* lies inside loop of sides h1.*, where there is no body: leave one",
+        r"loop of sides g1.* lies inside loop of sides h1.*, where there is no body: remove one",
     ),
     "exterior anticlockwise": (
         lambda: Outline((square(1.0),), is_exterior=True),

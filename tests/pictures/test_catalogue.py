@@ -76,7 +76,7 @@ def test_pictures_of_several_contacts_are_numbered(solution: Solution) -> None:
 @pytest.mark.parametrize(
     ("name", "scene", "message"),
     [
-        ("tractoin", "paper-1", r"'tractoin' is no picture: .*did you mean 'traction'\?"),
+        ("tractoin", "paper-1", r"'tractoin' is not a picture: .*did you mean 'traction'\?"),
         ("zoom", "bending", "there is no picture 'zoom' of .*: nothing is in contact"),
         ("work", "paper-1", "it has no load history"),
         ("boundary-traction", "two-cylinders", "it shows one body, and there are several"),
@@ -143,11 +143,11 @@ def test_the_command_draws_results_and_scenes(
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (("plot", "paper-1", "--what", "tension"), "'tension' is no picture: the pictures are deformation, zoom"),
+        (("plot", "paper-1", "--what", "tension"), "'tension' is not a picture: choose from deformation, zoom"),
         (("plot", "nothing.h5"), "nothing.h5"),
         (("plot", "paper-1", "-o", "x.png"), "one file takes one picture"),
         (("run", "paper-1", "--what", "traction"), "--what names figures: add --plot DIR"),
-        (("run", "paper-1", "--plot", "p", "--what", "tension"), "'tension' is no picture"),
+        (("run", "paper-1", "--plot", "p", "--what", "tension"), "'tension' is not a picture"),
     ],
 )
 def test_the_command_refuses_before_anything_is_solved(

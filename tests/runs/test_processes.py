@@ -54,7 +54,7 @@ def test_the_second_of_two_runs_into_one_file_is_refused_before_it_computes(
         wait_until(Path(".r.h5.lock").exists)
         with pytest.raises(SystemExit, match="2"):
             main(["run", "paper-1", "--elements", "40", "-o", "r.h5"])
-        assert "r.h5: another process is computing what it will write there" in capsys.readouterr().err
+        assert "r.h5: another process will write this file" in capsys.readouterr().err
         assert first.poll() is None  # it had work to do all the while
     finally:
         first.kill()

@@ -198,7 +198,7 @@ def test_a_list_names_solvers_one_after_the_other() -> None:
     assert scene_from_toml(scene_to_toml(scene)).solver == scene.solver
     with pytest.raises(SceneError, match=r"solver\[1\].kind: unknown solver 'newton'"):
         scene_from_toml(BLOCK.replace('solver = "semismooth-newton"', 'solver = ["lemke", "newton"]'))
-    with pytest.raises(SceneError, match="solver: drivers is empty; give at least one driver"):
+    with pytest.raises(SceneError, match="solver: drivers is empty; give at least one solver"):
         scene_from_toml(BLOCK.replace('solver = "semismooth-newton"', "solver = []"))
 
 

@@ -91,7 +91,7 @@ def test_lemkes_method_declines_before_it_asks():
     problem = inexact_problem(Coulomb(0.5), is_costly=True)
     found = solve(problem, LemkePivoting(), throw=False)
     assert found.status is Status.TOO_COSTLY
-    assert found.message.startswith("This driver asks for several responses for each contact node")
+    assert found.message.startswith("This solver needs several responses for each contact node")
     assert problem.body.n_responses < problem.n_contact  # the loop's own and the certificates', but no 2 n probes
 
 

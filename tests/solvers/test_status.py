@@ -223,7 +223,7 @@ def test_errors_inside_a_law_surface_with_its_name(driver):
     [
         (lambda: SemismoothNewton(rho=0.0), "rho = 0.0; give a positive number"),
         (lambda: SemismoothNewton(max_steps=0), "max_steps = 0; allow at least one step"),
-        (lambda: Fallbacks(()), r"drivers is empty; give at least one driver, such as SemismoothNewton\(\)"),
+        (lambda: Fallbacks(()), r"drivers is empty; give at least one solver, such as SemismoothNewton\(\)"),
         (lambda: SolutionPath(max_steps=0), "max_steps = 0"),
         (lambda: Springs(max_steps=0), "max_steps = 0"),
         (lambda: Springs(first=1e-6), "springs from 1e-06 to 1e-05; give positive numbers, the last not larger"),
@@ -256,7 +256,7 @@ def test_drivers_refuse_each_others_iterates():
     drivers = (SemismoothNewton(), AugmentedLagrangian(), FixedPoint(), Fallbacks(), Springs(), SolutionPath())
     iterate = LemkePivoting().init(problem, problem.sticking_state)
     for driver in drivers:
-        with pytest.raises(TypeError, match="iterate is a Iterate; give what init or step of this driver returned"):
+        with pytest.raises(TypeError, match="iterate is a Iterate; give a result of init or step of this solver"):
             driver.step(problem, iterate)
 
 

@@ -75,7 +75,7 @@ def read_dxf(path: Path, only: Sequence[str] = ()) -> tuple[list[Stroke], str, l
             drawn = _strokes(entity, group)
         except (DXFError, ValueError, ZeroDivisionError) as error:
             raise GeometryError(
-                f"a {entity.dxftype()} on layer {layer!r} is no curve ({error}): draw it anew"
+                f"a {entity.dxftype()} on layer {layer!r} is not a curve ({error}): redraw it"
             ) from error
         if drawn is None:
             left_out[entity.dxftype()] += 1

@@ -155,7 +155,7 @@ def _check_calls(path: Path) -> None:
     found = _CALLS.search(_COMMENTS.sub(b"", path.read_bytes()))
     if found:
         raise GeometryError(
-            f"it says {found[0].decode()}: a .geo file that calls programs or other files is not run; save its mesh "
+            f"it says {found[0].decode()}: .geo files that call programs or other files are refused; save its mesh "
             "or its geometry with gmsh and give that"
         )
 

@@ -86,9 +86,7 @@ def _points_of(mesh: Any) -> FloatArray:
     except (TypeError, ValueError):
         points = np.zeros(0)
     if points.ndim != 2 or not len(points) or points.shape[1] not in (2, 3) or not np.isfinite(points).all():
-        raise GeometryError(
-            "it is damaged: its points are no finite coordinates in the plane or in space: write it anew"
-        )
+        raise GeometryError("it is damaged: its points are not finite coordinates: export it again")
     return points
 
 
@@ -98,7 +96,7 @@ def _names(mesh: Any, number: int) -> tuple[str, ...]:
         names = _groups(mesh, number)
     except (IndexError, KeyError, TypeError, ValueError) as error:
         raise GeometryError(
-            f"it is damaged: its groups cannot be read ({printable(str(error))}): write it anew"
+            f"it is damaged: its groups cannot be read ({printable(str(error))}): export it again"
         ) from error
     for name in dict.fromkeys(names):
         if not name.isprintable():

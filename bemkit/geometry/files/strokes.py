@@ -346,7 +346,7 @@ def nurbs_strokes(points: FloatArray, degree: int, knots: FloatArray, weights: F
     """
     if len(knots) != len(points) + degree + 1 or (np.diff(knots) < 0.0).any() or not (weights > 0.0).all():
         raise GeometryError(
-            f"a spline has {len(knots)} knots for {len(points)} control points and degree {degree}: draw it anew"
+            f"a spline has {len(knots)} knots for {len(points)} control points and degree {degree}: redraw it"
         )
     values = np.column_stack([points * weights[:, None], weights])
     low, high = knots[degree], knots[-degree - 1]

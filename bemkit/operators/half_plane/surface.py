@@ -90,7 +90,7 @@ class SurfaceElasticity(ABC):
 
     def condense(self, conditions: NodalConditions, force: FloatArray) -> CondensedMap:
         """Refuse to form a matrix; see `bemkit.contact.half_plane`."""
-        raise InputError("a periodic half-plane is no body of an assembly: give it a scene of its own")
+        raise InputError("a periodic half-plane cannot be a body of an assembly: give it its own scene")
 
     def element_tractions(self, displacement: FloatArray, force: FloatArray) -> FloatArray:
         """Return the tractions (n_elements, 1, 2) [Pa], which are the forces per length."""

@@ -80,8 +80,8 @@ class Hierarchical:
     def __post_init__(self) -> None:
         if not 1e-12 <= self.tolerance <= 1e-8:
             raise InputError(
-                f"tolerance is {self.tolerance}: give 1e-12, finer ones cannot be met, to 1e-8, larger ones would be "
-                "certified by no solution, such as 1e-10"
+                f"tolerance is {self.tolerance}: give a number from 1e-12 (round-off) to 1e-8 (the "
+                "certificate), such as 1e-10"
             )
 
     @property
@@ -120,8 +120,8 @@ class MatrixFree:
     def __post_init__(self) -> None:
         if not 1e-11 <= self.tolerance <= 3e-10:
             raise InputError(
-                f"tolerance is {self.tolerance}: give 1e-11, finer ones cannot be met, to 3e-10, larger ones would be "
-                "certified by no solution, such as 1e-10"
+                f"tolerance is {self.tolerance}: give a number from 1e-11 (round-off) to 3e-10 (the "
+                "certificate), such as 1e-10"
             )
         if self.max_steps < 1:
             raise InputError(f"max_steps is {self.max_steps}: give a positive whole number")

@@ -108,8 +108,8 @@ class GalerkinElasticity:
         self.traction_space = ConstantSpace(mesh) if traction_space is None else traction_space
         if isinstance(linear_solver, Automatic | Hierarchical | MatrixFree):
             raise InputError(
-                f"linear_solver is {linear_solver}: a map does not choose; give DenseCholesky(), or what "
-                "bemkit.operators.linear.solvers.choose_linear_solver returns for it"
+                f"linear_solver is {linear_solver}: give DenseCholesky(), or the result of "
+                "bemkit.operators.linear.solvers.choose_linear_solver"
             )
         self.linear_solver: LinearSolver = linear_solver
 

@@ -143,7 +143,7 @@ def all_runs(
         raise StudyError(str(error)) from error
     if not runs:
         raise StudyError(
-            "nothing to run: give at least one element type, driver and mesh, with constant elements other than "
+            "no run is possible: give at least one element type, solver and mesh, with constant elements other than "
             "adaptive meshes, for which they have no error estimate, and with 'hp' adaptive ones"
         )
     keys = [run.key for run in runs]

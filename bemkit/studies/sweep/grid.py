@@ -145,7 +145,7 @@ def check_number(scene: Scene | Assembly, key: Key) -> None:
     if isinstance(value, tuple | list | np.ndarray):
         raise PlaceError(f"{key.text} is a list: vary one number of it, such as {key.text}[0]")
     if isinstance(value, bool | str | Enum):
-        raise PlaceError(f"{key.text} is a word: only numbers can be varied; write a scene file for each word")
+        raise PlaceError(f"{key.text} is not a number; only numbers can be varied: write a scene file for each value")
     if is_dataclass(value) and not callable(value):
         names = [entry.name for entry in fields(value) if entry.init]
         remedy = f"vary one number of it, such as {key.text}.{names[0]}" if names else "there is no number in it"

@@ -87,7 +87,7 @@ def selected(names: Sequence[str], known: tuple[str, ...]) -> tuple[str, ...]:
     """Return the known names that fit one of the names given, all if none is; InputError for a name that fits none."""
     for name in names:
         if not any(fnmatchcase(each, name) for each in known):
-            raise InputError(f"{name!r} is no case: the cases are {', '.join(known)}{closest(name, known)}")
+            raise InputError(f"{name!r} is not a case: the cases are {', '.join(known)}{closest(name, known)}")
     return tuple(each for each in known if not names or any(fnmatchcase(each, name) for name in names))
 
 

@@ -172,7 +172,7 @@ def test_layers_that_are_off_and_those_that_are_not_chosen_are_left_out(tmp_path
         ),
         (
             dxf(WEIGHTLESS),
-            r"a SPLINE on layer '0' is no curve",
+            r"a SPLINE on layer '0' is not a curve",
         ),
     ],
 )

@@ -242,7 +242,7 @@ def test_library_of_gmsh_that_cannot_be_loaded_is_named(monkeypatch) -> None:
 def test_geo_files_that_call_others_are_not_run(call: str, tmp_path) -> None:
     (tmp_path / "part.geo").write_text(f"// no SystemCall here\n{call}\n")
     with pytest.raises(
-        GeometryError, match=rf"it says {call.split()[0].split('(')[0]}: a .geo file that calls programs"
+        GeometryError, match=rf"it says {call.split()[0].split('(')[0]}: .geo files that call programs"
     ):
         _ = MeshFile(str(tmp_path / "part.geo")).shape
 

@@ -162,7 +162,7 @@ def test_a_run_that_fails_shows_in_the_table_and_the_exit_code(tmp_path: Path) -
         (("study", "paper-1", "--meshes", "grade"), "meshes: unknown 'grade': the known ones are uniform, graded"),
         (("study", "paper-1", "--errors", "sigma"), "errors: unknown 'sigma': the known ones are energy, sigma_n"),
         (("study", "paper-1", "--exponent", "0.5"), "exponent is 0.5: give a finite number of at least 1"),
-        (("study", "paper-1", "--meshes", "adaptive", "--discretisations", "constant"), "nothing to run"),
+        (("study", "paper-1", "--meshes", "adaptive", "--discretisations", "constant"), "no run is possible"),
         (("study", "paper-1", "-o", "/nowhere/rows.jsonl"), "create it first"),
         (("study", "paper-1", "--most-elements", "3"), "most_elements is 3"),
     ],

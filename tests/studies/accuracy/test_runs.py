@@ -50,7 +50,7 @@ def test_runs_are_all_combinations_but_adaptive_constant_elements() -> None:
 
 def test_nothing_to_run_and_runs_that_are_the_same() -> None:
     scene = bk.load_scene("paper-1")
-    with pytest.raises(StudyError, match="nothing to run: give at least one element type"):
+    with pytest.raises(StudyError, match="no run is possible: give at least one element type"):
         all_runs(scene, [CONSTANT], [adaptive()], [NEWTON])
     with pytest.raises(StudyError, match="no part of the scene is in contact: errors are measured"):
         all_runs(bk.load_scene("bending"), [LINEAR], [uniform()], [NEWTON])

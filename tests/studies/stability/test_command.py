@@ -72,7 +72,7 @@ def test_a_wrong_row_shows_in_the_exit_code(monkeypatch: pytest.MonkeyPatch) -> 
     [
         (("stability", "paper-3"), "no such file or shipped scene"),
         (("stability", "paper-1", "--axis", "rho"), "the axes are youngs-modulus"),
-        (("stability", "paper-1", "--csv", "-", "--markdown", "-"), "two outputs go to the same place"),
+        (("stability", "paper-1", "--csv", "-", "--markdown", "-"), "two outputs go to the same file"),
         (("stability", "paper-1", "-o", "/nowhere/rows.jsonl"), "create it first"),
     ],
 )

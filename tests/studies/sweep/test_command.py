@@ -124,7 +124,7 @@ def test_tasks_of_a_group_travel_together() -> None:
         (("--vary", f"{FRICTION}=1", "--jobs", "2", "--on", "tcp://x:1"), "give one of them"),
         (("--vary", f"{FRICTION}=1", "--show", "energy"), "--over and --show go with figures: add --plot DIR"),
         (("--vary", f"{FRICTION}=1", "--plot", "x", "--show", "energi"), "'energi' is no column of numbers"),
-        (("--vary", f"{FRICTION}=1", "--csv", "-", "--json", "-"), "two outputs go to the same place"),
+        (("--vary", f"{FRICTION}=1", "--csv", "-", "--json", "-"), "two outputs go to the same file"),
     ],
 )
 def test_wrong_words_are_named_before_anything_is_computed(arguments: tuple[str, ...], message: str) -> None:

@@ -52,7 +52,7 @@ def test_numbers_of_several_bodies_are_changed() -> None:
         (SCENE, "shape.corner.x", "shape.corner is a list: give the number of an entry"),
         (SCENE, "shape.corner[2]", r"shape\.corner\[2\]: unknown entry: shape\.corner has 2, counted from 0"),
         (SCENE, "law[0]", r"law is not a list: remove \[0\]"),
-        (SCENE, "material.plane", "material.plane is a word: only numbers can be varied"),
+        (SCENE, "material.plane", "material.plane is not a number; only numbers can be varied"),
         (SCENE, "symmetry.x", "symmetry is not given in the scene: write it there first"),
         (SCENE, "law..x", "give a place in a scene file, such as law.friction_coefficient"),
         (BODIES, "bodies.uper.material.youngs_modulus", "bodies.uper: unknown key: .*did you mean 'upper'"),

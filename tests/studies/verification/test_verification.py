@@ -124,7 +124,7 @@ def test_what_is_in_the_file_is_not_computed_again(tmp_path: Path, monkeypatch: 
 
 
 def test_names_choose_cases() -> None:
-    with pytest.raises(bk.InputError, match="'hertz' is no case: the cases are lame-ring, kirsch-hole"):
+    with pytest.raises(bk.InputError, match="'hertz' is not a case: the cases are lame-ring, kirsch-hole"):
         verify(["hertz"])
     assert module.selected(["pin*", "paper-1"], tuple(CASES)) == ("paper-1", "pin-in-hole", "pin-in-stiffer-hole")
     assert module.selected([], ("a", "b")) == ("a", "b")
