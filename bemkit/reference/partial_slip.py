@@ -51,7 +51,7 @@ class PartialSlip:
         check_positive(tangential_load=self.tangential_load, friction=self.friction)
         most = self.friction * self.contact.load
         if self.tangential_load >= most:
-            raise InputError(f"tangential_load is {self.tangential_load}: the contact slides from {most:g} on: give less")
+            raise InputError(f"tangential_load is {self.tangential_load}: all slides from {most:g} on: give less")
 
     @property
     def sticking(self) -> LineContact:

@@ -255,7 +255,9 @@ def test_contents_that_make_no_sense_are_named(
         cell_sets=content["cell_sets"],
     )
     monkeypatch.setattr(meshio, "read", lambda path: stored)
-    with pytest.raises(GeometryError, match=rf"x\.msh: it is damaged: .*{message}.*: (write it anew|export it again)") as caught:
+    with pytest.raises(
+        GeometryError, match=rf"x\.msh: it is damaged: .*{message}.*: (write it anew|export it again)"
+    ) as caught:
         read_mesh(tmp_path / "x.msh")
     assert str(caught.value).isprintable()
 

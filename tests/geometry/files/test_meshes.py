@@ -241,9 +241,7 @@ def test_library_of_gmsh_that_cannot_be_loaded_is_named(monkeypatch) -> None:
 @pytest.mark.parametrize("call", ['SystemCall "touch x";', 'Include "other.geo";', "Merge 'a.step';", "Plugin(X).Run;"])
 def test_geo_files_that_call_others_are_not_run(call: str, tmp_path) -> None:
     (tmp_path / "part.geo").write_text(f"// no SystemCall here\n{call}\n")
-    with pytest.raises(
-        GeometryError, match=rf"it says {call.split()[0].split('(')[0]}: .geo files that call programs"
-    ):
+    with pytest.raises(GeometryError, match=rf"it says {call.split()[0].split('(')[0]}: .geo files that call programs"):
         _ = MeshFile(str(tmp_path / "part.geo")).shape
 
 
