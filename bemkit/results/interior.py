@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from bemkit.arrays import FloatArray
-from bemkit.errors import InputError
 from bemkit.geometry.reflection import reflected_to_whole
 from bemkit.geometry.spaces import BoundarySpace, ConstantSpace, ElementwiseSpace
 from bemkit.operators.somigliana.fields import InteriorFields
+from bemkit.operators.somigliana.potentials import PotentialFields
 from bemkit.results.solved_body import SolvedBody
 from bemkit.scene.discretisation import on_whole_body
 
 
-def interior_fields(solution: SolvedBody) -> InteriorFields:
+def interior_fields(solution: SolvedBody) -> PotentialFields:
     """Return the displacement, strain and stress inside the body of a solution.
 
     Parameters
@@ -22,7 +22,7 @@ def interior_fields(solution: SolvedBody) -> InteriorFields:
 
     Returns
     -------
-    InteriorFields
+    InteriorFields, or HalfPlaneFields below the surface of a half-plane
         In physical units, on the whole body also where a symmetry halves it; evaluate it at points with
         ``displacement(points)`` and ``stress(points)``, and see `von_mises` and `principal_stresses`.
 
@@ -34,14 +34,12 @@ def interior_fields(solution: SolvedBody) -> InteriorFields:
     Displacements and tractions are those of the spaces of the discretisation (constant tractions in files of older
     versions). Inside, their error decays quickly with the distance from the boundary. Within about one element length
     of it, stresses are those of the piecewise data, with peaks at the ends of elements: see `InteriorFields`.
-
-    Raises
-    ------
-    InputError
-        If the body is a half-plane.
     """
     if solution.mesh.surface is not None:
-        raise InputError("half-planes have no fields inside: use a block")
+        from bemkit.operators.half_plane.fields import HalfPlaneFields
+
+        boundary = solution.boundary
+        return HalfPlaneFields(solution.mesh, solution.scene.material, boundary.traction, boundary.displacement)
     material, background = solution.scene.material, solution.particular
     return InteriorFields(solution.mesh.whole, material, *whole_boundary(solution), background)
 

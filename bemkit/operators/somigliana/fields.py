@@ -15,7 +15,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import cached_property
 from math import comb
-from typing import Protocol, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 
@@ -40,7 +40,7 @@ from bemkit.operators.somigliana.moments import (
     straight_displacement_moments,
     straight_gradient_moments,
 )
-from bemkit.operators.somigliana.stress import gradient_of, stress_of
+from bemkit.operators.somigliana.potentials import Background, PotentialFields, as_points
 
 CHUNK_PAIRS = 8192
 """Points and elements near them that are integrated at a time."""
@@ -55,20 +55,7 @@ Terms: TypeAlias = Callable[[ComplexArray, IntArray, ComplexArray, bool], Comple
 OfClusters: TypeAlias = Callable[[FarFields, ComplexArray, ComplexArray, list[Pairs]], ComplexArray]
 
 
-class Background(Protocol):
-    """A field in the whole body that is added to the one of the boundary data, such as a particular solution."""
-
-    def displacement(self, points: FloatArray) -> FloatArray:
-        """Evaluate the (n, 2) displacement [m] at (n, 2) points [m]."""
-
-    def displacement_gradient(self, points: FloatArray) -> FloatArray:
-        """Evaluate its (n, 2, 2) gradient [-]."""
-
-    def stress(self, points: FloatArray) -> FloatArray:
-        """Evaluate the (n, 2, 2) stress [Pa]."""
-
-
-class InteriorFields:
+class InteriorFields(PotentialFields):
     """Displacement, its gradient, strain and stress at points inside a body.
 
     Parameters
@@ -132,25 +119,10 @@ class InteriorFields:
 
     def is_inside(self, points: FloatArray) -> BoolArray:
         """Return the (n,) mask of the (n, 2) points [m] that lie strictly inside the body."""
-        return self._locator.locate(_as_points(points)).is_inside
+        return self._locator.locate(as_points(points)).is_inside
 
     def displacement(self, points: FloatArray) -> FloatArray:
-        """Evaluate the displacement.
-
-        Parameters
-        ----------
-        points : (n, 2) array [m]
-            Points strictly inside the body.
-
-        Returns
-        -------
-        (n, 2) array [m]
-
-        Raises
-        ------
-        PointNotInsideError
-            Naming the first point that is not inside.
-        """
+        """Evaluate the displacement (n, 2) [m] at points (n, 2) [m]."""
         points, location = self._located(points)
         reference = self._at_nearest(location)
         # a constant displacement c is represented as c inside a bounded body, and as zero inside an exterior one
@@ -160,25 +132,7 @@ class InteriorFields:
         own = np.column_stack([result.real, result.imag])
         return own if self.background is None else own + self.background.displacement(points)
 
-    def displacement_gradient(self, points: FloatArray) -> FloatArray:
-        """Evaluate the (n, 2, 2) displacement gradient, [:, i, j] = du_i / dx_j; otherwise as `displacement`."""
-        potential, shear = self._potentials(points)
-        kappa, two_mu = self.material.kappa, 2.0 * self.material.shear_modulus
-        own = gradient_of((kappa * potential - potential.conj()) / two_mu, shear / two_mu)
-        return own if self.background is None else own + self.background.displacement_gradient(points)
-
-    def strain(self, points: FloatArray) -> FloatArray:
-        """Evaluate the (n, 2, 2) strain, the symmetric part of the gradient; otherwise as `displacement`."""
-        gradient = self.displacement_gradient(points)
-        return 0.5 * (gradient + np.swapaxes(gradient, 1, 2))
-
-    def stress(self, points: FloatArray) -> FloatArray:
-        """Evaluate the (n, 2, 2) stress [Pa]; otherwise as `displacement`."""
-        potential, shear = self._potentials(points)
-        own = stress_of(2.0 * potential.real, shear)
-        return own if self.background is None else own + self.background.stress(points)
-
-    def _potentials(self, points: FloatArray) -> tuple[ComplexArray, ComplexArray]:
+    def potentials(self, points: FloatArray) -> tuple[ComplexArray, ComplexArray]:
         """Return Phi and D (n,) [Pa]."""
         points, location = self._located(points)
         potential, shear = self._summed(
@@ -187,7 +141,7 @@ class InteriorFields:
         return potential, shear
 
     def _located(self, points: FloatArray) -> tuple[FloatArray, Location]:
-        points = _as_points(points)
+        points = as_points(points)
         location = self._locator.locate(points)
         _require_inside(location, points)
         return points, location
@@ -295,13 +249,6 @@ def _at_points(terms: ComplexArray, point: IntArray, n_points: int) -> ComplexAr
     for own, each in zip(result, terms, strict=True):
         own.real, own.imag = (np.bincount(point, part, n_points) for part in (each.real, each.imag))
     return result
-
-
-def _as_points(points: FloatArray) -> FloatArray:
-    points = np.asarray(points, dtype=float)
-    if points.ndim != 2 or points.shape[1] != 2 or not np.isfinite(points).all():
-        raise InputError(f"points has the shape {points.shape}: give an (n, 2) array of finite coordinates")
-    return points
 
 
 def _require_inside(location: Location, points: FloatArray) -> None:

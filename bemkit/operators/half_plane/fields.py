@@ -1,0 +1,193 @@
+"""Fields below the surface of a half-plane in closed form, from tractions that are constant on elements.
+
+With z = x + i y, the body below the line y = 0, N and T the tractions along y and x, the potential
+
+    Phi(z) = -1 / (2 pi i) int (N - i T) / (t - z) dt
+
+holds on both sides of the line, and with its integral phi [Muskhelishvili1953]
+
+    sigma_xx + sigma_yy = 4 Re Phi(z),  sigma_yy - i sigma_xy = Phi(z) - Phi(z*) + (z - z*) Phi'(z)*,
+    2 mu (u_x + i u_y) = kappa phi(z) + phi(z*) - (z - z*) Phi(z)*.
+
+On elements the integrals are sums over their ends t of c log(t - z), c the jump of N - i T there by 2 pi i; log sin pi
+(t - z) takes the place of the logarithm where the surface is periodic, with lengths measured by the period.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from bemkit.arrays import BoolArray, ComplexArray, FloatArray
+from bemkit.errors import InputError
+from bemkit.geometry.mesh import BoundaryMesh
+from bemkit.operators.half_plane.equations import HalfPlaneEquations
+from bemkit.operators.material import Material
+from bemkit.operators.somigliana.locate import PointNotInsideError
+from bemkit.operators.somigliana.potentials import PotentialFields, as_points
+
+_CHUNK = 500_000
+"""Pairs of points and ends of elements that are evaluated at a time."""
+_SAMPLED = 64
+"""Elements whose displacements say how the half-plane has moved far away."""
+_DEEP = 6.0
+"""Depth in periods below which no wave is felt: exp(-12 pi) is 4e-17."""
+
+
+class HalfPlaneFields(PotentialFields):
+    """Displacement, its gradient, strain and stress below the surface of a half-plane.
+
+    Parameters
+    ----------
+    mesh : BoundaryMesh
+        Elements of its surface.
+    material : Material
+    traction : (n_elements, 2) array [Pa]
+        On each element, in x and y.
+    displacement : (n_elements, 2) array [m]
+        Means over elements, in x and y: the motion far away follows from them.
+    strain : float [-]
+        Along the surface, far below it.
+
+    Raises
+    ------
+    InputError
+        If the mesh is not that of a half-plane.
+
+    Notes
+    -----
+    Every method takes points strictly below the surface, otherwise as those of `InteriorFields`. Below a periodic
+    surface the mean strain along it is `strain` at all depths.
+    """
+
+    def __init__(
+        self,
+        mesh: BoundaryMesh,
+        material: Material,
+        traction: FloatArray,
+        displacement: FloatArray,
+        strain: float = 0.0,
+    ) -> None:
+        if mesh.surface is None:
+            raise InputError("mesh has closed boundaries: give that of a half-plane, or take InteriorFields")
+        self.mesh, self.material, self._is_periodic = mesh, material, mesh.surface.is_periodic
+        self.background = None
+        self.mesh, self.material, self._is_periodic = mesh, material, mesh.surface.is_periodic
+        # local axes: x against the tangent, y along the normal, from the end of the strip
+        self._axis = -complex(*mesh.tangents[0])
+        self._length, self._origin = float(mesh.lengths.sum()), mesh.nodes[mesh.elements[-1, 1]]
+        tractions, lengths = self._local(traction)[::-1], mesh.lengths[::-1]
+        jumps = np.diff(np.concatenate([[0.0], -tractions / (2.0 * np.pi), [0.0]]))
+        ends = np.append(0.0, np.cumsum(lengths)) / self._length
+        self._ends, self._jumps = ends[jumps != 0.0], jumps[jumps != 0.0]
+        self._mean = complex((tractions * lengths).sum() / self._length)
+        # what is added: a uniform tension along x, a turn and a shift
+        self._tension, self._turn, self._shift = material.plane_modulus * strain, 0.0, 0j
+        if self._is_periodic:
+            self._follow_period(displacement)
+        else:
+            self._follow_strip(strain, traction, displacement)
+
+    def _local(self, vectors: FloatArray) -> ComplexArray:
+        """Return vectors (n, 2) in x and y as complex numbers along the local axes."""
+        return np.asarray((vectors[:, 0] + 1j * vectors[:, 1]) / self._axis)
+
+    def _follow_strip(self, strain: float, traction: FloatArray, displacement: FloatArray) -> None:
+        """Find how the half-plane has moved far away; forces move no point at the distance L."""
+        mesh, length = self.mesh, self._length
+        # the sign at both sides of an element: half of what the potentials take as zero on one of them
+        self._shift = 0.5j * self.material.plane_compressibility * self._mean * length
+        nodes = np.unique(np.linspace(0.0, mesh.n_elements - 1.0, _SAMPLED).astype(int))
+        x = length - (np.cumsum(mesh.lengths) - 0.5 * mesh.lengths)[nodes]
+        places = np.append(0.0, np.cumsum(mesh.lengths)) / length
+        equations = HalfPlaneEquations(places, self.material, np.zeros((0, mesh.n_elements), complex))
+        along_surface = np.stack([mesh.tangents[0], mesh.normals[0]], axis=1)
+        left = length * equations.residual(nodes, traction @ along_surface, displacement @ along_surface / length)
+        moved = -left[:, 0] + 1j * left[:, 1] - strain * x
+        turn = float(np.polyfit(x / length, moved.imag, 1)[0]) / length if nodes.size > 1 else 0.0
+        self._turn = turn
+        self._shift += complex((moved - 1j * turn * x).mean())
+
+    def _follow_period(self, displacement: FloatArray) -> None:
+        """Keep the mean strain along the surface, and its mean displacement."""
+        compressibility, lengths = self.material.plane_compressibility, self.mesh.lengths
+        self._tension -= self.material.plane_modulus * compressibility * self._mean.imag
+        self._turn = compressibility * self._mean.real
+        # deep below all waves the field is linear: so is its mean over the surface
+        depth = _DEEP * self._length
+        deep = (self._origin - depth * self.mesh.normals[0])[None, :]
+        above = self.displacement(deep) + depth * self.displacement_gradient(deep) @ self.mesh.normals[0]
+        self._shift = complex(self._local(lengths @ displacement / lengths.sum() - above)[0])
+
+    def is_inside(self, points: FloatArray) -> BoolArray:
+        """Return the (n,) mask of the (n, 2) points [m] that lie strictly below the surface."""
+        return np.asarray(self._places(as_points(points)).imag < 0.0)
+
+    def _places(self, points: FloatArray) -> ComplexArray:
+        """Return points along the local axes, by the length of the strip."""
+        return self._local(points - self._origin) / self._length
+
+    def _checked(self, points: FloatArray) -> ComplexArray:
+        points = as_points(points)
+        z = self._places(points)
+        wrong = np.flatnonzero(~(z.imag < 0.0))
+        if wrong.size:
+            x, y = points[wrong[0]]
+            raise PointNotInsideError(
+                f"point {wrong[0]} at ({x:.9g}, {y:.9g}) lies on or above the surface of the half-plane "
+                f"({wrong.size} of {len(points)} points do): select points with is_inside(points)"
+            )
+        return z
+
+    def potentials(self, points: FloatArray) -> tuple[ComplexArray, ComplexArray]:
+        """Return Phi and D (n,) [Pa]."""
+        z = self._checked(points)
+        potential, mirrored, slope, _, _ = self._sums(z)
+        shear = 2.0 * potential.real - (potential - mirrored + (z - z.conj()) * slope.conj())
+        turn = 2.0j * self.material.shear_modulus * self._turn / (self.material.kappa + 1.0)
+        return potential + 0.25 * self._tension + turn, (shear + 0.5 * self._tension) * self._axis**2
+
+    def displacement(self, points: FloatArray) -> FloatArray:
+        """Evaluate the displacement (n, 2) [m] at points (n, 2) [m]."""
+        z = self._checked(points)
+        potential, _, _, integral, mirrored = self._sums(z)
+        kappa, two_mu = self.material.kappa, 2.0 * self.material.shear_modulus
+        strained = kappa * integral + mirrored - (z - z.conj()) * potential.conj()
+        tension = self._tension * (0.25 * (kappa - 1.0) * z + 0.5 * z.conj())
+        moved = ((strained + tension) / two_mu + 1j * self._turn * z) * self._length + self._shift
+        moved = moved * self._axis
+        return np.stack([moved.real, moved.imag], axis=1)
+
+    def _sums(self, z: ComplexArray) -> tuple[ComplexArray, ...]:
+        """Return Phi(z), Phi(z*), Phi'(z), phi(z), phi(z*), each (n,), of the tractions."""
+        if not self._ends.size:
+            return tuple(np.zeros((5, z.size), complex))
+        parts = []
+        chunk = max(1, _CHUNK // self._ends.size)
+        for begin in range(0, z.size, chunk):
+            arm = self._ends - z[begin : begin + chunk, None]
+            log, slope, integral = _periodic_kernels(arm) if self._is_periodic else _kernels(arm)
+            mirrored = log.conj(), integral.conj()
+            parts.append(np.stack([of @ self._jumps for of in (log, mirrored[0], -slope, -integral, -mirrored[1])]))
+        return tuple(np.concatenate(parts, axis=1))
+
+
+def _kernels(arm: ComplexArray) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
+    """Return log w, its derivative and its integral for w above the real axis."""
+    log = np.log(arm)
+    return log, 1.0 / arm, arm * (log - 1.0)
+
+
+def _periodic_kernels(arm: ComplexArray) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
+    """Return log sin(pi w), its derivative and its integral for w above the real axis.
+
+    The wave e = exp(2 pi i w) is small at some depth: log sin(pi w) = -i pi w + i pi / 2 - log 2 + log(1 - e), and the
+    integral of the last term is i / (2 pi) Li_2(e).
+    """
+    from scipy.special import spence
+
+    wave = np.exp(2j * np.pi * arm)
+    constant = 0.5j * np.pi - np.log(2.0)
+    log = -1j * np.pi * arm + constant + np.log1p(-wave)
+    slope = -1j * np.pi * (1.0 + wave) / (1.0 - wave)
+    integral = (constant - 0.5j * np.pi * arm) * arm + 0.5j / np.pi * np.asarray(spence(1.0 - wave))
+    return np.asarray(log), np.asarray(slope), integral
