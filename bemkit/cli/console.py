@@ -96,7 +96,7 @@ def print_explanation(solution: Solution | AssemblySolution, output_seconds: flo
 def _stages(solution: Solution | AssemblySolution, output_seconds: float) -> Table:
     table = plain_table(("stage",), ("time", "memory"), gap=2)
     for name, seconds in solution.timings.items():
-        if name != "total":
+        if name != "total" and seconds > 0.0:  # a stage that this run did not need is not listed
             size = solution.memory.get(name, 0)
             table.add_row(name, format_seconds(seconds), format_size(size) if size else "")
     table.add_row("outputs", format_seconds(output_seconds), "")
@@ -272,7 +272,7 @@ def _node_counts(solution: Solution | AssemblySolution) -> str:
 
 def _time(solution: Solution | AssemblySolution) -> str:
     timings = solution.timings
-    stages = ", ".join(f"{name} {value:.2f}" for name, value in timings.items() if name != "total")
+    stages = ", ".join(f"{name} {value:.2f}" for name, value in timings.items() if name != "total" and value > 0.0)
     return f"{timings.get('total', sum(timings.values())):.2f} s ({stages})"
 
 

@@ -150,7 +150,9 @@ def test_degrees_survive_their_text() -> None:
 
 def test_wrong_lists_are_refused() -> None:
     scene = dataclasses.replace(bk.load_scene("paper-1"), discretisation=bk.Galerkin([2, 3, 4]))
-    with pytest.raises(GeometryError, match=r"degree has 3 entries, but the mesh has \d+ elements: give one degree"):
+    with pytest.raises(
+        GeometryError, match=r"degree has 3 entries, but the mesh has \d+ elements[:;].* give one degree"
+    ):
         bk.run(scene)
     for wrong in (0, 13, 2.5):
         with pytest.raises(GeometryError, match=r"degree is .*: give a whole number from 1 to 12"):
@@ -166,7 +168,7 @@ def test_wrong_lists_are_refused() -> None:
 def test_several_bodies_take_one_degree() -> None:
     assembly = bk.load_scene("two-cylinders")
     assert isinstance(assembly, bk.Assembly)
-    with pytest.raises(InputError, match=r"degree is a list, of body .*: give one degree"):
+    with pytest.raises(InputError, match=r"degree is a list, of body .*[:;].* give one degree"):
         dataclasses.replace(assembly, discretisation=bk.Galerkin((2, 3)))
 
 
