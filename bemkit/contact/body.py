@@ -137,7 +137,7 @@ class SlipHistory:
 class LinearBody(Protocol):
     """One or several elastic bodies under their loads, reduced to the contact nodes.
 
-    All nonlinear code in bemkit sees bodies only through this protocol: a body never learns of friction, drivers
+    All nonlinear code in bemkit sees bodies only through this protocol: a body never learns of friction, solvers
     never learn how it finds its response. Derive from this class and write `weights`, `stiffness_scale` and `respond`;
     a body that only contact can hold also writes `rigid_motions` and `rigid_load`. `bemkit.testing.check_body` tests
     everything said here.
@@ -148,9 +148,9 @@ class LinearBody(Protocol):
         Positive: nodal force = weight times traction.
     accuracy : float
         Relative error of the displacements and tractions of a response: 1e-14 (the default) for a direct solver, the
-        tolerance at which it stops for an iterative one. Drivers take their tolerances from it.
+        tolerance at which it stops for an iterative one. Solvers take their tolerances from it.
     is_costly : bool
-        Whether drivers should ask for tens of responses at most, rather than for several per contact node. False by
+        Whether solvers should ask for tens of responses at most, rather than for several per contact node. False by
         default.
     """
 

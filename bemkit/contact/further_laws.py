@@ -30,7 +30,7 @@ class CohesiveCoulomb(LawOfCoefficients):
     Notes
     -----
     Cohesion drops to zero at once when a node opens. So a problem with ``c > 0`` and a moving edge of contact need not
-    have a solution; the status of a driver then says that it has found none.
+    have a solution; the status of a solver then says that it has found none.
     """
 
     friction_coefficient: Coefficient

@@ -122,7 +122,7 @@ class ContactProblem:
     def respond(self, conditions: LinearConditions) -> ContactState:
         """Return the response of the body, with ``sigma_t = 0`` for conditions on displacements that follow.
 
-        Drivers call this instead of `LinearBody.respond`, and need not know which tangents supports hold.
+        Solvers call this instead of `LinearBody.respond`, and need not know which tangents supports hold.
 
         Raises
         ------
@@ -199,7 +199,7 @@ class ContactProblem:
         if values.shape != sigma_n.shape:
             shapes = f"the shape {values.shape} for {sigma_n.shape}"
             raise LawError(f"{self._name(method)} returned {shapes}; give one value a node")
-        # A state that is not finite is the driver's to report; finite tractions must give finite bounds.
+        # A state that is not finite is the solver's to report; finite tractions must give finite bounds.
         if not np.isfinite(values).all() and np.isfinite(sigma_n).all():
             node = int(np.argmin(np.isfinite(values)))
             at = f"at contact node {node} (sigma_n = {sigma_n[node]:g})"
@@ -211,7 +211,7 @@ class ContactProblem:
 
 
 def _check_members(body: LinearBody, law: FrictionLaw) -> None:
-    """Refuse a body or a law that lacks what drivers ask of it."""
+    """Refuse a body or a law that lacks what solvers ask of it."""
     absent = [name for name in _BODY_MEMBERS if not hasattr(body, name)]
     if absent:
         raise InputError(

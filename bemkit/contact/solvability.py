@@ -20,7 +20,7 @@ Result = TypeVar("Result")
 
 _RELATIVE_WORK = 1e-6
 """Work below this share of the largest force counts as zero. Linear programming (tolerance 1e-7) cannot decide whether
-contact holds such a load; the drivers can."""
+contact holds such a load; the solvers can."""
 
 _PLAIN = 1e-3
 """Work, relative to the forces of the sticking state, that errors of supports and integrals cannot cause; and size of
@@ -97,7 +97,7 @@ def find_unsolvable_load(problem: ContactProblem) -> UnsolvableLoad | None:
     and the load does more work on it than friction present without pressure takes up, ``L(v) > sum w c |v_t|``. By
     linear duality no escape exists exactly if tractions with ``sigma_n <= 0`` and ``|sigma_t| <= c + s |sigma_n|``
     balance the load. c and s envelop the law from above, and a cap is tried as a second pair (c = cap, s = 0), so the
-    test never refuses a load that can be held. A load that it misses is left to the status of the driver.
+    test never refuses a load that can be held. A load that it misses is left to the status of the solver.
     """
     motions = as_rows(problem.body.rigid_motions())
     if not motions.shape[0]:

@@ -32,7 +32,7 @@ DRIVERS: Mapping[str, tuple[str, ...]] = MappingProxyType(
         "lemke": ("Lemke1965", "CottlePangStone1992", "StewartTrinkle1996"),
     }
 )
-"""The works behind each built-in driver, by its word in scene files."""
+"""The works behind each built-in solver, by its word in scene files."""
 
 LAW_WORKS: Mapping[str, tuple[str, ...]] = MappingProxyType(
     {"slip-weakening": ("Ida1972",), "rate-strengthening": ("Dieterich1979",)}
@@ -98,7 +98,7 @@ def cite(subject: Scene | Assembly | Solution | AssemblySolution) -> Citations:
     Parameters
     ----------
     subject : Scene, Assembly, Solution or AssemblySolution
-        A solution contains more than its scene: the linear solver that was chosen, and which drivers took part.
+        A solution contains more than its scene: the linear solver that was chosen, and which solvers took part.
 
     Returns
     -------

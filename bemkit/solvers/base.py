@@ -1,4 +1,4 @@
-"""The one loop that all drivers share: steps, certificate, status, history."""
+"""The one loop that all solvers share: steps, certificate, status, history."""
 
 import math
 from collections.abc import Callable
@@ -60,7 +60,7 @@ class Status(Enum):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Iterate:
-    """One state of an iteration; drivers that remember more derive their own iterates from it.
+    """One state of an iteration; solvers that remember more derive their own iterates from it.
 
     Parameters
     ----------
@@ -69,7 +69,7 @@ class Iterate:
     linear_solves : int
         Linear systems spent since `init`.
     ended : Status or None
-        Why the driver cannot go on; None while it can.
+        Why the solver cannot go on; None while it can.
     message : str
         The reason in words, or a note on the step for the history.
     """
@@ -83,7 +83,7 @@ class Iterate:
 class ContactSolver(Protocol):
     """A contact solver: frozen options and two pure functions.
 
-    A driver never decides that it has converged; `solve` does, by the certificate.
+    A solver never decides that it has converged; `solve` does, by the certificate.
     """
 
     @property
@@ -109,7 +109,7 @@ class ContactSolver(Protocol):
         ----------
         problem : ContactProblem
         iterate : Iterate
-            What `init` or `step` of the same driver returned.
+            What `init` or `step` of the same solver returned.
 
         Raises
         ------
@@ -137,7 +137,7 @@ class StepRecord:
     n_changed : int
         Nodes whose status changed in this step.
     message : str
-        The driver's remark on the step.
+        The solver's remark on the step.
     """
 
     step: int
@@ -164,7 +164,7 @@ class ContactSolution:
         Of `state`.
     node_status : (n_contact,) array of `NodeStatus` values
     steps, linear_solves : int
-        Steps of the driver, and linear systems solved in all of them and at the start.
+        Steps of the solver, and linear systems solved in all of them and at the start.
     message : str
         One sentence on how the solve ended.
     history : tuple of StepRecord
@@ -212,7 +212,7 @@ def solve(
     start : ContactState, optional
         Guess, in equilibrium or not. The cold start has every node in contact and sticking.
     max_steps : int, optional
-        By default what the driver allows.
+        By default what the solver allows.
     tolerance : float
         Bound on every entry of the certificate.
     throw : bool
@@ -263,7 +263,7 @@ class _Run:
     callback: Callable[[StepRecord], None] | None
 
     def finish(self, start: ContactState | None) -> ContactSolution:
-        """Run the driver from a start until there is a status."""
+        """Run the solver from a start until there is a status."""
         # Overflow is not warned about: it ends in the status NOT_FINITE.
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
             try:
@@ -319,7 +319,7 @@ class _Run:
     def _without_contact(self, iterate: Iterate, untouched: FloatingResponse | None) -> Iterate:
         """Return the iterate without contact tractions, if the body needs none at its displacements.
 
-        Drivers only approach tractions that vanish, and where all vanish nothing shows that the rest is small. A body
+        Solvers only approach tractions that vanish, and where all vanish nothing shows that the rest is small. A body
         that has moved far may be moved on by a little, out of the obstacle.
         """
         if untouched is None or not iterate.state.is_finite:

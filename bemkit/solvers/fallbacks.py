@@ -1,4 +1,4 @@
-"""Drivers one after the other: a driver that is made of drivers, and the default of scenes."""
+"""Solvers in turn: a solver composed of solvers, and the default of scenes."""
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
@@ -20,13 +20,13 @@ class FallbackIterate(Iterate):
     Parameters
     ----------
     index : int
-        Of the driver at work.
+        Of the solver at work.
     inner : Iterate
-        Of that driver.
+        Of that solver.
     n_steps : int
         Its steps so far.
     reasons : tuple of str
-        Why those drivers have ended.
+        Why those solvers have ended.
     """
 
     index: int
@@ -47,8 +47,8 @@ class Fallbacks:
 
     Notes
     -----
-    A driver that cannot help ends in `init`, and the next one begins. Nothing follows where contact and friction are
-    satisfied, because only drivers of other responses could improve the rest of the certificate.
+    A solver that cannot help ends in `init`, and the next one begins. Nothing follows where contact and friction are
+    satisfied, because only solvers of other responses could improve the rest of the certificate.
 
     Examples
     --------
@@ -70,15 +70,15 @@ class Fallbacks:
 
     @property
     def max_steps(self) -> int:
-        """Steps of all drivers."""
+        """Steps of all solvers."""
         return sum(driver.max_steps for driver in self.drivers)
 
     def without_whole_path(self) -> "Fallbacks":
-        """Return the drivers without those that follow the whole path of solutions."""
+        """Return the solvers without those that follow the whole path of solutions."""
         return self._without(lambda driver: isinstance(driver, SolutionPath) and driver.from_start)
 
     def without_new_starts(self) -> "Fallbacks":
-        """Return the drivers that go on from a given state, without those that begin with all nodes sticking."""
+        """Return the solvers that go on from a given state, without those that begin with all nodes sticking."""
         return self.without_whole_path()._without(lambda driver: isinstance(driver, Springs))
 
     def _without(self, is_excluded: Callable[[ContactSolver], bool]) -> "Fallbacks":
@@ -86,11 +86,11 @@ class Fallbacks:
         return Fallbacks(others) if others else self
 
     def init(self, problem: ContactProblem, start: ContactState) -> FallbackIterate:
-        """Begin with the first driver that can help."""
+        """Begin with the first solver that can help."""
         return self._begun(problem, FallbackIterate(state=start, index=-1, inner=Iterate(state=start)))
 
     def step(self, problem: ContactProblem, iterate: Iterate) -> FallbackIterate:
-        """Take a step of the driver at work; hand on to the next one if it ends."""
+        """Take a step of the solver at work; hand on to the next one if it ends."""
         if not isinstance(iterate, FallbackIterate):
             raise TypeError(f"iterate is a {type(iterate).__name__}; give a result of init or step of this solver")
         driver, n_steps = self.drivers[iterate.index], iterate.n_steps + 1
@@ -111,7 +111,7 @@ class Fallbacks:
         return self._begun(problem, replace(following, reasons=(*iterate.reasons, self._reason(iterate.index, inner))))
 
     def _begun(self, problem: ContactProblem, iterate: FallbackIterate) -> FallbackIterate:
-        """Return the iterate at the first of the next drivers that can help; the given one, ended, if none can."""
+        """Return the iterate at the first of the next solvers that can help; the given one, ended, if none can."""
         ended, reasons = iterate.ended, iterate.reasons
         for index in range(iterate.index + 1, len(self.drivers)):
             inner = self.drivers[index].init(problem, iterate.state)
@@ -130,7 +130,7 @@ class Fallbacks:
 
 
 def drivers_at_work(solver: ContactSolver, messages: Iterable[str]) -> tuple[ContactSolver, ...]:
-    """Return the drivers that have taken part in a solve, by the messages of its history; without any the first one."""
+    """Return the solvers that have taken part in a solve, by the messages of its history; without any the first one."""
     if not isinstance(solver, Fallbacks):
         return (solver,)
     words = "; ".join(messages)
@@ -142,6 +142,6 @@ def _begins(driver: ContactSolver) -> str:
 
 
 def _is_satisfied(problem: ContactProblem, state: ContactState) -> bool:
-    """Whether contact and friction hold to round-off, so that what is wrong is no matter of drivers."""
+    """Whether contact and friction hold to round-off, so that what is wrong is no matter of solvers."""
     rho = problem.body.stiffness_scale
     return merit(problem, ProjectionEquations(problem, rho, rho).evaluate(state)) <= negligible(problem.body)

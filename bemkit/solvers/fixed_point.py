@@ -17,7 +17,7 @@ class FixedPoint:
     Parameters
     ----------
     inner : ContactSolver
-        Driver of the Tresca problems.
+        Solver of the Tresca problems.
     inner_tolerance : float
         Certificate of the inner solutions; at least a thousand times the accuracy of the body.
     max_steps : int

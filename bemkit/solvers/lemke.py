@@ -1,4 +1,4 @@
-"""Lemke's algorithm on the linear complementarity problem of Coulomb friction: an independent check of the drivers.
+"""Lemke's algorithm on the linear complementarity problem of Coulomb friction: an independent check of the solvers.
 
 It shares no equation with them: no projections, no rho, no active sets, no Newton matrix. It pivots in a tableau made
 of the compliance of the body, and is meant for small problems.
@@ -16,7 +16,7 @@ from bemkit.solvers.base import Iterate, Status, check_max_steps
 from bemkit.solvers.newton import spring_stiffness
 
 _RELATIVE_STIFFNESS = 1e-2
-"""Stiffness of the springs on free rigid motions, relative to that of the other drivers. With weaker springs a body
+"""Stiffness of the springs on free rigid motions, relative to that of the other solvers. With weaker springs a body
 slides far in few steps; the result loses as many digits as they are weaker."""
 
 _ROUND_OFF = 1e-11

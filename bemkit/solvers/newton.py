@@ -1,4 +1,4 @@
-"""Newton steps on the projection equations, shared by all drivers; and how to respond where they leave the body free.
+"""Newton steps on the projection equations, shared by all solvers; and how to respond where they leave the body free.
 
 Active sets on the way to a solution may leave rigid motions of a body free. If the forces on it balance, it stays where
 it is along them (`floating_response`); otherwise weak springs hold it during the step (`respond`).
@@ -148,7 +148,7 @@ def merit(problem: ContactProblem, residual: Residual) -> float:
 def consistent_state(problem: ContactProblem, guess: ContactState) -> tuple[ContactState, int]:
     """Return the response of the body to the sets of a guessed state, and the linear solves spent.
 
-    Drivers start from states in equilibrium; a guess need not be one. Where a problem has several solutions the guess
+    Solvers start from states in equilibrium; a guess need not be one. Where a problem has several solutions the guess
     chooses among them.
 
     Raises

@@ -18,7 +18,7 @@ _PATIENCE = 60
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class OuterIterate(Iterate):
-    """Iterate of a driver whose steps depend only on the state, and each take several linear solves.
+    """Iterate of a solver whose steps depend only on the state, and each take several linear solves.
 
     It ends with CYCLING if a state comes back, with STALLED if nothing improves.
 

@@ -1,4 +1,4 @@
-"""A driver that follows the path of solutions from given statuses, or from all nodes sticking."""
+"""A solver that follows the path of solutions from given statuses, or from all nodes sticking."""
 
 from dataclasses import dataclass, replace
 
@@ -33,7 +33,7 @@ class SolutionPath:
     ----------
     from_start : bool
         Begin with all nodes closed and sticking, from where the whole path leads to a solution of a body that is held,
-        by a few linear solves for each node. Otherwise begin with the statuses of the state at which the driver before
+        by a few linear solves for each node. Otherwise begin with the statuses of the state at which the solver before
         has stopped, most of which are right: one node changes at a time, by two linear solves for each that is wrong.
     max_steps : int
         Paths followed, each under the tangent of the law at the end of the last. One is enough for bounds that are

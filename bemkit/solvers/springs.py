@@ -1,4 +1,4 @@
-"""A driver for many loose bodies: springs on all of them that become weaker (the proximal point method)."""
+"""A solver for many loose bodies: springs on all of them that become weaker (the proximal point method)."""
 
 from dataclasses import dataclass, field, replace
 
@@ -32,7 +32,7 @@ class SpringIterate(Iterate):
     sets : ActiveSets
         Projections at the state, and sets of the next step.
     released : Iterate or None
-        The iterate of the driver that goes on once the springs have gone.
+        The iterate of the solver that goes on once the springs have gone.
     """
 
     spring: float

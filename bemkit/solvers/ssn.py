@@ -43,12 +43,12 @@ class SemismoothNewton:
         Ratio of traction to displacement in the projections [Pa/m], rho_1 = rho_2 of the paper. By default the
         stiffness scale of the body. It matters only at nodes that change from slip to slip, or from open to closed.
     max_steps : int
-        Steps allowed; `Fallbacks` then hands on to the next driver.
+        Steps allowed; `Fallbacks` then hands on to the next solver.
 
     Notes
     -----
     For Coulomb's law the equations are piecewise linear, so a step that reproduces its active sets has found an exact
-    solution: 5 to 10 steps for any friction. Where sets come back instead, other drivers follow in `Fallbacks`.
+    solution: 5 to 10 steps for any friction. Where sets come back instead, other solvers follow in `Fallbacks`.
     Deviations from the print: the friction bound is differentiated, too, instead of taken from the last step; the
     multiplier is the traction itself; a node reverses its slip only by way of stick; and where the sets do not hold the
     body, weak springs do during that step.
@@ -100,7 +100,7 @@ def newton_start(equations: ProjectionEquations, start: ContactState) -> NewtonI
 def newton_step(equations: ProjectionEquations, iterate: NewtonIterate) -> NewtonIterate:
     """Do Steps 1 to 3 of Algorithm 2 once on given equations, which may hold the multiplier or the bound fixed.
 
-    Step 1 of the first iteration is that of `newton_start`; each later one ends the step before it, so that drivers
+    Step 1 of the first iteration is that of `newton_start`; each later one ends the step before it, so that solvers
     see at once whether sets come back.
     """
     problem, sets = equations.problem, iterate.sets

@@ -101,7 +101,7 @@ KNOWN_PROBLEMS: Mapping[str, Callable[[], KnownProblem]] = MappingProxyType(
             [[(0.0, 0.0), (-1.0, -0.1)], [(0.0, 0.0), (-2.0, -0.1)]],
             motions=((1.0, 0.0), (1.0, 0.0)),
         ),
-        # the same body pulled off: there is no solution, and a driver must not find one
+        # the same body pulled off: there is no solution, and a solver must not find one
         "lifted": _known(_SPRING, (-1.0, -0.1, -2.0, -0.1), Coulomb(0.3), motions=((1.0, 0.0), (1.0, 0.0))),
     }
 )

@@ -1,4 +1,4 @@
-"""Conformance of contact drivers."""
+"""Conformance of contact solvers."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from bemkit.testing.problems import KNOWN_PROBLEMS, KnownProblem
 
 
 def check_solver(solver: ContactSolver, *, problems: Iterable[str] | None = None, tolerance: float = 1e-9) -> None:
-    """Check a contact driver on problems with known answers; call it on your own driver.
+    """Check a contact solver on problems with known answers; call it on your own solver.
 
     Parameters
     ----------
     solver : ContactSolver
     problems : iterable of str, optional
-        Names from `bemkit.testing.problems.KNOWN_PROBLEMS`, for a driver that claims less than all friction laws;
+        Names from `bemkit.testing.problems.KNOWN_PROBLEMS`, for a solver that claims less than all friction laws;
         all of them by default.
     tolerance : float
         Bound on the certificate.
@@ -29,7 +29,7 @@ def check_solver(solver: ContactSolver, *, problems: Iterable[str] | None = None
     Raises
     ------
     CheckFailed
-        Naming the driver, the problem and what is wrong: no convergence, a wrong state, a success where there is no
+        Naming the solver, the problem and what is wrong: no convergence, a wrong state, a success where there is no
         solution, different answers to one question, a changed problem, uncounted linear solves, or a dependence on
         units.
     """

@@ -15,7 +15,7 @@ from bemkit.errors import InputError
 
 _SMALLEST_RCOND = 1e-13
 """Below this reciprocal condition number of a row-scaled system its matrix counts as singular. A condensed stiffness
-of a floating body leaves 1e-15 of its free motions; drivers that are refused without need only take a detour."""
+of a floating body leaves 1e-15 of its free motions; solvers that are refused without need only take a detour."""
 
 _LEFT_OVER = 1e-9
 """Stiffnesses below this share of the largest may be what round-off leaves of none."""

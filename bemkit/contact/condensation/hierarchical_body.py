@@ -1,4 +1,4 @@
-"""An elastic body of many elements as the contact drivers see it: compressed, never condensed."""
+"""An elastic body of many elements as the contact solvers see it: compressed, never condensed."""
 
 from __future__ import annotations
 

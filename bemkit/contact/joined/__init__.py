@@ -1,1 +1,1 @@
-"""Several elastic bodies in mutual contact, as one body that contact drivers see."""
+"""Several elastic bodies in mutual contact, as one body that contact solvers see."""

@@ -56,7 +56,7 @@ def _draw_panel(panel: Axes, records: Sequence[ErrorRecord], measure: str) -> No
         colour, line, marker = _style(records, series[0])
         panel.plot(x, y, color=colour, linestyle=line, marker=marker, markersize=4.5, linewidth=1.2)
         rate = fitted_rate(series, measure)
-        # drivers reach the same state: the rate is that of elements and meshes
+        # solvers reach the same state: the rate is that of elements and meshes
         if x.size and np.isfinite(rate.value) and series[0].series[:2] not in named:
             named.add(series[0].series[:2])
             _write_order(panel, str(rate), (x[-1], y[-1]), colour)

@@ -68,7 +68,7 @@ class StudyOptions:
             scene,
             self._element_types(),
             [sequences[word] for word in _known(self.meshes, "meshes", sequences)],
-            # the scene's own driver, with its options, if it has that word
+            # the scene's own solver, with its options, if it has that word
             [scene.solver if type(each) is type(scene.solver) else each for each in map(_solver, solvers)],
         )
 

@@ -19,7 +19,7 @@ N_FITTED = 3
 N_EXPONENTIAL = 4
 """Meshes to which an exponential rate is fitted: three lie on either curve nearly as well."""
 EQUALITY_TOLERANCE = 1e-6
-"""Relative difference below which errors are equal: drivers agree on a state to their tolerances only."""
+"""Relative difference below which errors are equal: solvers agree on a state to their tolerances only."""
 STAGES = ("mesh", "assemble", "condense", "solve", "recover")
 
 

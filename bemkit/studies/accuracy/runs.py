@@ -1,4 +1,4 @@
-"""The runs of an error study, element types times drivers times sequences of meshes, and what is measured of each.
+"""The runs of an error study, element types times solvers times sequences of meshes, and what is measured of each.
 
 Measured are run times, memory and errors, or only the errors where runs at the same time would disturb each other.
 """
@@ -85,7 +85,7 @@ def adaptive(accuracies: tuple[float, ...] = ACCURACIES, most_elements: int = MO
 
 @dataclass(frozen=True)
 class Run:
-    """One record to compute: its key, and a problem, of which mesh, elements and driver are changed.
+    """One record to compute: its key, and a problem, of which mesh, elements and solver are changed.
 
     The size is a number of elements, or the accuracy that is asked for.
     """
@@ -115,7 +115,7 @@ def all_runs(
     meshes: Sequence[MeshSequence],
     solvers: Sequence[ContactSolver],
 ) -> tuple[Run, ...]:
-    """Combine element types, meshes and drivers.
+    """Combine element types, meshes and solvers.
 
     The word "hp" among the element types is for rising degrees. Constant elements have no error estimate and so no
     adaptive meshes, rising degrees no others.

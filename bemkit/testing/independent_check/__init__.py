@@ -1,4 +1,4 @@
-"""An independent check of a solution, from its own fields: no stiffness matrix, no active sets, no driver.
+"""An independent check of a solution, from its own fields: no stiffness matrix, no active sets, no solver.
 
 Only the physical fields of a `Solution`, the points of its mesh and the statement of its scene are read. Normals are
 differentiated from the points, obstacles measured anew, and elasticity is tested with Kelvin's solution as printed in

@@ -14,7 +14,7 @@ from bemkit.results.solution import Solution
 from bemkit.scene.conditions import Clamped, Contact, PrescribedDisplacement, Pressure, Roller, Traction
 
 CONTACT_LIMIT = 1e-6
-"""Largest violation of contact, friction, supports and equilibrium in a right answer. Drivers stop at 1e-9 of a
+"""Largest violation of contact, friction, supports and equilibrium in a right answer. Solvers stop at 1e-9 of a
 traction that may be hundreds of times that of the answer (that of the body held everywhere)."""
 EPSILON = float(np.finfo(float).eps)
 _N_POINTS = 8
