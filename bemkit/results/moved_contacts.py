@@ -47,6 +47,7 @@ def distances_off(body: SolvedBody) -> dict[str, tuple[float, float]]:
 def _distance_off(body: SolvedBody, obstacle: Obstacle, elements: IntArray) -> float:
     values = points_at_obstacle(body, obstacle, elements)
     is_pressed = -values.sigma_n > _PRESSED * float(np.maximum(-values.sigma_n, 0.0).max(initial=0.0))
+    is_pressed &= np.isfinite(values.clearance)  # round-off where a part does not face its obstacle
     xi = points_between(body.scene.discretisation.displacement_space(body.mesh).degree)
     at = np.broadcast_to(xi, (elements.size, xi.size))
     moved = values.points + Interpolation.at(body, elements, at).displacement(body).reshape(-1, 2)

@@ -60,14 +60,17 @@ def find_warnings(solution: Solution | AssemblySolution) -> tuple[ResultWarning,
         laws, of_all = solution.scene.laws, [_error(solution), _turned(solution)]
         titled = {"": solution}
     else:
+        from bemkit.results.overlaps import overlap_warnings  # only of several bodies
+
         laws = {pair.name: solution.assembly.law_of(pair) for pair in solution.assembly.contacts}
-        of_all = [_large(solution.estimated_error, remedy)]
+        of_all = [_large(solution.estimated_error, remedy), overlap_warnings(solution)]
         titled = dict(solution.bodies)
     smooth = {name for name, law in laws.items() if law.is_frictionless}
     of_bodies = [_in_body(name, found) for name, body in titled.items() for found in _of_body(solution, body)]
     found = [
         *of_all,
         *of_bodies,
+        _no_load(solution),
         _narrow_zones(solution.contact, smooth, remedy),
         _hidden_overlaps(solution.contacts_between_nodes, solution.contact, solution.units, remedy),
     ]
@@ -109,11 +112,18 @@ def _unbounded_tractions(solution: Solution | AssemblySolution, body: SolvedBody
         point = f"({corner.x:.4g}, {corner.y:.4g})"
         yield ResultWarning(
             "singular contact traction",
-            point,
+            f"({corner.x:.12g}, {corner.y:.12g})",
             f"Contact tractions are singular at {point} (r^{corner.exponent - 1.0:.2g}). Use forces instead of peak "
             f"values, or round the corner. The estimated error of tractions excludes {length} there.",
             corner.exponent - 1.0,
         )
+
+
+def _no_load(solution: Solution | AssemblySolution) -> Iterator[ResultWarning]:
+    """Warn of a single load that moves nothing."""
+    bodies = solution.solved_bodies
+    if solution.loading is None and not any(body.boundary.displacement.any() for body in bodies):
+        yield ResultWarning("no load", "", "Nothing loads or moves the bodies: give a load or a displacement.")
 
 
 def _large(error: float | None, remedy: str) -> Iterator[ResultWarning]:
@@ -255,7 +265,12 @@ def _coarse_curves(mesh: BoundaryMesh) -> Iterator[ResultWarning]:
 
 
 def _narrow_zones(contact: ContactTable, smooth: Collection[str], remedy: str) -> Iterator[ResultWarning]:
-    """Warn of zones of contact, stick and slip of few nodes; of smooth parts, without friction, only of contact."""
+    """Warn of zones of contact, separation, stick and slip of few nodes; without friction not of stick and slip.
+
+    A contact-free state has no zones, only round-off.
+    """
+    if not (contact.sigma_n.any() or contact.sigma_t.any()):
+        return
     words = np.array(contact.status_words(), dtype=object)
     # friction that acts across a gap sticks or slips without contact
     clearance = np.where(np.isfinite(contact.clearance), contact.clearance, 0.0)
@@ -264,7 +279,7 @@ def _narrow_zones(contact: ContactTable, smooth: Collection[str], remedy: str) -
     is_word = {word: words == word for word in ("stick", "slip")}
     for part in contact.parts:
         is_of_part = contact.rows(part)
-        kinds = {"contact": is_of_part & is_closed}
+        kinds = {"contact": is_of_part & is_closed, "separated": _enclosed(contact, is_of_part & ~is_closed)}
         if part not in smooth:
             kinds |= {word: is_of_part & chosen for word, chosen in is_word.items()}
         reported = np.zeros(is_of_part.size, bool)
@@ -295,6 +310,14 @@ def _hidden_overlaps(
                 f"{_there(remedy)}.",
                 between.penetration_depth,
             )
+        elif between.complementarity > LARGEST_PENETRATION:
+            yield ResultWarning(
+                "gap between nodes",
+                name,
+                f"Contact {name!r}: the sides are apart between nodes that press each other "
+                f"({100.0 * between.complementarity:.0f} % of {length}): {_there(remedy)}.",
+                between.complementarity,
+            )
 
 
 def _zones(contact: ContactTable, chosen: BoolArray) -> list[IntArray]:
@@ -302,6 +325,15 @@ def _zones(contact: ContactTable, chosen: BoolArray) -> list[IntArray]:
     nodes = np.flatnonzero(chosen)
     is_end = (np.diff(nodes) != 1) | ~contact.is_joined[nodes[:-1]]
     return [zone for zone in np.split(nodes, np.flatnonzero(is_end) + 1) if zone.size]
+
+
+def _enclosed(contact: ContactTable, chosen: BoolArray) -> BoolArray:
+    """Return the chosen nodes (n_contact,) whose run has a neighbour on each side."""
+    joined = np.concatenate([[False], contact.is_joined, [False]])
+    is_enclosed = np.zeros(chosen.size, bool)
+    for zone in _zones(contact, chosen):
+        is_enclosed[zone] = joined[zone[0]] and joined[zone[-1] + 1]
+    return is_enclosed
 
 
 def _narrow(part: str, kind: str, zones: Sequence[FloatArray], remedy: str) -> ResultWarning:

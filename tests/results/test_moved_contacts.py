@@ -66,3 +66,14 @@ def test_bodies_of_an_assembly_are_doubted_where_they_are_placed() -> None:
     )
     (doubt,) = doubts(bk.run(assembly))
     assert doubt.startswith("Body 'block': Part 'floor' moves so far")
+
+
+def test_a_part_that_does_not_face_its_obstacle_is_not_doubted() -> None:
+    floor = bk.Part("floor", bk.Contact(bk.HalfPlane()), ("bottom",))
+    side = bk.Part("side", bk.Contact(bk.HalfPlane((0.0, -1.0))), ("right",))
+    load = bk.Part("load", bk.Pressure(1e-3), ("top",))
+    scene = replace(
+        block(0.0), shape=bk.Rectangle(1.0, 1.0), parts=(floor, side, load), discretisation=bk.Galerkin(1),
+        mesh=bk.MeshOptions(elements=16),
+    )  # fmt: skip
+    assert not doubts(bk.run(scene))

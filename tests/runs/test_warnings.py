@@ -168,6 +168,40 @@ def test_a_contact_zone_of_few_nodes_is_doubted_once() -> None:
     assert f"has only {n_closed} node" in narrow[0]
 
 
+def test_a_separated_zone_between_contact_zones_is_doubted() -> None:
+    fine = run(bowl(1e-2, mesh=MeshOptions(elements=120, density={"bottom": 4.0})))
+    table = fine.contact
+    status, clearance, pressure = table.status.copy(), table.clearance.copy(), table.sigma_n.copy()
+    hole = np.flatnonzero(status != NodeStatus.SEPARATED)[5:7]
+    status[hole], clearance[hole], pressure[hole] = NodeStatus.SEPARATED, 1e-3, 0.0
+    changed = dataclasses.replace(table, status=status, clearance=clearance, sigma_n=pressure)
+    (words,) = [
+        words
+        for words in map(str, find_warnings(dataclasses.replace(fine, contact=changed)))
+        if words.startswith("A separated zone")
+    ]
+    assert f"of part 'foot' at s = {table.s[hole].mean():.4g} has only 2 nodes" in words
+    assert not [words for words in map(str, fine.warnings) if words.startswith("A separated zone")]
+
+
+def test_a_gap_between_nodes_that_press_is_doubted() -> None:
+    """A notch as long as an element, between two nodes of a flat floor."""
+    solution = run(bowl(mesh=MeshOptions(elements=24)))
+    (between,) = solution.contacts_between_nodes.values()
+    apart = dataclasses.replace(between, penetration=0.0, complementarity=0.3)
+    changed = dataclasses.replace(solution)
+    changed.__dict__["contacts_between_nodes"] = {"foot": apart}
+    words = "Contact 'foot': the sides are apart between nodes that press each other (30 % of the displacement that"
+    assert any(text.startswith(words) for text in map(str, find_warnings(changed)))
+
+
+def test_a_state_without_contact_has_no_zones_and_one_without_load_is_doubted() -> None:
+    idle = run(bowl(0.0))
+    assert idle.is_converged
+    assert [warning.kind for warning in idle.warnings] == ["no load"]
+    assert str(idle.warnings[0]) == "Nothing loads or moves the bodies: give a load or a displacement."
+
+
 def test_a_stick_zone_of_few_nodes_is_doubted_unless_there_is_no_friction() -> None:
     fine = run(bowl(1e-2, mesh=MeshOptions(elements=120, density={"bottom": 4.0})))
     assert not [words for words in map(str, fine.warnings) if words.startswith("A contact zone")]

@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from bemkit.arrays import FloatArray, IntArray
+from bemkit.arrays import FloatArray
 from bemkit.contact.body import ContactState, LinearBody, SingularResponse
 from bemkit.contact.condensation.dense_body import DenseBody
 from bemkit.contact.condensation.node_coupling import NodeCoupling
@@ -194,14 +194,16 @@ class JoinedBodies(CoupledMembers, LinearBody):
         # what round-off may leave of both
         eps = float(np.finfo(float).eps)
         sizes = abs(self.relative) @ np.abs(displacement) + np.abs(self.offset) + np.abs(state.displacement.ravel())
-        of_sums = eps * np.add.reduceat(terms, self._first_components) / total
+        of_sums = eps * self._over_members(np.add, terms) / total
         round_off = max((eps * sizes * force_by_displacement).max(), of_sums.max())
         return Imbalance(float(missing.max()), float(np.max(work, initial=0.0)), float(round_off))
 
-    @property
-    def _first_components(self) -> IntArray:
-        """(n_members,) array: the first displacement component of each member."""
-        return np.cumsum([0, *(member.n_components for member in self.members)])[:-1]
+    def _over_members(self, operation: np.ufunc, values: FloatArray) -> FloatArray:
+        """Return the sum or the largest of values (n,) on each member (n_members,); zero of one without components."""
+        n_components = np.array([member.n_components for member in self.members])
+        first, result = np.cumsum(n_components) - n_components, np.zeros(n_components.size)
+        result[n_components > 0] = operation.reduceat(values, first[n_components > 0])
+        return result
 
     def _terms(self, displacement: FloatArray) -> FloatArray:
         """Return the terms (n,) [N/m] whose differences the forces on the members are."""
@@ -217,11 +219,11 @@ class JoinedBodies(CoupledMembers, LinearBody):
         nothing is loaded and all forces are round-off, so that members have only moved, the terms take their place.
         """
         nodal = np.abs(self.weights[:, None] * state.traction).ravel()
-        sizes, first = abs(self.relative).T @ nodal + np.abs(self.load), self._first_components
+        sizes = abs(self.relative).T @ nodal + np.abs(self.load)
         noise = NOISE_FACTOR * float(np.finfo(float).eps) * terms.sum()
         if not np.abs(self.load).sum() > 0.0 and sizes.sum() <= noise:
             sizes = terms
-        return np.maximum.reduceat(sizes, first), np.add.reduceat(sizes, first)
+        return self._over_members(np.maximum, sizes), self._over_members(np.add, sizes)
 
     def member_displacements(self, state: ContactState) -> tuple[FloatArray, ...]:
         """Return the displacements (n,) [m] of each member that go with a state."""

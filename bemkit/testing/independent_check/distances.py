@@ -58,7 +58,7 @@ def _from_obstacle(joints: Joints, name: str) -> FloatArray:
         added, obstacle = pair.gap, joints.solution.assembly.rigid_body_of(pair).obstacle
     distance, _ = distance_to(obstacle, points, normals)
     known = np.isfinite(table.gap[rows])
-    return np.abs(table.gap[rows] - distance - added)[known]
+    return np.abs(table.gap[rows][known] - distance[known] - added)
 
 
 def mean_mismatch(joints: Joints) -> float:
@@ -66,7 +66,7 @@ def mean_mismatch(joints: Joints) -> float:
     table, worst = joints.solution.contact, [0.0]
     lengths, _ = joints.units()
     known = np.isfinite(table.gap)
-    clearance = np.abs(table.clearance - (table.gap - table.u_n))[known]
+    clearance = np.abs(table.clearance[known] - (table.gap[known] - table.u_n[known]))
     worst.append(largest(clearance / lengths[known]))
     for name in table.parts:
         rows, partner = table.rows(name), joints.partner(name)
