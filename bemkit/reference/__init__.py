@@ -16,6 +16,10 @@ from bemkit.reference.compare import over_resolved as over_resolved
 from bemkit.reference.disc import DiscBetweenPlates as DiscBetweenPlates
 from bemkit.reference.elastic import BrazilianDisc as BrazilianDisc
 from bemkit.reference.elastic import KirschHole as KirschHole
+from bemkit.reference.friction import arch_friction_limit as arch_friction_limit
+from bemkit.reference.friction import cantilevers_loss as cantilevers_loss
+from bemkit.reference.friction import closed_cracks_slip as closed_cracks_slip
+from bemkit.reference.friction import mindlin_loss as mindlin_loss
 from bemkit.reference.hertz import BluntWedge as BluntWedge
 from bemkit.reference.hertz import HertzLine as HertzLine
 from bemkit.reference.hertz import LineContact as LineContact

@@ -7,11 +7,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
-from typing import Any, TypeAlias
+from typing import Any, TypeAlias, cast
 
 import numpy as np
 
 from bemkit.arrays import FloatArray
+from bemkit.contact.laws import Coulomb
 from bemkit.errors import InputError
 from bemkit.operators.material import Material, Plane
 from bemkit.reference import (
@@ -32,8 +33,12 @@ from bemkit.reference import (
     ShrinkFit,
     SlidingPunch,
     answer_of,
+    arch_friction_limit,
+    cantilevers_loss,
+    closed_cracks_slip,
     errors_of,
     find_reference,
+    mindlin_loss,
     pair_modulus,
     spence_stick_ratio,
     static_cylinder_stick_ratio,
@@ -188,6 +193,24 @@ def _pin(sheet: Material) -> Rows:
     return {"half-angle": (_half_length, exact.half_angle), "peak pressure": (_peak, exact.peak_pressure)}
 
 
+def _snug_disc() -> Rows:
+    mean, difference = 1.5e-3, 1e-3
+
+    def error(solution: AssemblySolution) -> float:
+        angle = np.arctan2(solution.contact.y, solution.contact.x)
+        return _largest_error(-solution.contact.sigma_n, mean + 0.75 * difference * np.cos(2.0 * angle))
+
+    return {"pressure, largest error": (error, 0.0)}
+
+
+def _least_friction() -> Rows:
+    def friction(solution: AssemblySolution) -> float:
+        law = solution.assembly.law
+        return cast("float", law.friction_coefficient) if isinstance(law, Coulomb) else np.nan
+
+    return {"friction coefficient": (friction, arch_friction_limit(21))}
+
+
 def _receding_pair() -> Rows:
     exact = RecedingLayer(1.0, 0.5, 1.0, 1.0)
     return {
@@ -264,6 +287,27 @@ def _periodic_wave() -> Rows:
     return {"normal traction, L2": (lambda solution: _pressure_error(solution, exact), 0.0)}
 
 
+def _closed_cracks(length_share: float) -> Rows:
+    effective = 2e-4  # shear less what friction bears; E' = 1
+
+    def slip(solution: Solution) -> float:
+        return 2.0 * abs(float(solution.contact.weight @ solution.contact.u_t)) / effective  # of both faces
+
+    return {"mean slip": (slip, closed_cracks_slip(length_share))}
+
+
+def _lost(expected: float) -> Rows:
+    """Compare the energy that friction takes up in the steps of the last cycle, all but the first half of them."""
+
+    def lost(solution: Solution | AssemblySolution) -> float:
+        loading = solution.loading
+        if loading is None:
+            raise InputError("the solution has no load history: give steps")
+        return loading.total(1 + (loading.n_steps - 1) // 5).dissipation
+
+    return {"energy lost in a cycle": (lost, expected)}
+
+
 def _ends(solution: Solution | AssemblySolution, status: str = "separated") -> list[float]:
     """Return the places [m] along x where a status begins or ends, from left to right."""
     return sorted(place.x for place in solution.transitions if status in (place.from_status, place.to_status))
@@ -325,6 +369,9 @@ ROWS: Mapping[str, Callable[[], Rows]] = MappingProxyType(
         "pin-in-hole": lambda: _pin(Material(1.0, 0.3)),
         "pin-in-stiffer-hole": lambda: _pin(Material(3.0, 0.15)),
         "receding-pair": _receding_pair,
+        "snug-disc": _snug_disc,
+        "stacked-cantilevers": lambda: _lost(cantilevers_loss(FRICTION, 1e-4, 8e-5, 20.0, 1.0)),
+        "friction-limit-of-an-arch": _least_friction,
         "hertz-half-plane": lambda: _indenter(CYLINDER),
         "flat-punch": lambda: _pressure(FlatPunch(1.0, 1.0, 1.0).pressure),
         "tilted-punch": _tilted_punch,
@@ -338,6 +385,10 @@ ROWS: Mapping[str, Callable[[], Rows]] = MappingProxyType(
         "sheared-cylinder": lambda: _sheared(CYLINDER),
         "sheared-rounded-punch": lambda: _sheared(ROUNDED),
         "periodic-wave": _periodic_wave,
+        "closed-cracks-10": lambda: _closed_cracks(0.1),
+        "closed-cracks-25": lambda: _closed_cracks(0.25),
+        "closed-cracks-40": lambda: _closed_cracks(0.4),
+        "mindlin-cycle": lambda: _lost(mindlin_loss(PartialSlip(CYLINDER, 0.2, FRICTION), 1.0)),
     }
 )
 """By the names of cases, each made when it is needed; cases without an entry are shipped scenes with a reference."""

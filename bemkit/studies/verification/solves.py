@@ -14,10 +14,12 @@ from bemkit.results.assembly_solution import AssemblySolution
 from bemkit.results.solution import Solution
 from bemkit.runs.assembly import run_assembly_history
 from bemkit.runs.run import run
+from bemkit.runs.steps import UnsolvableSceneError
 from bemkit.scene.assembly import Assembly
 from bemkit.scene.conditions import PrescribedDisplacement
 from bemkit.scene.mesh_options import MeshOptions
 from bemkit.scene.scene import Scene
+from bemkit.scene.steps import Step
 from bemkit.scene.toml import with_overrides
 
 Solve: TypeAlias = Callable[[float], Solution | AssemblySolution]
@@ -68,7 +70,52 @@ def _growing(scene: Scene) -> Solve:
     return lambda n: run(replace(scene, load_factors=tuple((np.arange(1.0, n + 1.0) / n) ** 2)))
 
 
+def _to_and_fro(scene: Scene | Assembly, loads: Mapping[str, float], n_quarter: int) -> Scene | Assembly:
+    """Return a scene whose loads, at their keys, grow and go to and fro once after a first step without them."""
+
+    def changes(shape: str) -> dict[str, str]:
+        return {key: f"{largest!r} * ({shape})" for key, largest in loads.items()}
+
+    times = ((2.0, "t - 1", n_quarter), (4.0, "3 - t", 2 * n_quarter), (6.0, "t - 5", 2 * n_quarter))
+    steps = (Step(time, changes(shape), increments=n) for time, shape, n in times)
+    return replace(scene, steps=(Step(1.0), *steps))
+
+
+def _sheared_to_and_fro(scene: Scene) -> Solve:
+    """Take a number of increments for a quarter of a cycle."""
+    return lambda n: run(_to_and_fro(scene, {"far.force_x": 0.2}, int(n)))
+
+
+def _bent_to_and_fro(scene: Assembly) -> Solve:
+    loads = {f"bodies.{name}.parts.tip.condition.y": 4e-5 for name in ("lower", "upper")}
+    return at_resolution(_to_and_fro(scene, loads, 2))
+
+
+def _least_friction(scene: Assembly) -> Solve:
+    """Halve a range of the friction coefficient until the arch is known to fall just below the one that is returned."""
+
+    def solve(n: float) -> AssemblySolution:
+        known, least, most = None, 0.3, 0.33
+        while most - least > 3e-5 or known is None:
+            friction = 0.5 * (least + most)
+            try:
+                known = run(replace(with_overrides(scene, elements=int(n)), law=Coulomb(friction)))
+                most = friction
+            except UnsolvableSceneError:
+                least = friction
+        return known
+
+    return solve
+
+
 SOLVES: Mapping[str, Callable[[Any], Solve]] = MappingProxyType(
-    {"pair-patch": _unmatched, "cattaneo-mindlin": _pressed_then_sheared, "growing-cylinder": _growing}
+    {
+        "pair-patch": _unmatched,
+        "cattaneo-mindlin": _pressed_then_sheared,
+        "growing-cylinder": _growing,
+        "mindlin-cycle": _sheared_to_and_fro,
+        "stacked-cantilevers": _bent_to_and_fro,
+        "friction-limit-of-an-arch": _least_friction,
+    }
 )
 """By the names of cases, those that `at_resolution` does not solve."""
