@@ -105,7 +105,8 @@ def test_a_cluster_gives_the_same() -> None:
 def test_condensed_bodies_can_be_sent(name: str, changes: Any) -> None:
     scene = bk.load_scene(name)
     scene = replace(scene, mesh=replace(scene.mesh, elements=24, accuracy=None, density={}), **changes)
-    condensed = build_model(prepare(scene, scene.build_mesh())).body.condensed
+    model = build_model(prepare(scene, scene.build_mesh()))
+    condensed = model.elastic.condense(model.prepared.conditions, model.prepared.force)
     sent = pickle.loads(pickle.dumps(condensed))
     displacement = np.linspace(-1.0, 1.0, len(condensed.load))
     force, fixed = condensed.recover(displacement)[1], np.zeros_like(condensed.recover(displacement)[0])
