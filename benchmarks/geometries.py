@@ -20,6 +20,7 @@ from rich.table import Table
 
 import bemkit as bk
 from bemkit.contact.condensation.hierarchical_body import hierarchical_body
+from bemkit.contact.condensation.nodes import opened
 from bemkit.contact.conditions import stick
 from bemkit.geometry.outline import Outline
 from bemkit.model.prepared import prepare
@@ -116,13 +117,15 @@ def row_of(scene: bk.Scene, n_elements: int) -> Row:
     """Measure one body."""
     scene = replace(scene, mesh=replace(scene.mesh, elements=n_elements))
     given = prepare(scene, scene.build_mesh())
+    nodes, gap = given.contact_nodes, given.column("gap")
+    conditions = opened(given.only.conditions, nodes)
     with blas_threads_for(1):
         clock = time.process_time()
-        elastic = HierarchicalCollocation(given.mesh.unit, given.material, bk.Hierarchical())
-        body = hierarchical_body(elastic, given.conditions, given.contact.nodes, given.force)
+        elastic = HierarchicalCollocation(given.only.own_space.mesh, given.material_of(given.only), bk.Hierarchical())
+        body = hierarchical_body(elastic, conditions, nodes, given.only.force)
         build = time.process_time() - clock
         clock = time.process_time()
-        state = body.respond(stick(given.contact.gap / given.units.displacement, np.zeros(body.n_contact)))
+        state = body.respond(stick(gap / given.units.displacement, np.zeros(body.n_contact)))
         factor = time.process_time() - clock
         residual = body.imbalance(state).worst
     system = body.loaded.system

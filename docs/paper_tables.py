@@ -22,7 +22,7 @@ from bemkit.contact.certificate import Scales
 from bemkit.contact.problem import ContactProblem, ContactState
 from bemkit.errors import NoResultError
 from bemkit.geometry.meshing.discretise import Algebraic
-from bemkit.model.contact_model import Model, build_model
+from bemkit.model.model import Model, build_model
 from bemkit.model.prepared import prepare
 from bemkit.operators.linear.threads import blas_threads_for
 from bemkit.scene.discretisation import ConstantCollocation
@@ -149,7 +149,7 @@ def text_of(table: PaperTable) -> str:
 
 def _cell(number: int, i: int, j: int, model: Model) -> PaperCell:
     # from rho * E / (1 unit of length) to units of E'/L
-    unit = model.scene.material.youngs_modulus / model.units.modulus * model.units.length
+    unit = model.prepared.only.material.youngs_modulus / model.units.modulus * model.units.length
     driver = AugmentedLagrangian(rho_n=RHO[i] * unit, rho_t=RHO[j] * unit)
     try:
         return PaperCell((number, i, j), *_outer_steps(model.problem, driver))

@@ -130,8 +130,9 @@ def true_error(solution: bk.Solution, n_bisections: int = 2) -> float:
         inherited[dofs] = np.einsum("pe,epc->ec", space.basis(xi[:, local]), at_dofs)
     prepared = prepare(scene, mesh)
     tractions = scene.discretisation.traction_space(mesh.unit)
+    body = prepared.only
     stiffness = SteklovPoincareOperator(
-        bk.GalerkinElasticity(mesh.unit, prepared.material, prepared.space, tractions)
+        bk.GalerkinElasticity(mesh.unit, prepared.material_of(body), body.own_space, tractions)
     ).matrix()
     error = (fine - inherited).ravel()
     return float(np.sqrt(error @ stiffness @ error / (fine.ravel() @ stiffness @ fine.ravel())))

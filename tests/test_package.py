@@ -21,9 +21,9 @@ NOT_NEEDED = (
     *("operators.steklov_poincare.galerkin", "operators.forms", "operators.assembly", "operators.integrals.sweep"),
     "operators.steklov_poincare.matrix_free_needs",
     *("operators.particular_solutions", "model.particular", "model.free_motion", "model.untouched_body"),
-    *("geometry.drawn", "geometry.nurbs", "geometry.files", "geometry.arclength", "geometry.placement"),
+    *("geometry.drawn", "geometry.nurbs", "geometry.files", "geometry.arclength"),
     *("geometry.reflection", "geometry.meshing.partition", "geometry.meshing.layers"),
-    *("scene.assembly", "scene.body", "scene.copies", "scene.places", "scene.symmetry"),
+    *("scene.assembly", "model.joined", "contact.joined", "scene.places", "scene.symmetry"),
     *("results.assembly_solution", "results.part_forces", "results.zone_ends"),
     *("runs.warm_start", "solvers.homotopy", "solvers.multistart"),
 )

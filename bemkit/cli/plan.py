@@ -64,15 +64,10 @@ def _as_json(made: Plan) -> str:
 
 def _planned(scene: Scene | Assembly) -> Plan:
     """Return the plan of a scene, with a symmetry that it could use."""
-    from bemkit.scene.assembly import Assembly
-
-    if isinstance(scene, Assembly):
-        from bemkit.plan.assembly_plan import make_assembly_plan
-
-        return make_assembly_plan(scene)
     from bemkit.plan import check_elements, make_plan
+    from bemkit.scene.scene import Scene
     from bemkit.scene.symmetry import find_symmetry
 
     check_elements(scene)
-    proposal = find_symmetry(scene) if scene.symmetry is None else None
-    return make_plan(scene, scene.build_mesh(), proposal=proposal)
+    proposal = find_symmetry(scene) if isinstance(scene, Scene) and scene.symmetry is None else None
+    return make_plan(scene, proposal=proposal)

@@ -121,14 +121,16 @@ def _solve(
 
     if cascade:
         from bemkit.runs.nested import run_cascade
-        from bemkit.scene.toml import single_body
 
-        return run_cascade(single_body(scene, scene.title), callback=callback)[-1]
+        solution: Solution | AssemblySolution = run_cascade(scene, callback=callback)[-1]
+        return solution
     if history_file is not None:
         from bemkit.runs.checkpoint import run_to_file
 
-        return run_to_file(scene, history_file, callback=callback)
-    return solve_scene(scene, callback=callback)
+        solution = run_to_file(scene, history_file, callback=callback)
+        return solution
+    solution = solve_scene(scene, callback=callback)
+    return solution
 
 
 def _start_tracing() -> None:

@@ -52,20 +52,6 @@ class ContactData:
     facing: FloatArray
     points: FloatArray
 
-    def of(self, nodes: ContactNodes) -> ContactData:
-        """Return the rows of some of the nodes, in the order they have here."""
-        # a node in a corner between two obstacles has two rows, and two numbers here
-        numbers, kept_numbers = (2 * some.nodes + some.is_second for some in (self.nodes, nodes))
-        rows = np.isin(numbers, kept_numbers)
-        parts = tuple(part for part, is_kept in zip(self.parts, rows.tolist(), strict=True) if is_kept)
-        columns = (column[rows] for column in (self.arc_length, self.gap, self.facing, self.points))
-        return ContactData(self.nodes.take(rows), parts, *columns)
-
-    def has_same_directions(self, other: ContactData) -> bool:
-        """Whether the same nodes touch in the same directions."""
-        ours, theirs = self.nodes, other.nodes
-        return np.array_equal(ours.nodes, theirs.nodes) and np.allclose(ours.frame, theirs.frame, rtol=0.0, atol=1e-12)
-
 
 @dataclass(frozen=True)
 class FacingPart:

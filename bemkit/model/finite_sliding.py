@@ -18,10 +18,10 @@ from bemkit.contact.signed_distance import SignedDistance
 from bemkit.contact.spline import SplineObstacle
 from bemkit.geometry.spaces import element_nodes
 from bemkit.geometry.vectors import norms
-from bemkit.model.assembled.contacts import ContactRows
-from bemkit.model.assembled.model import AssembledModel
-from bemkit.model.assembled.placed import PlacedBody
-from bemkit.model.assembled.prepared import PreparedAssembly
+from bemkit.model.contacts import ContactRows
+from bemkit.model.model import Model
+from bemkit.model.placed import PlacedBody
+from bemkit.model.prepared import Prepared
 from bemkit.scene.conditions import Contact
 from bemkit.scene.unit_names import amount
 from bemkit.solvers.base import ContactSolution, Status
@@ -40,7 +40,7 @@ _SHARE_OF_ZONE = 0.05
 """Part of the length of contact that a motion may take where it is longer than an element."""
 
 
-def with_sliding_checked(model: AssembledModel, result: ContactSolution) -> ContactSolution:
+def with_sliding_checked(model: Model, result: ContactSolution) -> ContactSolution:
     """Return the outcome of a solve, named FINITE_SLIDING if a contact has moved too far along its surface."""
     prepared = model.prepared
     if not result.is_converged or not prepared.n_contact:
@@ -60,13 +60,13 @@ def with_sliding_checked(model: AssembledModel, result: ContactSolution) -> Cont
 
 
 def _moved(
-    prepared: PreparedAssembly, rows: ContactRows, displacement: FloatArray, is_pressed: BoolArray, deformation: float
+    prepared: Prepared, rows: ContactRows, displacement: FloatArray, is_pressed: BoolArray, deformation: float
 ) -> str:
     """Say how far the pressed nodes of a contact move along it; empty if gaps and directions still hold.
 
     Parameters
     ----------
-    prepared : PreparedAssembly
+    prepared : Prepared
     rows : ContactRows
     displacement : (n, 2) array [m]
         Relative, normal and tangential.
@@ -80,12 +80,12 @@ def _moved(
     if number < 0 <= rows.other:
         is_off = _is_off_side(rows, displacement[:, 1], is_pressed, deformation)
     else:
-        obstacle = _fixed_obstacle(prepared, rows) if number < 0 else prepared.assembly.rigid[number].obstacle
+        obstacle = _fixed_obstacle(prepared, rows) if number < 0 else prepared.scene.rigid[number].obstacle
         is_off = _is_off_obstacle(rows, obstacle, displacement, is_pressed, deformation)
         is_off = is_off or _is_oblique(prepared.bodies[rows.body], rows, is_pressed)
     if not is_off:
         return ""
-    units = prepared.assembly.units
+    units = prepared.scene.units
     length = amount(float(norms(displacement[is_pressed]).max()), "length", units, 3)
     beside = amount(deformation, "length", units, 3)
     return (
@@ -132,7 +132,7 @@ def _is_oblique(body: PlacedBody, rows: ContactRows, is_pressed: BoolArray) -> b
     return bool((facing[rows.nodes[is_pressed]] < _LEAST_FACING).any())
 
 
-def _fixed_obstacle(prepared: PreparedAssembly, rows: ContactRows) -> Obstacle:
+def _fixed_obstacle(prepared: Prepared, rows: ContactRows) -> Obstacle:
     """Return the fixed obstacle of a contact."""
     parts = prepared.bodies[rows.body].scene.parts
     stated = {part.name: part.condition for part in parts if isinstance(part.condition, Contact)}

@@ -41,10 +41,10 @@ def check_held(prepared: Prepared) -> None:
     FreeBodyError
         Naming the modes.
     """
-    modes = prepared.free_modes
+    modes = prepared.only.free_modes
     if not len(modes):
         return
-    points = dof_points(prepared.space)
+    points = dof_points(prepared.only.own_space)
     basis = rigid_motions(points, np.zeros(2), 1.0).reshape(-1, 3)
     # (n_modes, 3): shift of the centre, and turn
     free = np.asarray(np.linalg.lstsq(basis, modes.reshape(len(modes), -1).T, rcond=None)[0].T, float)
@@ -83,7 +83,7 @@ def _pivot(mode: FloatArray, units: Units) -> str:
 
 
 def describe(prepared: Prepared, load: UnsolvableLoad) -> str:
-    """Say in one sentence how a load moves the body and that nothing holds it.
+    """Say in one sentence how a load moves a body and that nothing holds it.
 
     Parameters
     ----------
@@ -96,6 +96,8 @@ def describe(prepared: Prepared, load: UnsolvableLoad) -> str:
     str
         With the resultant force for a translation, or the moment and the fixed point for a rotation.
     """
+    if not prepared.has_obstacles_only:
+        return f"{load.description}: hold what moves by a support, raise the friction, or change the loads"
     units = prepared.units
     mode = _rigid_mode(prepared, load)
     size, turn = float(np.hypot(*mode[:2])), float(mode[2])
@@ -115,7 +117,7 @@ def describe(prepared: Prepared, load: UnsolvableLoad) -> str:
 
 def _rigid_mode(prepared: Prepared, load: UnsolvableLoad) -> FloatArray:
     """Return the shift at the origin of the dimensionless points and the turn (anticlockwise), (3,)."""
-    nodes = prepared.contact.nodes
+    nodes = prepared.contact_nodes
     modes = rigid_motions(nodes.points, np.zeros(2), 1.0)
     matrix = np.einsum("nkc,ncm->nkm", nodes.frame, modes)
     mode: FloatArray = np.linalg.lstsq(matrix.reshape(-1, 3), load.motion.ravel(), rcond=_ROUND_OFF)[0]

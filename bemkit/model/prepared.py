@@ -1,152 +1,79 @@
-"""A scene on a mesh, made ready to plan and to solve: units, conditions at nodes, contact nodes and forces, once.
+"""A scene on meshes, made ready to plan and to solve: units, conditions at nodes, forces and contact rows, once.
 
-Inside, lengths are measured by the diameter of the body, stresses of the material by E', loads by their largest value
-p and displacements by p L / E'.
+Inside, lengths are measured by the diameter of the largest body, stresses of the material by E' of the most compliant
+contact, loads by their largest value p and displacements by p L / E'.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import zip_longest
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bemkit.arrays import FloatArray
-from bemkit.contact.condensation.nodes import contact_conditions
-from bemkit.errors import InputError
-from bemkit.geometry.mesh import BoundaryMesh
-from bemkit.geometry.spaces import BoundarySpace, element_nodes
-from bemkit.model.contact_data import ContactData, find_contact
-from bemkit.model.units import Units, check_position, find_units
+from bemkit.arrays import BoolArray, FloatArray, IntArray
+from bemkit.contact.condensation.nodes import ContactNodes
+from bemkit.contact.further_laws import PiecewiseLaw
+from bemkit.contact.laws import FrictionLaw, Frictionless, LawOfCoefficients
+from bemkit.contact.problem import LawError
+from bemkit.geometry.spaces import dof_points
+from bemkit.model.contact_data import ContactData
+from bemkit.model.contact_tractions import ContactSpread
+from bemkit.model.contacts import ContactRows, candidates_of, obstacle_rows, retained_for
+from bemkit.model.given import (
+    far_drive,
+    given_data,
+    linear_solver_of,
+    nodal_forces,
+    supports_on,
+)
+from bemkit.model.placed import Meshes, PlacedBody, place
+from bemkit.model.same_bodies import bodies_under, check_rigid, find_units, listed_contacts, with_found_contacts
+from bemkit.model.units import Units
 from bemkit.operators.half_plane.far_drive import FarDrive
-from bemkit.operators.linear.solvers import (
-    ChosenLinearSolver,
-    Hierarchical,
-    LinearSolverChoice,
-    choose_linear_solver,
-)
+from bemkit.operators.linear.solvers import ChosenLinearSolver
 from bemkit.operators.material import Material
-from bemkit.operators.steklov_poincare import TractionField
 from bemkit.operators.steklov_poincare.forces_inside import ForcesInside
-from bemkit.operators.steklov_poincare.hierarchical_needs import (
-    LARGEST_BLOCK,
-    choose_collocation_solver,
-)
-from bemkit.operators.steklov_poincare.needs import BodyCase, physical_memory
+from bemkit.operators.steklov_poincare.hierarchical_needs import LARGEST_BLOCK
+from bemkit.operators.steklov_poincare.needs import BodyCase
 from bemkit.operators.steklov_poincare.nodal_conditions import (
     GivenData,
     NodalConditions,
-    Support,
     free_modes,
-    integrate_traction,
+    supported,
     turning,
 )
-from bemkit.scene.conditions import Clamped, Part, PrescribedDisplacement, Pressure, Roller, Traction
-from bemkit.scene.discretisation import Discretisation
-from bemkit.scene.scene import Scene
+from bemkit.scene.steps import Stated
 
-
-def supports_on(scene: Scene, mesh: BoundaryMesh, units: Units, space: BoundarySpace) -> list[Support]:
-    """Return the supports of the parts that hold the body, their displacements in the units given."""
-    result = []
-    for part, elements in scene.parts_on(mesh):
-        condition = part.condition
-        axes = np.broadcast_to(np.eye(2), (elements.size, 2, 2))
-        if isinstance(condition, Roller):
-            normals = mesh.normals_at(elements, element_nodes(space)[elements])
-            result.append(Support(part.name, elements, normals[:, :, None, :]))
-        elif isinstance(condition, Clamped):
-            result.append(Support(part.name, elements, axes))
-        elif isinstance(condition, PrescribedDisplacement):
-            result.append(
-                Support(
-                    part.name, elements, axes[:, list(condition.is_prescribed)], _dimensionless_motion(condition, units)
-                )
-            )
-    return result
-
-
-def _dimensionless_motion(condition: PrescribedDisplacement, units: Units) -> Callable[[FloatArray], FloatArray]:
-    def field(points: FloatArray) -> FloatArray:
-        return condition.at(units.to_physical(points)) / units.displacement
-
-    return field
-
-
-def nodal_forces(scene: Scene, mesh: BoundaryMesh, space: BoundarySpace, units: Units) -> FloatArray:
-    """Return the (n_nodes, 2) dimensionless forces of all loads on the nodes of a space on the unit mesh."""
-    force = np.zeros((space.n_dofs // 2, 2))
-    for part, elements in scene.parts_on(mesh):
-        if isinstance(part.condition, Traction | Pressure):
-            force += integrate_traction(space, elements, dimensionless_load(part.condition, units))
-    return force
-
-
-def dimensionless_load(load: Traction | Pressure, units: Units) -> TractionField:
-    """Return a load as a function of dimensionless points."""
-
-    def field(points: FloatArray, normals: FloatArray) -> FloatArray:
-        return load.at(units.to_physical(points), normals) / units.stress
-
-    return field
-
-
-def far_drive(scene: Scene, units: Units) -> FarDrive:
-    """Return how a half-plane moves far away, in the units given; at rest by default."""
-    far = scene.far
-    if far is None:
-        return FarDrive()
-    motion = far.motion / (units.displacement, units.displacement, units.displacement / units.length)
-    load = far.load / (units.stress * units.length * np.array([1.0, 1.0, units.length]))
-    centre = (np.array(far.centre) - units.centre) / units.length
-    driven = tuple(np.flatnonzero(far.is_driven).tolist())
-    return FarDrive(driven, *(tuple(array.tolist()) for array in (motion, load, centre)))
+if TYPE_CHECKING:
+    pass
 
 
 @dataclass(frozen=True, eq=False)
-class Prepared:
-    """A scene on a mesh, dimensionless except for the mesh and the columns of the contact data.
+class PreparedBody(PlacedBody):
+    """A placed body with what is given of it, in the axes of its own mesh.
 
     Parameters
     ----------
-    scene : Scene
-        With a single load.
-    mesh : BoundaryMesh
-        In physical units.
-    units : Units
-    space : BoundarySpace
-        Of the displacements, on the unit mesh.
     conditions : NodalConditions
-        Supports, and the directions that are retained for contact.
-    candidates : ContactData
-        The nodes on contact parts, held by supports or not.
-    contact : ContactData
-        Those of them that can touch their obstacle.
+        Supports; the nodes in contact are retained.
     force : (n_nodes, 2) array [-]
         Given nodal forces.
     inside : ForcesInside or None
         Body forces; None without any.
     drive : FarDrive
         How a half-plane moves far away.
+    candidates : ContactData
+        The nodes that may touch an obstacle or a rigid body, held by supports or not.
     """
 
-    scene: Scene
-    mesh: BoundaryMesh
-    units: Units
-    space: BoundarySpace
     conditions: NodalConditions
-    candidates: ContactData
-    contact: ContactData
     force: FloatArray
-    inside: ForcesInside | None = None
-    drive: FarDrive = field(default_factory=FarDrive)
-
-    @property
-    def material(self) -> Material:
-        """The material, its modulus in dimensionless units."""
-        return self.scene.material.scaled(self.units.modulus)
+    inside: ForcesInside | None
+    drive: FarDrive
+    candidates: ContactData
 
     @property
     def map_data(self) -> GivenData:
@@ -156,177 +83,316 @@ class Prepared:
     @cached_property
     def free_modes(self) -> FloatArray:
         """(n_motions, n_nodes, 2) array: rigid body modes that no support resists."""
-        return free_modes(self.space, self.conditions)
+        return free_modes(self.own_space, self.conditions)
 
-    @cached_property
-    def linear_solver(self) -> ChosenLinearSolver:
-        """The linear solver of the map, and why it was chosen."""
-        case = BodyCase(
-            self.space.mesh, self.material, self.conditions, (self.map_data,), is_condensed=self.is_condensed
-        )
-        requested, discretisation = self.scene.linear_solver, self.scene.discretisation
-        return linear_solver_of(requested, discretisation, case)
+
+@dataclass(frozen=True, eq=False)
+class Prepared:
+    """A scene on meshes: bodies with their conditions and forces, and contact rows.
+
+    Parameters
+    ----------
+    scene : Scene or Assembly
+        With a single load and all contacts listed.
+    bodies : tuple of PreparedBody
+    units : Units
+        Common to all bodies: the largest body's length, the modulus of the most compliant contact, the largest load.
+    rows : tuple of ContactRows
+    """
+
+    scene: Stated
+    bodies: tuple[PreparedBody, ...]
+    units: Units
+    rows: tuple[ContactRows, ...]
 
     @property
-    def largest_matrix(self) -> int:
-        """Order of the largest matrix that is factored, roughly."""
-        n_dofs = self.space.n_dofs
-        return n_dofs if self.linear_solver.hierarchical is None else min(LARGEST_BLOCK, n_dofs)
+    def only(self) -> PreparedBody:
+        """The only body."""
+        (body,) = self.bodies
+        return body
+
+    @property
+    def force_unit(self) -> float:
+        """The unit of nodal forces [N/m]."""
+        return self.units.stress * self.units.length
+
+    @property
+    def n_contact(self) -> int:
+        """Number of contact nodes."""
+        return sum(rows.n_contact for rows in self.rows)
+
+    @property
+    def has_obstacles_only(self) -> bool:
+        """Whether there is one elastic body that touches nothing but fixed obstacles."""
+        return len(self.bodies) == 1 and all(rows.other < 0 for rows in self.rows)
 
     @cached_property
     def is_condensed(self) -> bool:
-        """Whether contact sees the stiffness of the body even if its equations are compressed over a tree.
+        """Whether contact sees the stiffness of bodies even if their equations are compressed over a tree.
 
-        The stiffness is needed to see whether the energy of elements that are too long can be negative, for rotations
-        that no support holds and displacements do not contain, and for nodes between two obstacles (two rows each).
+        Several bodies are joined by their stiffness. That of one body is needed to see whether the energy of elements
+        that are too long can be negative, for rotations that no support holds and displacements do not contain, and for
+        nodes between two obstacles (two rows each).
         """
-        if self.contact.nodes.is_shared.any():
+        if not self.has_obstacles_only:
             return True
-        discretisation = self.scene.discretisation
+        body, nodes = self.only, np.concatenate([np.zeros(0, np.intp), *(rows.nodes for rows in self.rows)])
+        if np.unique(nodes).size < nodes.size:
+            return True
+        discretisation = body.scene.discretisation
         if discretisation.is_symmetric:
             return False
-        if not discretisation.keeps_rotations and turning(self.free_modes).any():
+        if not discretisation.keeps_rotations and turning(body.free_modes).any():
             return True
-        return discretisation.may_be_negative(self.space.mesh)
+        return discretisation.may_be_negative(body.own_space.mesh)
 
-    def under(self, scene: Scene) -> Prepared:
-        """Return the same body under the loads, obstacles and law of another scene, in the same units.
+    def material_of(self, body: PlacedBody) -> Material:
+        """Return the material of a body, its modulus in dimensionless units."""
+        return body.material.scaled(self.units.modulus)
 
-        Parameters
-        ----------
-        scene : Scene
-            Differs from this one only in numbers of its conditions, its law and its solver.
+    def linear_solver(self, body: PreparedBody) -> ChosenLinearSolver:
+        """Return the linear solver that the map of a body takes, and why."""
+        case = BodyCase(
+            body.own_space.mesh,
+            self.material_of(body),
+            body.conditions,
+            (body.map_data,),
+            is_condensed=self.is_condensed,
+        )
+        return linear_solver_of(self.scene.linear_solver, body.scene.discretisation, case)
+
+    @cached_property
+    def largest_matrix(self) -> int:
+        """Order of the largest matrix that is factored, roughly."""
+        body = max(self.bodies, key=lambda body: body.space.n_dofs)
+        is_compressed = self.linear_solver(body).hierarchical is not None
+        return min(LARGEST_BLOCK, body.space.n_dofs) if is_compressed else body.space.n_dofs
+
+    def column(self, name: str) -> FloatArray:
+        """Return a column of `ContactRows` for all contact nodes."""
+        shape = (0, 2) if name == "points" else (0,)
+        return np.concatenate([np.zeros(shape), *(getattr(rows, name) for rows in self.rows)])
+
+    @cached_property
+    def frame(self) -> FloatArray:
+        """(n_contact, 2, 2) array: direction of contact and tangent of all contact nodes."""
+        return np.concatenate([np.zeros((0, 2, 2)), *(rows.frame for rows in self.rows)])
+
+    @cached_property
+    def spread(self) -> ContactSpread:
+        """The map from forces of contact nodes to tractions of elements."""
+        return ContactSpread.of(self.bodies, self.rows)
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """The contact of each contact node."""
+        return tuple(rows.name for rows in self.rows for _ in range(rows.n_contact))
+
+    @property
+    def acting_at(self) -> FloatArray:
+        """(n_contact, 2) array [m]: where the force of each contact node acts on the body that it belongs to."""
+        points = (rows.at_nodes(dof_points(self.bodies[rows.body].space)) for rows in self.rows)
+        return np.concatenate([np.zeros((0, 2)), *points])
+
+    @property
+    def contact_nodes(self) -> ContactNodes:
+        """The contact nodes of the only body, dimensionless."""
+        nodes = np.concatenate([np.zeros(0, np.intp), *(rows.nodes for rows in self.rows)])
+        return ContactNodes(
+            nodes,
+            dof_points(self.only.own_space)[nodes],
+            self.frame,
+            self.column("weights") / self.units.length,
+        )
+
+    @cached_property
+    def law(self) -> FrictionLaw:
+        """The friction law of the contact nodes, in physical units.
 
         Raises
         ------
-        ValueError
-            If the scene has another body, other parts, or other kinds of conditions.
+        LawError
+            If a coefficient is not finite or negative somewhere; the message names the contact.
         """
-        check_same_body(self.scene, scene)
-        _check_symmetry(scene, self.mesh)
-        return _prepared(scene, self.mesh, self.units, self.space)
+        laws: dict[object, tuple[FrictionLaw, list[IntArray]]] = {}
+        first = 0
+        for rows in self.rows:
+            numbers = first + np.arange(rows.n_contact)
+            first += rows.n_contact
+            for law, chosen in ((rows.law, ~rows.is_frictionless), (Frictionless(), rows.is_frictionless)):
+                if not chosen.any():
+                    continue
+                is_uniform = isinstance(law, LawOfCoefficients) and law.is_uniform
+                try:
+                    evaluated = law if is_uniform else law.at(rows.points[chosen])
+                except ValueError as error:
+                    kind = "part" if rows.other < 0 else "contact"
+                    raise LawError(f"{kind} {rows.name!r}: friction law: {error}") from error
+                laws.setdefault(law if is_uniform else first, (evaluated, []))[1].append(numbers[chosen])
+        if len(laws) < 2:
+            return next((law for law, _ in laws.values()), Frictionless())
+        return PiecewiseLaw(*zip(*((law, np.concatenate(nodes)) for law, nodes in laws.values()), strict=True))
+
+    @property
+    def tangent_follows(self) -> BoolArray:
+        """(n_contact,) bool array: nodes whose tangential displacement a support or a second obstacle gives."""
+        return np.concatenate([np.zeros(0, bool), *(rows.tangent_follows for rows in self.rows)])
+
+    @property
+    def is_on_line(self) -> BoolArray:
+        """(n_contact,) bool array: nodes of contacts between bodies that lie on a symmetry line."""
+        return np.concatenate([np.zeros(0, bool), *(rows.is_on_line for rows in self.rows)])
+
+    def under(self, scene: Stated, units: Units | None = None) -> Prepared:
+        """Return the same bodies under the loads, gaps and laws of another scene.
+
+        Loads on a body are integrated again only if its parts or body forces are other objects than before.
+
+        Parameters
+        ----------
+        scene : Scene or Assembly
+            Differs only in numbers of conditions and contacts, its law and its solver.
+        units : Units, optional
+            By default the same.
+
+        Raises
+        ------
+        InputError
+            If its bodies have other names, shapes or kinds of conditions, a rigid body becomes another one, or a load
+            drives another of its motions.
+        """
+        check_rigid(self.scene, scene)
+        before = self if units is None else None
+        following = _prepared(scene, bodies_under(scene, self.bodies), units or self.units, before)
+        if self.is_coupled_like(following) and "spread" in self.__dict__:
+            following.__dict__["spread"] = self.spread
+        return following
+
+    def with_loads_of(self, other: Prepared) -> Prepared:
+        """Return the same bodies and contacts under the loads, supports and body forces of another step."""
+        pairs = zip(self.bodies, other.bodies, strict=True)
+        bodies = (
+            replace(
+                body,
+                conditions=replace(body.conditions, displacement=loaded.conditions.displacement),
+                force=loaded.force,
+                inside=loaded.inside,
+                drive=loaded.drive,
+            )
+            for body, loaded in pairs
+        )
+        return replace(self, bodies=tuple(bodies))
+
+    def has_same_unknowns(self, other: Prepared) -> bool:
+        """Whether bodies are condensed onto the same displacements as in another step."""
+        pairs = zip(self.bodies, other.bodies, strict=True)
+        return all(np.array_equal(one.conditions.is_retained, two.conditions.is_retained) for one, two in pairs)
+
+    def is_coupled_like(self, other: Prepared) -> bool:
+        """Whether the same nodes touch the same sides in the same directions as in another step."""
+        pairs = zip(self.rows, other.rows, strict=False)
+        return len(self.rows) == len(other.rows) and all(one.is_coupled_like(two) for one, two in pairs)
+
+    def rows_under(self, scene: Stated) -> tuple[ContactRows, ...] | None:
+        """Return the contacts of elastic bodies with the gaps and laws of another scene, None if they are others."""
+        before, after = self.scene.elastic_contacts, scene.elastic_contacts
+        if len(before) != len(after) or any(
+            replace(one, gap=0.0, law=None) != replace(two, gap=0.0, law=None)
+            for one, two in zip(before, after, strict=True)
+        ):
+            return None
+        return tuple(
+            replace(rows, gap=rows.gap + (two.gap - one.gap), law=scene.law if two.law is None else two.law)
+            for rows, one, two in zip(self.rows, before, after, strict=False)
+        )
 
 
-def given_data(conditions: NodalConditions, force: FloatArray, inside: ForcesInside | None) -> GivenData:
-    """Return the forces and displacements under which an elastic map is solved, without what acts inside the body."""
-    if inside is not None:
-        conditions, force = inside.left_of(conditions, force)
-    return GivenData.of(conditions, force, conditions.displacement)
+def prepare(scene: Stated, meshes: Meshes = None) -> Prepared:
+    """Prepare a scene with a single load; see `prepare_steps`."""
+    (prepared,) = prepare_steps((scene,), meshes)
+    return prepared
 
 
-def prepare(scene: Scene, mesh: BoundaryMesh, units: Units | None = None) -> Prepared:
-    """Prepare a scene on a mesh: conditions at nodes, contact nodes and forces.
+def prepare_steps(scenes: Sequence[Stated], meshes: Meshes = None) -> tuple[Prepared, ...]:
+    """Prepare scenes that follow each other in time, in the units of the largest load.
+
+    All have the contacts that are found in the first one.
 
     Parameters
     ----------
-    scene : Scene
-        With a single load; see `bemkit.scene.load_history.load_steps`.
-    mesh : BoundaryMesh
-        As made by `Scene.build_mesh`, or a refinement of it.
-    units : Units, optional
-        By default `find_units` of the scene.
+    scenes : sequence of Scene or of Assembly
+        Each with a single load; see `bemkit.scene.load_history.load_steps`.
+    meshes : BoundaryMesh or mapping of str to BoundaryMesh, optional
+        Meshes of bodies by name, in the coordinates of their shapes, or that of the only body.
 
     Raises
     ------
-    TooFarError
-        If the body lies so far from the origin that its coordinates no longer hold its shape.
+    GeometryError
+        If a body cannot be divided, or sides in contact face away from each other.
+    OverlapError
+        If bodies overlap by more than the interference given.
     ConflictingSupportsError
         If supports contradict each other at a node.
+    TooFarError
+        If a body lies so far from the origin that its coordinates no longer hold its shape.
     ValueError
-        If the scene lacks its symmetry, or an expression is not finite somewhere.
+        If a scene lacks its symmetry, or an expression is not finite somewhere.
     """
-    check_position(mesh)
-    _check_symmetry(scene, mesh)
-    units = find_units(scene, mesh) if units is None else units
-    space = scene.discretisation.displacement_space(mesh.unit)
-    return _prepared(scene, mesh, units, space)
-
-
-def prepare_steps(steps: Sequence[Scene], mesh: BoundaryMesh) -> tuple[Prepared, ...]:
-    """Prepare scenes that follow each other in time, on one mesh and in the units of the largest load."""
-    units = max((find_units(step, mesh) for step in steps), key=lambda units: units.stress)
-    first = prepare(steps[0], mesh, units)
+    bodies = place(scenes[0], meshes)
+    found = listed_contacts(scenes[0], bodies)
+    steps = [with_found_contacts(step, found) for step in scenes]
+    for step in steps[1:]:
+        check_rigid(steps[0], step)
+    first = _prepared(steps[0], bodies, find_units(steps, bodies))
     later = tuple(first.under(step) for step in steps[1:])
-    if later:
-        first = replace(first, conditions=replace(first.conditions, later=tuple(step.map_data for step in later)))
+    if later:  # what later steps give decides how much of the compressed equations is kept
+        pairs = [(body, tuple(step.bodies[k].map_data for step in later)) for k, body in enumerate(first.bodies)]
+        told = (replace(body, conditions=replace(body.conditions, later=data)) for body, data in pairs)
+        first = replace(first, bodies=tuple(told))
     return (first, *later)
 
 
-def _check_symmetry(scene: Scene, mesh: BoundaryMesh) -> None:
-    if scene.symmetry is not None or mesh.symmetry is not None:
-        from bemkit.scene.symmetry import check_symmetry
+def _prepared(scene: Stated, bodies: Sequence[PlacedBody], units: Units, before: Prepared | None = None) -> Prepared:
+    """Prepare placed bodies; bodies whose loads have not changed keep their conditions and forces."""
+    supports: list[NodalConditions] = []
+    forces: list[FloatArray] = []
+    force_unit = units.stress * units.length
+    for number, body in enumerate(bodies):
+        if before is not None and body.is_loaded_like(before.bodies[number]):
+            supports.append(before.bodies[number].conditions)
+            forces.append(before.bodies[number].force)
+            continue
+        own_units = body.units(units.modulus, force_unit)
+        held = supported(body.own_space, supports_on(body.scene, body.own_mesh, own_units, body.own_space))
+        supports.append(replace(held, driven=far_drive(body.scene, own_units).driven))
+        in_place = body.units(units.modulus, force_unit, body.mesh)
+        forces.append(body.turn.turned_back(nodal_forces(body.scene, body.mesh, body.space_in_place, in_place)))
+    candidates = [candidates_of(scene, body) for body in bodies]
+    with_obstacles = tuple(obstacle_rows(scene, bodies, candidates, supports))
+    between = None if before is None else before.rows_under(scene)
+    if between is None:
+        between = ()
+        if scene.elastic_contacts:
+            from bemkit.model.body_contacts import body_rows  # mortars, which single bodies lack
 
-        check_symmetry(scene, mesh)
-
-
-def _prepared(scene: Scene, mesh: BoundaryMesh, units: Units, space: BoundarySpace) -> Prepared:
-    candidates = find_contact(scene, mesh, space)
-    drive = far_drive(scene, units)
-    supports = supports_on(scene, mesh, units, space)
-    conditions, nodes = contact_conditions(space, supports, candidates.nodes, drive.driven)
-    force = nodal_forces(scene, mesh, space, units)
-    inside = None
-    if scene.body_forces:
-        from bemkit.model.particular import particular_solution
-
-        inside = ForcesInside.of(particular_solution(scene, mesh, units.modulus, units.stress), space)
-    return Prepared(scene, mesh, units, space, conditions, candidates, candidates.of(nodes), force, inside, drive)
-
-
-def check_same_body(scene: Scene, other: Scene) -> None:
-    """Check that another scene has the same matrices on the same mesh.
-
-    Raises
-    ------
-    InputError
-        Naming the first difference.
-    """
-    for name in ("shape", "material", "symmetry", "discretisation"):
-        if getattr(scene, name) != getattr(other, name):
-            raise InputError(f"{name} is {getattr(other, name)}: keep {getattr(scene, name)}, or build a new model")
-    if _driven(scene) != _driven(other):
-        raise InputError("far drives other motions: change numbers only, or build a new model")
-    if [type(force) for force in scene.body_forces] != [type(force) for force in other.body_forces]:
-        raise InputError("body_forces change their kinds or order: change numbers only, or build a new model")
-    for part, changed in zip_longest(scene.parts, other.parts):
-        if part is None or changed is None or _layout(part) != _layout(changed):
-            name = (part or changed).name
-            raise InputError(f"part {name!r} changes its place or its kind: change numbers only, or build a new model")
+            between = tuple(body_rows(scene, bodies, supports, with_obstacles))
+    rows = (*between, *with_obstacles)
+    retained, insides = retained_for(bodies, supports, rows), _insides(bodies, units, before)
+    prepared = []
+    for number, body in enumerate(bodies):
+        drive = far_drive(body.scene, body.units(units.modulus, force_unit))
+        given = (retained[number], forces[number], insides[number], drive, candidates[number])
+        placed = body.body, body.scene, body.mesh, body.own_mesh, body.space, body.own_space, body.space_in_place
+        prepared.append(PreparedBody(*placed, *given))
+    return Prepared(scene, tuple(prepared), units, rows)
 
 
-def _driven(scene: Scene) -> list[bool]:
-    return [] if scene.far is None else scene.far.is_driven.tolist()
+def _insides(bodies: Sequence[PlacedBody], units: Units, before: Prepared | None) -> list[ForcesInside | None]:
+    """Return the body forces of each body."""
+    if not any(body.body.body_forces for body in bodies):
+        return [None] * len(bodies)
+    from bemkit.model.inside import forces_inside_of
 
-
-def _layout(part: Part) -> tuple[object, ...]:
-    condition = part.condition
-    components = condition.is_prescribed if isinstance(condition, PrescribedDisplacement) else ()
-    return part.name, part.sides, part.where, type(condition), components
-
-
-def linear_solver_of(
-    requested: LinearSolverChoice, discretisation: Discretisation, case: BodyCase
-) -> ChosenLinearSolver:
-    """Choose the linear solver of a map.
-
-    Parameters
-    ----------
-    requested : LinearSolver, Hierarchical or Automatic
-    discretisation : Discretisation
-    case : BodyCase
-        Its linear solver counts for nothing.
-
-    Raises
-    ------
-    InputError
-        If compressed equations of Galerkin's method are requested: there are none.
-    """
-    if not discretisation.is_symmetric:
-        return choose_collocation_solver(requested, case, physical_memory(), discretisation.why_dense(case.mesh))
-    if isinstance(requested, Hierarchical) and case.mesh.surface is None:
-        raise InputError(
-            f"linear_solver is 'hierarchical', but discretisation {discretisation.method} has dense equations only: "
-            'take discretisation = "constant", whose equations are compressed, or hp with an accuracy and '
-            'linear_solver = "automatic"'
-        )
-    return choose_linear_solver(requested)
+    pairs = () if before is None else zip(bodies, before.bodies, strict=True)
+    kept = {number: old.inside for number, (body, old) in enumerate(pairs) if body.is_loaded_like(old)}
+    return forces_inside_of(bodies, units, kept)

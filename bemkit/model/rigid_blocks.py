@@ -17,10 +17,12 @@ from bemkit.contact.obstacle import Obstacle, measure_contact
 from bemkit.contact.solvability import envelopes_of
 from bemkit.geometry.spaces import dof_points
 from bemkit.geometry.vectors import norms, turned_left
-from bemkit.model.assembled.contacts import check_overlap, listed_contacts, reach_of
-from bemkit.model.assembled.placed import PlacedBody
+from bemkit.model.body_contacts import reach_of
+from bemkit.model.contacts import check_overlap
+from bemkit.model.given import nodal_forces, supports_on
 from bemkit.model.particular import particular_solution
-from bemkit.model.prepared import nodal_forces, supports_on
+from bemkit.model.placed import PlacedBody
+from bemkit.model.same_bodies import listed_contacts, with_found_contacts
 from bemkit.operators.rigid_modes import rigid_motions
 from bemkit.operators.steklov_poincare.forces_inside import ForcesInside
 from bemkit.operators.steklov_poincare.nodal_conditions import free_modes, supported
@@ -155,7 +157,8 @@ def _elastic_block(body: PlacedBody) -> Block:
 def joints_of(assembly: Assembly, bodies: Sequence[PlacedBody]) -> Iterator[Joint]:
     """Yield the joints between elastic bodies, then those with rigid bodies and with fixed obstacles."""
     names = [*(body.name for body in bodies), *(body.name for body in assembly.rigid)]
-    for pair in listed_contacts(assembly, bodies):
+    listed = with_found_contacts(assembly, listed_contacts(assembly, bodies))
+    for pair in listed.contacts:
         parts = [(names.index(body), part) for body, part in pair.elastic_parts]
         if pair.rigid_body is None:
             yield _joint_of_sides(assembly, pair, bodies, parts)

@@ -8,25 +8,24 @@ may push back the wrong way, and still satisfy contact and equilibrium.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from bemkit.arrays import FloatArray, IntArray
 from bemkit.contact.equilibrium import NOISE_FACTOR, round_off_of
 from bemkit.geometry.spaces import BoundarySpace, dof_points
-from bemkit.model.contact_model import Model, energy_beyond, map_fields
+from bemkit.model.contacts import ContactRows
+from bemkit.model.fields import energy_beyond, map_fields
+from bemkit.model.model import Model
+from bemkit.model.prepared import PreparedBody
 from bemkit.operators.rigid_modes import traction_free_modes
 from bemkit.operators.steklov_poincare import CondensedMap, SteklovPoincare
 from bemkit.result_warning import ResultWarning
-from bemkit.scene.unit_names import amount
+from bemkit.scene.unit_names import UnitNames, amount
 from bemkit.solvers.active_sets import NodeStatus
 from bemkit.solvers.base import ContactSolution, Status
-
-if TYPE_CHECKING:
-    from bemkit.model.assembled.model import AssembledModel  # single bodies are solved without it
-
 
 LARGEST_ANGLE = 30.0
 """Degrees between the body's normal and the direction of contact. A side lies down on its obstacle by turning through
@@ -42,107 +41,109 @@ _ELIMINATION_TOLERANCE = 64.0 * float(np.finfo(float).eps)
 """Share of the sensitivity of the whole body that elimination may leave in its condensed stiffness."""
 
 
-def contact_warnings(model: Model, displacement: FloatArray, node_status: IntArray) -> tuple[ResultWarning, ...]:
-    """Say where contact is closed at a large angle, and where supports push the body into an obstacle.
+def contact_warnings(
+    model: Model, displacements: Sequence[FloatArray], node_status: IntArray
+) -> tuple[ResultWarning, ...]:
+    """Say where contact is closed at a large angle, and where supports push a body into an obstacle.
 
     Parameters
     ----------
     model : Model
-    displacement : (n_nodes, 2) array [m]
-        Of all nodes of the displacement space.
+    displacements : sequence of (n_nodes, 2) arrays [m]
+        Of all nodes of the displacement space of each body.
     node_status : (n_contact,) array of `NodeStatus` values
 
     Returns
     -------
     tuple of ResultWarning
-        At most one of either kind for each contact part.
+        At most one of either kind for each contact with an obstacle.
     """
-    return (*_oblique(model, node_status), *_pushed_in(model, displacement))
+    found: list[ResultWarning] = []
+    begin = 0
+    touching: list[list[IntArray]] = [[] for _ in model.prepared.bodies]
+    for rows in model.prepared.rows:
+        of_rows = node_status[begin : begin + rows.n_contact]
+        begin += rows.n_contact
+        touching[rows.body].append(rows.nodes)
+        if rows.other < 0:
+            found += _oblique(model.prepared.bodies[rows.body], rows, of_rows)
+    units = model.prepared.scene.units
+    for body, displacement, nodes in zip(model.prepared.bodies, displacements, touching, strict=True):
+        found += _pushed_in(body, displacement, np.concatenate([np.zeros(0, np.intp), *nodes]), units)
+    return tuple(found)
 
 
-def _oblique(model: Model, node_status: IntArray) -> list[ResultWarning]:
-    contact = model.contact
-    angle = np.degrees(np.arccos(np.clip(contact.facing, -1.0, 1.0)))
+def _oblique(body: PreparedBody, rows: ContactRows, node_status: IntArray) -> list[ResultWarning]:
+    candidates = body.candidates
+    is_of_part = np.equal(candidates.parts, rows.part) & np.isin(candidates.nodes.nodes, rows.nodes)
+    angle = np.degrees(np.arccos(np.clip(candidates.facing[is_of_part], -1.0, 1.0)))
     is_oblique = (node_status != NodeStatus.SEPARATED) & (angle > LARGEST_ANGLE)
-    worst: dict[str, float] = {}
-    for node in np.flatnonzero(is_oblique).tolist():
-        part = contact.parts[node]
-        worst[part] = max(worst.get(part, 0.0), float(angle[node]))
+    if not is_oblique.any():
+        return []
+    degrees = float(angle[is_oblique].max())
     return [
         ResultWarning(
             "oblique contact",
-            part,
-            f"Part {part!r} touches its obstacle at up to {degrees:.0f} degrees to its own normal, where small "
+            rows.name,
+            f"Part {rows.name!r} touches its obstacle at up to {degrees:.0f} degrees to its own normal, where small "
             "displacements no longer describe the contact: model the body nearer to its final position.",
             degrees,
         )
-        for part, degrees in worst.items()
     ]
 
 
-def _pushed_in(model: Model, displacement: FloatArray) -> list[ResultWarning]:
-    candidates, nodes = model.prepared.candidates, model.prepared.candidates.nodes
+def _pushed_in(
+    body: PreparedBody, displacement: FloatArray, touching: IntArray, units: UnitNames | None
+) -> list[ResultWarning]:
+    candidates, nodes = body.candidates, body.candidates.nodes
+    is_fixed = np.isin(candidates.parts, [part.name for part in body.scene.contact_parts])
     overlap = np.sum(displacement[nodes.nodes] * nodes.directions, axis=1) - candidates.gap
-    overlap[np.isin(nodes.nodes, model.nodes.nodes)] = -math.inf
+    overlap[np.isin(nodes.nodes, touching) | ~is_fixed] = -math.inf
     found = []
     for part in dict.fromkeys(candidates.parts):
         node = int(np.argmax(np.where(np.equal(candidates.parts, part), overlap, -math.inf)))
         if overlap[node] > SMALLEST_OVERLAP * np.abs(displacement).max():
             x, y = candidates.points[node]
-            depth = amount(overlap[node], "length", model.scene.units, 3)
+            depth = amount(overlap[node], "length", units, 3)
+            name = body.contact_title(part)
             text = (
-                f"Supports push part {part!r} {depth} into its obstacle at ({x:.6g}, {y:.6g}), where "
-                "contact cannot act: let them move with the obstacle, or leave a free element between them."
+                f"Supports push part {name!r} {depth} into its obstacle at ({x:.6g}, {y:.6g}), "
+                "where contact cannot act: let them move with the obstacle, or leave a free element between them."
             )
-            found.append(ResultWarning("pushed into obstacle", part, text, float(overlap[node])))
+            found.append(ResultWarning("pushed into obstacle", name, text, float(overlap[node])))
     return found
 
 
-def with_energy_checked(model: Model, result: ContactSolution) -> ContactSolution:
-    """Return the outcome of a solve, named NEGATIVE_ENERGY if the energy of the body is negative or can become so.
+def with_energies_checked(model: Model, result: ContactSolution) -> ContactSolution:
+    """Return the outcome of a solve, named NEGATIVE_ENERGY if the energy of a body is negative or can become so.
 
     Returns
     -------
     ContactSolution
-        The same unless the condensed stiffness has a negative direction or the work of all forces is negative.
+        The same unless the condensed stiffness of a body has a negative direction or the work of all forces on it is
+        negative; the message names it.
     """
     if not result.state.is_finite or result.status is Status.NOT_FINITE:
         return result
-    if model.mesh.surface is not None:  # the flexibility of a half-plane is positive in closed form
-        return result
-    displacement, force = map_fields(model.elastic, *model.body.recover(result.state))
-    space = model.prepared.space
-    if model.body.condensed is None:  # only the work of the solution shows it
-        sensitivity = np.full(displacement.shape, model.elastic.material.plane_modulus)
-        finding = _negative_work(model.elastic, displacement, force, space, sensitivity)
-    else:
-        is_symmetric = model.scene.discretisation.is_symmetric
-        finding = _negative_energy_of(model.body.condensed, model.elastic, space, is_symmetric, (displacement, force))
-    return _named_negative(result, finding) if finding else result
-
-
-def with_energies_checked(model: AssembledModel, result: ContactSolution) -> ContactSolution:
-    """Return the outcome of a solve, named NEGATIVE_ENERGY and by the body if the energy of one is negative or can be.
-
-    See `with_energy_checked`.
-    """
-    if not result.state.is_finite or result.status is Status.NOT_FINITE:
-        return result
-    unknowns = model.body.member_displacements(result.state)[: len(model.condensed)]  # rigid bodies come last
-    bodies = zip(model.prepared.bodies, model.elastic, model.condensed, unknowns, strict=True)
-    for body, elastic, condensed, own in bodies:
-        fields, is_symmetric = map_fields(elastic, *condensed.recover(own)), body.scene.discretisation.is_symmetric
-        finding = _negative_energy_of(condensed, elastic, body.own_space, is_symmetric, fields)
+    for number, (body, fields) in enumerate(zip(model.prepared.bodies, model.nodal_fields(result.state), strict=True)):
+        if body.mesh.surface is not None:  # the flexibility of a half-plane is positive in closed form
+            continue
+        elastic, displacements = model.elastic[number], map_fields(model.elastic[number], *fields)
+        condensed = model.condensed_map(number)
+        if condensed is None:  # only the work of the solution shows it
+            sensitivity = np.full(displacements[0].shape, elastic.material.plane_modulus)
+            finding = _negative_work(elastic, *displacements, body.own_space, sensitivity)
+        else:
+            finding = _negative_energy_of(condensed, elastic, body, displacements)
         if finding:
-            return _named_negative(result, f"body {body.name!r}: {finding}")
+            return _named_negative(result, f"{body.title}: {finding}" if body.name else finding)
     return result
 
 
 def _negative_energy_of(
     condensed: CondensedMap,
     elastic: SteklovPoincare,
-    space: BoundarySpace,
-    is_symmetric: bool,
+    body: PreparedBody,
     fields: tuple[FloatArray, FloatArray],
 ) -> str:
     """Say why the energy of a body is or can be negative; empty if it is not.
@@ -151,10 +152,7 @@ def _negative_energy_of(
     ----------
     condensed : CondensedMap
     elastic : SteklovPoincare
-    space : BoundarySpace
-        Of the displacements.
-    is_symmetric : bool
-        Whether the map is.
+    body : PreparedBody
     fields : two (n_nodes, 2) arrays [-]
         Displacements and forces without what acts inside the body.
     """
@@ -163,9 +161,9 @@ def _negative_energy_of(
     if sensitivity is None:  # a node resists by about E' per displacement, for any elements around it
         sensitivity = np.full(displacement.shape, elastic.material.plane_modulus)
     # a symmetric map is negative in no direction but for round-off, which the work of the solution shows
-    if not is_symmetric and is_indefinite(condensed.stiffness, sensitivity):
+    if not body.scene.discretisation.is_symmetric and is_indefinite(condensed.stiffness, sensitivity):
         return "the stiffness that the contact boundary sees is negative in some direction"
-    return _negative_work(elastic, displacement, force, space, sensitivity)
+    return _negative_work(elastic, displacement, force, body.own_space, sensitivity)
 
 
 def _negative_work(

@@ -74,22 +74,6 @@ def _check_scale(name: str, scale: float) -> None:
         )
 
 
-def find_units(scene: Scene, mesh: BoundaryMesh) -> Units:
-    """Choose the units by the largest load, body force, prescribed displacement or interference.
-
-    Raises
-    ------
-    OutOfRangeError
-        If results in these units could overflow or vanish.
-    """
-    modulus, length = scene.material.plane_modulus, mesh.diameter
-    load, motion, gap = largest_sizes(scene, mesh, length)
-    stress = max(load, motion / length * modulus) or gap / length * modulus or modulus
-    units = Units(mesh.centre, length, modulus, stress)
-    units.check_range()
-    return units
-
-
 def largest_sizes(scene: Scene, mesh: BoundaryMesh, length: float) -> tuple[float, float, float]:
     """Return the largest traction [Pa], the largest given displacement or interference, and the largest gap [m].
 
@@ -129,3 +113,8 @@ def check_position(mesh: BoundaryMesh, owner: str = "the body") -> None:
             f"{owner} lies {distance:.1e} times its size from the origin, where numbers hold fewer than nine digits "
             f"of its shape: subtract about ({x:.6g}, {y:.6g}) from all coordinates of body and obstacles"
         )
+
+
+def motion_units(units: Units) -> FloatArray:
+    """Return (3,) the lengths [-, -, m] by which motions x, y, turn become displacements."""
+    return np.array([1.0, 1.0, units.length])

@@ -14,7 +14,7 @@ from bemkit.geometry.local_values import values_on_elements
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.reflection import reflected_to_whole
 from bemkit.geometry.spaces import BoundarySpace
-from bemkit.model.assembled.placed import place
+from bemkit.model.placed import place
 from bemkit.results.assembly_solution import AssemblySolution
 from bemkit.results.contact_table import ContactTable
 from bemkit.results.part_forces import RigidResult

@@ -1,8 +1,8 @@
 """Only what the scene needs: the cost of a scene, what is skipped, and why."""
 
 from bemkit.operators.steklov_poincare.needs import PlanItem as PlanItem
+from bemkit.plan.items import Sizes as Sizes
 from bemkit.plan.plan import Plan as Plan
-from bemkit.plan.plan import Sizes as Sizes
 from bemkit.plan.plan import TooLargeError as TooLargeError
 from bemkit.plan.plan import announce_plan as announce_plan
 from bemkit.plan.plan import check_elements as check_elements

@@ -18,7 +18,7 @@ from bemkit.contact.mortar.projection import mean_directions
 from bemkit.contact.mortar.segments import Segments, common_refinement, facing_points
 from bemkit.contact.mortar.sides import ContactSide
 from bemkit.geometry.placement import Placement
-from bemkit.model.assembled.contacts import reach_of
+from bemkit.model.body_contacts import reach_of
 from bemkit.results.between_nodes import (
     BetweenNodes,
     Interpolation,

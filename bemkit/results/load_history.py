@@ -12,8 +12,7 @@ from bemkit.contact.body import ContactState, SlipHistory
 from bemkit.results.contact_table import ContactTable
 
 if TYPE_CHECKING:
-    from bemkit.scene.assembly import Assembly
-    from bemkit.scene.scene import Scene
+    from bemkit.scene.steps import Stated
 
 
 class StepEnd(Protocol):
@@ -162,7 +161,7 @@ class LoadHistory:
     steps : tuple of LoadStep
     """
 
-    asked: Scene | Assembly
+    asked: Stated
     n_steps: int
     steps: tuple[LoadStep, ...]
 

@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from bemkit.results.singular_corners import SingularCorner
     from bemkit.scene.assembly import Assembly
     from bemkit.scene.scene import Scene
+    from bemkit.scene.steps import Stated
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -318,7 +319,7 @@ def with_times(result: AnySolution, solutions: Sequence[AnySolution]) -> AnySolu
 
 
 def following(
-    so_far: AnySolution | None, solution: AnySolution, stated: Scene | Assembly, number: int, n_steps: int
+    so_far: AnySolution | None, solution: AnySolution, stated: Stated, number: int, n_steps: int
 ) -> AnySolution:
     """Return a step of a load history with the records, solves, times, memory and warnings of all before it.
 

@@ -3,56 +3,58 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from concurrent.futures import Executor
 from dataclasses import dataclass
-from typing import Any, Generic
+from typing import TYPE_CHECKING, Any, cast
 
 from bemkit.errors import InputError
 from bemkit.plan import make_plan
-from bemkit.results.assembly_solution import AssemblySolution
-from bemkit.results.solution import Solution
-from bemkit.runs.assembly import several_bodies
 from bemkit.runs.density import DensityMeshes
 from bemkit.runs.earlier_steps import EarlierSteps
-from bemkit.runs.history import ONE_BODY, run_on_mesh
+from bemkit.runs.history import run_on_mesh
 from bemkit.runs.hp import LayeredMeshes
-from bemkit.runs.mesh_sequence import AnyScene, AnySolution, Level, MeshSequence
+from bemkit.runs.mesh_sequence import Level, MeshSequence
 from bemkit.runs.refinement import refined, required_accuracy
 from bemkit.runs.step_errors import in_which_step
-from bemkit.runs.steps import Kind, joined, solved_history
-from bemkit.scene.assembly import Assembly
-from bemkit.scene.scene import Scene
+from bemkit.runs.steps import joined, solved_history
+from bemkit.scene.steps import Stated
 from bemkit.solvers.base import StepRecord
+
+if TYPE_CHECKING:
+    from concurrent.futures import Executor
 
 
 def run_adaptive(
-    scene: Scene,
+    scene: Stated,
     *,
     callback: Callable[[StepRecord], None] | None = None,
-    done: Solution | None = None,
-    finished: Callable[[Solution], None] | None = None,
-) -> tuple[Solution, ...]:
-    """Solve a scene on a sequence of meshes until the estimated error is below the accuracy of the scene.
+    done: Any = None,
+    finished: Callable[[Any], None] | None = None,
+    executor: Executor | None = None,
+) -> tuple[Any, ...]:
+    """Solve a scene on a sequence of meshes until the estimated error is below its accuracy.
 
     A load history is solved as a whole on each mesh, which follows the largest errors of all its steps, relative to the
     largest energy among them.
 
-    Each mesh is made from the solution before it, by density for linear and quadratic elements (`DensityMeshes`), in
-    layers for higher and rising degrees (`LayeredMeshes`), and its solve starts from that solution, so that few Newton
-    steps are needed.
+    All bodies are divided anew after each solve, by density for linear and quadratic elements (`DensityMeshes`), in
+    layers for higher and rising degrees (`LayeredMeshes`); both sides of a contact get nodes where its status changes.
+    Copies keep one mesh in common, as fine as the worst of them needs. A solve starts from the solution before it, so
+    that few Newton steps are needed.
 
     Parameters
     ----------
-    scene : Scene
+    scene : Scene or Assembly
         With `MeshOptions.accuracy`.
     callback : callable, optional
         Receives a record of every step on every mesh.
     done, finished : optional
         Of a load history; see `EarlierSteps`.
+    executor : Executor, optional
+        As for `bemkit.run`.
 
     Returns
     -------
-    tuple of Solution
+    tuple of Solution or of AssemblySolution
         One for each mesh; the best one comes last. Its timings, linear solves, steps and history are those of all
         meshes together. If the accuracy is out of reach within the elements or the time allowed, or because the solve
         on a finer mesh fails, its status is ACCURACY_NOT_REACHED, its message gives the reason, and
@@ -64,47 +66,9 @@ def run_adaptive(
     ValueError
         If the scene has no accuracy, degrees shall rise in a load history, or for the reasons of `bemkit.run`.
     """
-    level = Level.first(scene)
-    return refined(level, _SceneRefinement(_rule(level), callback, EarlierSteps(done, finished)), scene.mesh)
-
-
-def run_assembly_adaptive(
-    assembly: Assembly,
-    *,
-    callback: Callable[[StepRecord], None] | None = None,
-    done: AssemblySolution | None = None,
-    finished: Callable[[AssemblySolution], None] | None = None,
-    executor: Executor | None = None,
-) -> tuple[AssemblySolution, ...]:
-    """Solve an assembly on a sequence of meshes until the estimated error is below its accuracy.
-
-    All bodies are divided anew after each solve, as in `run_adaptive`; both sides of a contact get nodes where its
-    status changes. Copies keep one mesh in common, as fine as the worst of them needs.
-
-    Parameters
-    ----------
-    assembly : Assembly
-        With `MeshOptions.accuracy`.
-    callback : callable, optional
-        Receives a record of every step on every mesh.
-    done, finished : optional
-        Of a load history; see `EarlierSteps`.
-    executor : Executor, optional
-        As for `run_assembly`.
-
-    Returns
-    -------
-    tuple of AssemblySolution
-        One for each mesh, the best one last; see `run_adaptive`.
-
-    Raises
-    ------
-    ValueError
-        If the assembly has no accuracy, or for the reasons of `bemkit.run`.
-    """
-    level, earlier = Level.first(assembly), EarlierSteps(done, finished)
-    refinement = _AssemblyRefinement(_rule(level), callback, earlier, several_bodies(executor))
-    return refined(level, refinement, assembly.mesh)
+    level: Level[Any] = Level.first(cast(Any, scene))
+    refinement = _Refinement(_rule(level), callback, EarlierSteps(done, finished), executor)
+    return refined(level, refinement, scene.mesh)
 
 
 def _rule(level: Level[Any]) -> MeshSequence[Any]:
@@ -120,69 +84,57 @@ def _rule(level: Level[Any]) -> MeshSequence[Any]:
 
 
 @dataclass(frozen=True)
-class _Refinement(Generic[AnyScene, AnySolution]):
-    """What one body and several have in common."""
+class _Refinement:
+    """How the meshes of a level are solved, judged and refined."""
 
-    meshes: MeshSequence[AnySolution]
+    meshes: MeshSequence[Any]
     callback: Callable[[StepRecord], None] | None
-    earlier: EarlierSteps[AnySolution]
+    earlier: EarlierSteps[Any]
+    executor: Executor | None
 
-    def _solved(self, kind: Kind[Any, AnySolution], level: Level[AnyScene], meshes: Any) -> AnySolution:
-        return joined(*solved_history(kind, [level.scene], meshes, self.callback, *self.earlier.on(level)))
+    def solved(self, level: Level[Any], start: Any) -> Any:
+        """Solve a single load from the solution before, and if that leads nowhere from the beginning."""
+        scene = level.scene
+        if start is not None and start.contact.n_contact and scene.n_steps == 1:
+            solution = run_on_mesh(scene, level.meshes, start, self.callback, self.executor)
+            if solution.is_converged:
+                return solution
+        earlier = self.earlier.on(level)
+        return joined(*solved_history([scene], level.meshes, self.callback, *earlier, executor=self.executor))
 
-    def error(self, solution: AnySolution) -> float:
-        return self.meshes.error(solution)
+    def error(self, solution: Any) -> float:
+        """Return the estimated error; infinite without an estimate."""
+        return float(self.meshes.error(solution))
 
-    def shown_error(self, solution: AnySolution) -> str:
+    def shown_error(self, solution: Any) -> str:
+        """Return the estimated errors in words."""
         if where := in_which_step(solution):
             return f"{self.error(solution):.1e}{where}"
         energy, tractions = solution.estimated_error, solution.estimated_traction_error
         of_energy = "unknown" if energy is None else f"{energy:.1e}"
         return of_energy if tractions is None else f"{of_energy}, of contact tractions {tractions:.1e}"
 
-    def is_enough(self, solutions: Sequence[AnySolution]) -> bool:
+    def is_enough(self, solutions: Sequence[Any]) -> bool:
+        """Return whether the last of the solutions is as accurate as it shall be."""
         return self.meshes.is_enough(solutions)
 
-    def following(self, level: Level[AnyScene], solutions: Sequence[AnySolution]) -> Level[AnyScene] | None:
+    def following(self, level: Level[Any], solutions: Sequence[Any]) -> Level[Any] | None:
+        """Return the next level, its meshes made; None if that would not help."""
         following = self.meshes.following(level, solutions)
         if following is not None:
             _ = following.meshes  # errors in them are raised now
         return following
 
-    def excess(self, level: Level[AnyScene], most_elements: int) -> str:
-        """Compare the number of elements of a body, on average; of high degree, of quadratic ones with as many nodes.
+    def excess(self, level: Level[Any], most_elements: int) -> str:
+        """Say which number of elements a level exceeds; empty if it does not.
 
-        Copies count as one.
+        That of a body, on average; of high degree, of quadratic ones with as many nodes. Copies count as one.
         """
         degree = level.scene.discretisation.displacement_space(level.partitions[0].mesh).degree
         n_elements = sum(len(partition.sides) for partition in level.partitions) // len(level.partitions)
         of_each = " a body" if len(level.keys) > 1 else ""
         return f"{most_elements} elements{of_each}" if n_elements * max(degree, 2) // 2 > most_elements else ""
 
-
-class _SceneRefinement(_Refinement[Scene, Solution]):
-    def solved(self, level: Level[Scene], start: Solution | None) -> Solution:
-        """Solve a single load from the solution before, and if that leads nowhere from the beginning."""
-        scene, mesh = level.scene, level.partition.mesh
-        if start is not None and scene.contact_parts and scene.n_steps == 1:
-            solution = run_on_mesh(scene, mesh, start, self.callback)
-            if solution.is_converged:
-                return solution
-        return self._solved(ONE_BODY, level, mesh)
-
-    def expected_seconds(self, level: Level[Scene], solution: Solution, spent: float) -> float:
-        """Return how long the next mesh will take: what the last one took, in the proportion of their plans."""
-        return spent * make_plan(level.scene, level.partition.mesh).seconds / solution.plan.seconds
-
-
-@dataclass(frozen=True)
-class _AssemblyRefinement(_Refinement[Assembly, AssemblySolution]):
-    kind: Kind[Any, AssemblySolution]
-
-    def solved(self, level: Level[Assembly], start: AssemblySolution | None) -> AssemblySolution:
-        """Solve from the beginning: contact nodes of several bodies are not carried from mesh to mesh."""
-        return self._solved(self.kind, level, level.meshes)
-
-    def expected_seconds(self, level: Level[Assembly], solution: AssemblySolution, spent: float) -> float:
-        """Return how long the next meshes will take."""
-        return spent * (level.n_elements / solution.n_elements) ** 2
+    def expected_seconds(self, level: Level[Any], solution: Any, spent: float) -> float:
+        """Return how long the next meshes will take: what the last ones took, in the proportion of their plans."""
+        return spent * make_plan(level.scene, level.meshes).seconds / float(solution.plan.seconds)

@@ -4,32 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import overload
+from typing import Any
 
-from bemkit.results.assembly_solution import AssemblySolution
 from bemkit.results.result_file import ResultWriter, check_result_target, read_result
-from bemkit.results.solution import Solution
-from bemkit.runs.adaptive import run_adaptive, run_assembly_adaptive
-from bemkit.runs.assembly import SEVERAL_BODIES
-from bemkit.runs.history import ONE_BODY
+from bemkit.runs.adaptive import run_adaptive
 from bemkit.runs.steps import joined, solved_history
-from bemkit.scene.assembly import Assembly
-from bemkit.scene.scene import Scene
+from bemkit.scene.steps import Stated
 from bemkit.scene.toml import scene_to_toml
 from bemkit.solvers.base import Status, StepRecord
 
 
-@overload
-def run_to_file(
-    scene: Scene, path: str | Path, *, callback: Callable[[StepRecord], None] | None = None
-) -> Solution: ...
-@overload
-def run_to_file(
-    scene: Assembly, path: str | Path, *, callback: Callable[[StepRecord], None] | None = None
-) -> AssemblySolution: ...
-def run_to_file(
-    scene: Scene | Assembly, path: str | Path, *, callback: Callable[[StepRecord], None] | None = None
-) -> Solution | AssemblySolution:
+def run_to_file(scene: Stated, path: str | Path, *, callback: Callable[[StepRecord], None] | None = None) -> Any:
     """Solve a load history into a result file that holds the steps so far as soon as each of them is finished.
 
     A file that holds the beginning of the same history, because a run was killed, is continued; the numbers are those
@@ -59,25 +44,16 @@ def run_to_file(
     ValueError
         As `bemkit.run`.
     """
+    solution: Any
     text, target = scene_to_toml(scene), check_result_target(path)
     known = read_result(target) if target.exists() else None
     is_begun = known is not None and known.status is Status.UNFINISHED and scene_to_toml(known.stated) == text
-    done = known if is_begun else None
+    done: Any = known if is_begun else None
 
-    solution: Solution | AssemblySolution
-    is_adaptive = scene.mesh.accuracy is not None
     with ResultWriter(target) as writer:
-        if isinstance(scene, Assembly):
-            several = done if isinstance(done, AssemblySolution) else None
-            if is_adaptive:
-                solution = run_assembly_adaptive(scene, callback=callback, done=several, finished=writer.append)[-1]
-            else:
-                solution = joined(*solved_history(SEVERAL_BODIES, [scene], None, callback, several, writer.append))
+        if scene.mesh.accuracy is not None:
+            solution = run_adaptive(scene, callback=callback, done=done, finished=writer.append)[-1]
         else:
-            one = done if isinstance(done, Solution) else None
-            if is_adaptive:
-                solution = run_adaptive(scene, callback=callback, done=one, finished=writer.append)[-1]
-            else:
-                solution = joined(*solved_history(ONE_BODY, [scene], None, callback, one, writer.append))
+            solution = joined(*solved_history([scene], None, callback, done, writer.append))
         writer.finish(solution)
     return solution

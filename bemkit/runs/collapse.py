@@ -2,22 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
 
 from bemkit.contact.limit_load import largest_factor
 from bemkit.errors import InputError
-from bemkit.geometry.mesh import BoundaryMesh
-from bemkit.model.assembled.placed import place
+from bemkit.model.placed import Meshes, place
 from bemkit.model.rigid_blocks import friction_of, joints_of, loads_of, relative_motions, rigid_blocks
 from bemkit.runs.steps import UnsolvableSceneError
 from bemkit.scene.assembly import Assembly
 from bemkit.scene.load_history import load_steps, with_scaled_loads
 
 
-def largest_load_factor(assembly: Assembly, *, meshes: Mapping[str, BoundaryMesh] | None = None) -> float:
+def largest_load_factor(assembly: Assembly, *, meshes: Meshes = None) -> float:
     """Return the largest load factor under which contact tractions can balance the loads of an assembly.
 
     Parameters
@@ -26,7 +24,7 @@ def largest_load_factor(assembly: Assembly, *, meshes: Mapping[str, BoundaryMesh
         Its loads and body forces are those of the factor one; body forces that are constant have none. Its own load
         factors play no part.
     meshes : mapping of str to BoundaryMesh, optional
-        As for `bemkit.runs.assembly.run_assembly`.
+        As for `bemkit.run`.
 
     Returns
     -------

@@ -13,18 +13,13 @@ from bemkit.contact.body import SingularResponse
 from bemkit.contact.critical_friction import critical_coefficient, sliding_response
 from bemkit.contact.problem import ContactProblem, LawError
 from bemkit.errors import NoResultError
-from bemkit.model.assembled.model import build_assembled_model
-from bemkit.model.assembled.prepared import prepare_assembly_steps
-from bemkit.model.contact_model import build_model
+from bemkit.model.model import build_model
 from bemkit.model.prepared import prepare
-from bemkit.results.assembly_solution import AssemblySolution
-from bemkit.results.solution import Solution
-from bemkit.runs.run import LoadHistoryError, run
+from bemkit.runs.run import LoadHistoryError, on_its_meshes
 from bemkit.runs.steps import UnsolvableSceneError
-from bemkit.scene.assembly import Assembly
 from bemkit.scene.load_history import load_steps
 from bemkit.scene.scene import NoContactError, Scene
-from bemkit.scene.steps import check_stated
+from bemkit.scene.steps import Stated, check_stated
 from bemkit.solvers.active_sets import NodeStatus
 from bemkit.solvers.base import solve
 
@@ -64,7 +59,7 @@ class CriticalFriction:
         return {name: None if math.isinf(value) else value for name, value in numbers.items()}
 
 
-def critical_friction(scene: Scene | Assembly) -> CriticalFriction:
+def critical_friction(scene: Stated) -> CriticalFriction:
     """Return the friction coefficients at which sliding states of a scene lose uniqueness.
 
     Parameters
@@ -139,29 +134,18 @@ def _coefficients(
     )
 
 
-def _solved(scene: Scene | Assembly) -> tuple[ContactProblem, np.ndarray[tuple[int], np.dtype[np.intp]]]:
+def _solved(scene: Stated) -> tuple[ContactProblem, np.ndarray[tuple[int], np.dtype[np.intp]]]:
     """Return the contact problem of a scene, on the mesh that its accuracy needs, and the statuses of its nodes."""
     check_stated(scene)
     if scene.n_steps > 1:
         raise LoadHistoryError(f"a load history of {scene.n_steps} steps has no single state: give one load")
     if isinstance(scene, Scene) and not scene.contact_parts:
         raise NoContactError("no part is in contact: nothing slides")
-    stated: Any = scene
-    (step,) = load_steps(stated)
-    found: Solution | AssemblySolution | None = run(step) if step.mesh.accuracy is not None else None
-    if isinstance(step, Assembly):
-        meshes = None
-        if isinstance(found, AssemblySolution):  # its meshes are in place, with the discretisations that they need
-            back = {body.name: body.placement.inverse for body in step.placed_bodies}
-            step, meshes = found.assembly, {name: back[name].mesh(body.mesh) for name, body in found.bodies.items()}
-        (prepared,) = prepare_assembly_steps([step], meshes)
-        if not prepared.n_contact:
-            raise NoContactError("no two bodies are in contact: nothing slides")
-        problem = build_assembled_model(prepared).problem
-    elif isinstance(found, Solution):
-        problem = build_model(prepare(found.scene, found.mesh)).problem
-    else:
-        problem = build_model(prepare(step, step.build_mesh())).problem
+    (step,) = load_steps(scene)
+    prepared = prepare(*on_its_meshes(step))
+    if not (prepared.n_contact or any(body.scene.contact_parts for body in prepared.bodies)):
+        raise NoContactError("no two bodies are in contact: nothing slides")
+    problem = build_model(prepared).problem
     result = solve(problem, scene.solver, throw=False)
     if not result.is_converged:
         raise NoSlidingStateError(f"the scene has no solution to begin with: {result.message}")

@@ -40,7 +40,7 @@ Callback = Callable[[StepRecord], None] | None
 
 
 class StepModel(Protocol):
-    """The members of a model that a load history needs; `Model` and `AssembledModel` have them."""
+    """The members of a model that a load history needs; `Model` and `Model` have them."""
 
     @property
     def problem(self) -> ContactProblem:

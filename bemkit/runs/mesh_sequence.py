@@ -151,7 +151,7 @@ def _divided_bodies(asked: Scene | Assembly) -> tuple[dict[str, int], list[Scene
         if id(scene) not in numbers:
             numbers[id(scene)] = len(scenes)
             scenes.append(scene)
-            touching.append((*asked.contact_parts(body), *(part.name for part in scene.contact_parts)))
+            touching.append((*asked.touching_parts(body), *(part.name for part in scene.contact_parts)))
         keys[body.name] = numbers[id(scene)]
     return keys, scenes, tuple(touching)
 

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
+from typing import Any
 
 from bemkit.errors import InputError
 from bemkit.plan import check_elements
-from bemkit.results.solution import Solution
 from bemkit.runs.adaptive import run_adaptive
 from bemkit.runs.history import run_on_mesh
 from bemkit.scene.scene import Scene
+from bemkit.scene.steps import Stated
+from bemkit.scene.toml import with_overrides
 from bemkit.solvers.base import StepRecord
 
 
@@ -19,8 +20,8 @@ class CascadeError(InputError):
 
 
 def run_cascade(
-    scene: Scene, *, coarsest: int = 40, ratio: int = 2, callback: Callable[[StepRecord], None] | None = None
-) -> tuple[Solution, ...]:
+    scene: Stated, *, coarsest: int = 40, ratio: int = 2, callback: Callable[[StepRecord], None] | None = None
+) -> tuple[Any, ...]:
     """Solve a scene on meshes of growing size, ending with its own.
 
     The number of linear solves on the finest mesh then hardly depends on its size, and the coarser meshes together
@@ -53,7 +54,7 @@ def run_cascade(
         raise InputError(f"coarsest = {coarsest}: give at least 3 elements")
     if ratio < 2:
         raise InputError(f"ratio = {ratio}: give a whole number from 2 on")
-    if not scene.contact_parts:
+    if isinstance(scene, Scene) and not scene.contact_parts:
         raise CascadeError("no part is in contact: one mesh is enough, where there is nothing to iterate")
     if scene.n_steps > 1:
         raise CascadeError(f"a load history of {scene.n_steps} steps cannot cascade: run it on one mesh")
@@ -63,9 +64,9 @@ def run_cascade(
     counts = [scene.mesh.n_elements]
     while counts[-1] // ratio >= coarsest:
         counts.append(counts[-1] // ratio)
-    solutions: list[Solution] = []
+    solutions: list[Any] = []
     for count in reversed(counts):
-        level = scene if count == counts[0] else replace(scene, mesh=replace(scene.mesh, elements=count))
+        level = scene if count == counts[0] else with_overrides(scene, elements=count)
         start = solutions[-1] if solutions and solutions[-1].is_converged else None
         solutions.append(run_on_mesh(level, start=start, callback=callback))
     return tuple(solutions)

@@ -2,31 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
-from concurrent.futures import Executor
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, overload
+from typing import TYPE_CHECKING, Any
 
 from bemkit.contact.solvability import find_unsolvable_load
 from bemkit.errors import BemkitError, InputError
-from bemkit.geometry.mesh import BoundaryMesh
-from bemkit.model.solved_contact import with_energy_checked
+from bemkit.model.placed import Meshes
 from bemkit.operators.linear.threads import blas_threads_for
 from bemkit.plan.plan import few_on, make_plan
 from bemkit.results.solution import Solution
 from bemkit.results.solved_problem import with_times
-from bemkit.runs.history import ONE_BODY, run_history, run_on_mesh, solution_of
+from bemkit.runs.history import run_on_mesh
+from bemkit.runs.solution_of import solution_of
 from bemkit.runs.steps import UnsolvableSceneError as UnsolvableSceneError
+from bemkit.runs.steps import built, checked, explained, planned
 from bemkit.scene.load_history import load_steps
 from bemkit.scene.scene import NoContactError, Scene
-from bemkit.scene.steps import check_stated
+from bemkit.scene.steps import Stated, check_stated
 from bemkit.solvers.base import StepRecord
 from bemkit.stopwatch import Stage
 
 if TYPE_CHECKING:
-    from bemkit.results.assembly_solution import AssemblySolution
-    from bemkit.scene.assembly import Assembly
-
+    from concurrent.futures import Executor
 
 _COARSEST, _RATIO = 1024, 16
 """Elements of the coarsest mesh of a large body, and the ratio of their numbers from one mesh to the next."""
@@ -38,43 +36,31 @@ class LoadHistoryError(InputError):
     """A load history was given where only a single load is possible."""
 
 
-@overload
 def run(
-    scene: Scene,
+    scene: Stated,
     *,
-    mesh: BoundaryMesh | None = None,
-    start: Solution | None = None,
-    callback: Callable[[StepRecord], None] | None = None,
-) -> Solution: ...
-@overload
-def run(
-    scene: Assembly, *, callback: Callable[[StepRecord], None] | None = None, executor: Executor | None = None
-) -> AssemblySolution: ...
-def run(
-    scene: Scene | Assembly,
-    *,
-    mesh: BoundaryMesh | None = None,
-    start: Solution | None = None,
+    mesh: Meshes = None,
+    start: Any = None,
     callback: Callable[[StepRecord], None] | None = None,
     executor: Executor | None = None,
-) -> Solution | AssemblySolution:
+) -> Any:
     """Solve a scene, or an assembly of several bodies.
 
     Parameters
     ----------
     scene : Scene or Assembly
-    mesh : BoundaryMesh, optional
-        For a single body: a mesh of your own with the parts of the scene. By default the mesh that the scene describes,
-        or meshes until its accuracy is reached.
-    start : Solution, optional
-        For a single body: a solution to start from, on any mesh; see `bemkit.runs.nested.run_cascade`. By default every
-        node sticks; large scenes on compressed equations start from a solution on a coarser mesh. Where a scene has
-        several solutions the start chooses among them. An error without contact, where there is only one solution.
+    mesh : BoundaryMesh or mapping of str to BoundaryMesh, optional
+        A mesh of your own with the parts of the scene, or meshes of bodies by name, in the coordinates of their shapes.
+        By default the meshes that the scene describes, or meshes until its accuracy is reached.
+    start : Solution or AssemblySolution, optional
+        A solution to start from, on any mesh; see `bemkit.runs.nested.run_cascade`. By default every node sticks; large
+        scenes on compressed equations start from a solution on a coarser mesh. Where a scene has several solutions the
+        start chooses among them. An error without contact, where there is only one solution.
     callback : callable, optional
         Receives a record of every step as soon as it exists.
     executor : Executor, optional
-        For several bodies: where they are assembled and factored, copies once. An executor of `concurrent.futures`, or
-        that of a `distributed` client; by default in this process, in turn.
+        Where bodies are assembled and factored, copies once. An executor of `concurrent.futures`, or that of a
+        `distributed` client; by default in this process, in turn.
 
     Returns
     -------
@@ -92,28 +78,26 @@ def run(
         If the scene is not well posed; the message names the part and the remedy.
     """
     check_stated(scene)
-    if not isinstance(scene, Scene):
-        return _run_assembly(scene, mesh, start, callback, executor)
-    if executor is not None:
-        raise InputError("executor is given with one body, which is a single piece of work: remove it, or give several")
     if scene.mesh.accuracy is not None and mesh is None:
         from bemkit.runs.adaptive import run_adaptive  # only where it is asked for
 
-        return run_adaptive(scene, callback=callback)[-1]
+        return run_adaptive(scene, callback=callback, executor=executor)[-1]
     if mesh is None and start is None and (ratio := _gain_by_cascade(scene)):
         from bemkit.runs.nested import run_cascade
 
         meshes = run_cascade(scene, coarsest=_COARSEST, ratio=ratio, callback=callback)
         return with_times(meshes[-1], meshes)
-    return run_on_mesh(scene, mesh, start, callback)
+    return run_on_mesh(scene, mesh, start, callback, executor)
 
 
-def _gain_by_cascade(scene: Scene) -> int:
+def _gain_by_cascade(scene: Stated) -> int:
     """Return the ratio of elements of a cascade of meshes, zero if the scene is solved on its mesh at once.
 
     A cascade pays where a contact step costs about as much as the assembly: for periodic half-planes, which have no
     matrices, and for large bodies on compressed equations.
     """
+    if not isinstance(scene, Scene):
+        return 0
     outline = scene.shape.outline()
     if outline.surface is not None and not outline.surface.is_periodic:
         return 0
@@ -123,58 +107,26 @@ def _gain_by_cascade(scene: Scene) -> int:
     if outline.surface is not None:
         return ratio
     smaller = replace(scene, mesh=replace(scene.mesh, elements=max(_LARGE, least)))
-    return ratio if make_plan(smaller, smaller.build_mesh()).is_compressed else 0
+    return ratio if make_plan(smaller).is_compressed else 0
 
 
-def _run_assembly(
-    assembly: Assembly,
-    mesh: BoundaryMesh | None,
-    start: Solution | None,
-    callback: Callable[[StepRecord], None] | None,
-    executor: Executor | None,
-) -> AssemblySolution:
-    for name, value in (("mesh", mesh), ("start", start)):
-        if value is not None:
-            raise InputError(f"{name} is given with an assembly of several bodies: remove it")
-    if assembly.mesh.accuracy is not None:
-        from bemkit.runs.adaptive import run_assembly_adaptive
-
-        return run_assembly_adaptive(assembly, callback=callback, executor=executor)[-1]
-    from bemkit.runs.assembly import run_assembly
-
-    return run_assembly(assembly, callback=callback, executor=executor)
-
-
-def run_steps(
-    scenes: Sequence[Scene] | Sequence[Assembly], callback: Callable[[StepRecord], None] | None = None
-) -> Sequence[Solution] | Sequence[AssemblySolution]:
-    """Solve scenes, or assemblies, that follow each other in time; see `run_history` and `run_assembly_history`."""
-    solve: Callable[..., Any] = run_history
-    if not isinstance(scenes[0], Scene):
-        from bemkit.runs.assembly import run_assembly_history
-
-        solve = run_assembly_history
-    steps: Sequence[Solution] | Sequence[AssemblySolution] = solve(scenes, callback=callback)
-    return steps
-
-
-def run_probe(scene: Scene, *, n_starts: int = 8, mesh: BoundaryMesh | None = None) -> tuple[Solution, ...]:
+def run_probe(scene: Stated, *, n_starts: int = 8, mesh: Meshes = None) -> tuple[Any, ...]:
     """Solve a scene from several starts and return the distinct solutions.
 
     With Coulomb friction a scene may have more than one solution; which of them `run` returns depends on its start.
 
     Parameters
     ----------
-    scene : Scene
-        With a single load; with an accuracy, it is probed on the mesh that reaches it.
+    scene : Scene or Assembly
+        With a single load. With an accuracy, on the meshes that it needs.
     n_starts : int
         Starts: all nodes sticking, open, slipping forward, slipping backward, then random choices (always the same).
-    mesh : BoundaryMesh, optional
+    mesh : BoundaryMesh or mapping of str to BoundaryMesh, optional
         As for `run`.
 
     Returns
     -------
-    tuple of Solution
+    tuple of Solution or of AssemblySolution
         In the order found, each certified; empty if no start leads to a solution. A single one does not prove that
         there is no other.
 
@@ -183,26 +135,39 @@ def run_probe(scene: Scene, *, n_starts: int = 8, mesh: BoundaryMesh | None = No
     UnsolvableSceneError, ValueError
         As for `run`; also if the scene has a load history or `n_starts` is negative.
     """
-    if not scene.contact_parts:
+    if isinstance(scene, Scene) and not scene.contact_parts:
         raise NoContactError("no part is in contact: the solution is the only one, which run returns")
     if scene.n_steps > 1:
         raise LoadHistoryError(f"a load history of {scene.n_steps} steps cannot be probed: give one load")
     from bemkit.solvers.multistart import probe
 
-    if mesh is None and scene.mesh.accuracy is not None:
-        found = run(scene)
-        scene, mesh = found.scene, found.mesh
-    (prepared,), plan, clock = ONE_BODY.planned(load_steps(scene), mesh)
+    if mesh is None:
+        scene, mesh = on_its_meshes(scene)
+    (prepared,), plan, clock = planned(load_steps(scene), mesh)
     with blas_threads_for(prepared.largest_matrix):
-        model, clock = ONE_BODY.built(prepared, clock)
+        model, clock = built(prepared, clock)
         load = find_unsolvable_load(model.problem)
         if load is not None:
-            raise UnsolvableSceneError(ONE_BODY.explained(model, load))
+            raise UnsolvableSceneError(explained(model, load))
         clock = clock.closed(Stage.CONDENSE)
         results = probe(model.problem, scene.solver, n_starts=n_starts)
-        results = tuple(with_energy_checked(model, result) for result in results)
+        results = tuple(checked(model, result) for result in results)
         clock = clock.closed(Stage.SOLVE)
         return tuple(solution_of(model, result, plan, clock) for result in results if result.is_converged)
+
+
+def on_its_meshes(scene: Stated) -> tuple[Stated, Meshes]:
+    """Return a scene with the discretisations, and the meshes of its bodies, by which it reaches its accuracy.
+
+    Without an accuracy the scene stays as it is.
+    """
+    if scene.mesh.accuracy is None:
+        return scene, None
+    found = run(scene)
+    if isinstance(found, Solution):
+        return found.scene, found.mesh
+    placed = {body.name: body.placement for body in scene.placed_bodies}
+    return found.assembly, {name: placed[name].inverse.mesh(body.mesh) for name, body in found.bodies.items()}
 
 
 @dataclass(frozen=True)
@@ -216,7 +181,7 @@ class FailedRun:
         What `run` raised; its message names the remedy.
     """
 
-    scene: Scene | Assembly
+    scene: Stated
     error: BemkitError
 
     @property
@@ -225,9 +190,7 @@ class FailedRun:
         return False
 
 
-def run_all(
-    scenes: Iterable[Scene | Assembly], executor: Executor | None = None
-) -> list[Solution | AssemblySolution | FailedRun]:
+def run_all(scenes: Iterable[Stated], executor: Executor | None = None) -> list[Any]:
     """Solve several scenes, on any `concurrent.futures.Executor` if one is given.
 
     Parameters
@@ -245,7 +208,7 @@ def run_all(
     return list(map(_attempt, scenes)) if executor is None else list(executor.map(_attempt, scenes))
 
 
-def _attempt(scene: Scene | Assembly) -> Solution | AssemblySolution | FailedRun:
+def _attempt(scene: Stated) -> Any:
     try:
         return run(scene)
     except BemkitError as error:

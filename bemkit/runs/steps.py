@@ -1,84 +1,90 @@
-"""Load histories of one body or of several: what is asked, the one loop over their steps, and what comes out."""
+"""Load histories: what is asked, the one loop over their steps, and what comes out."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, Generic, TypeVar
+from typing import TYPE_CHECKING, Generic, TypeVar
 
 import numpy as np
 
-from bemkit.contact.body import ContactState, SlipHistory
+from bemkit.contact.body import ContactState
 from bemkit.contact.problem import ContactProblem
 from bemkit.contact.solvability import UnsolvableLoad, find_unsolvable_load
 from bemkit.errors import InputError
+from bemkit.model.model import Model, build_model
+from bemkit.model.placed import Meshes
+from bemkit.model.prepared import Prepared, prepare_steps
+from bemkit.model.solved_contact import with_energies_checked
 from bemkit.operators.linear.threads import blas_threads_for
-from bemkit.plan import Plan, announce_plan, check_memory
+from bemkit.plan import Plan, announce_plan, check_elements, check_memory, plan_steps
 from bemkit.results.load_history import LoadHistory, LoadStep
 from bemkit.results.missed_contact import with_missed_contact_named
 from bemkit.results.solved_problem import following
 from bemkit.runs.load_path import Callback, Path, ReachedStep, Standing, reach
-from bemkit.scene.load_history import AnyScene, load_steps
+from bemkit.runs.solution_of import solution_of
+from bemkit.scene.load_history import load_steps
+from bemkit.scene.steps import Stated
 from bemkit.solvers.base import ContactSolution, Status, solve
 from bemkit.stopwatch import Stage, StageClock, announce, assembly_time
 
 if TYPE_CHECKING:
+    from concurrent.futures import Executor
+
     from bemkit.results.assembly_solution import AssemblySolution
     from bemkit.results.solution import Solution
-    from bemkit.scene.assembly import Assembly
-    from bemkit.scene.scene import Scene
 
 AnySolution = TypeVar("AnySolution", "Solution", "AssemblySolution")
-AnyModel = TypeVar("AnyModel", bound=Any)
 
 
 class UnsolvableSceneError(InputError):
     """The scene has no solution; the message says why."""
 
 
-@dataclass(frozen=True)
-class Kind(Generic[AnyModel, AnySolution]):
-    """How one body is solved, or several.
+def planned(steps: Sequence[Stated], meshes: Meshes = None) -> tuple[tuple[Prepared, ...], Plan, StageClock]:
+    """Return load steps ready to solve, their plan, and the clock of their run; refuse what does not fit."""
+    clock = StageClock.start()
+    if meshes is None:
+        check_elements(steps[0])
+    prepared = prepare_steps(steps, meshes)
+    plan = plan_steps(prepared)
+    check_memory(plan)
+    announce_plan(plan)
+    return prepared, plan, clock.closed(Stage.MESH)
 
-    Parameters
-    ----------
-    prepared : callable
-        Load steps and a mesh, or meshes by the names of bodies -> what the steps say there, and their plan.
-    model : callable
-        What the first step says -> the model; operators are assembled and the bodies condensed.
-    checked : callable
-        Model and outcome -> the outcome, with another status if the energy of a body is negative, or if only
-        its mesh keeps one from turning.
-    solution : callable
-        Model, outcome, plan, clock and slip -> the fields.
-    explained : callable
-        Model and a load that nothing can balance -> why not, and the remedy.
-    """
 
-    prepared: Callable[[Sequence[Any], Any], tuple[Sequence[Any], Plan]]
-    model: Callable[[Any], AnyModel]
-    checked: Callable[[AnyModel, ContactSolution], ContactSolution]
-    solution: Callable[[AnyModel, ContactSolution, Plan, StageClock, SlipHistory], AnySolution]
-    explained: Callable[[AnyModel, UnsolvableLoad], str]
+def built(prepared: Prepared, clock: StageClock, executor: Executor | None = None) -> tuple[Model, StageClock]:
+    """Assemble and condense the bodies."""
+    with assembly_time() as assembly:
+        model = build_model(prepared, executor)
+    return model, clock.closed_build(assembly)
 
-    def planned(self, steps: Sequence[Any], meshes: Any) -> tuple[Sequence[Any], Plan, StageClock]:
-        """Return load steps ready to solve, their plan, and the clock of their run; refuse what does not fit."""
-        clock = StageClock.start()
-        prepared, plan = self.prepared(steps, meshes)
-        check_memory(plan)
-        announce_plan(plan)
-        return prepared, plan, clock.closed(Stage.MESH)
 
-    def built(self, prepared: Any, clock: StageClock) -> tuple[AnyModel, StageClock]:
-        """Assemble and condense the bodies."""
-        with assembly_time() as assembly:
-            model = self.model(prepared)
-        return model, clock.closed_build(assembly)
+def checked(model: Model, result: ContactSolution) -> ContactSolution:
+    """Return the outcome of a solve, named otherwise if energies, turns that a mesh stops, or slides are wrong."""
+    result = with_energies_checked(model, result)
+    if any(rows.law.is_frictionless for rows in model.prepared.rows):
+        from bemkit.model.turning import with_turning_checked
 
-    def why_not(self, model: AnyModel, result: ContactSolution) -> str:
-        """Say why a load cannot be balanced, or what the driver says of another failure."""
-        load = find_unsolvable_load(model.problem) if result.status is Status.UNSOLVABLE_LOAD else None
-        return result.message if load is None else self.explained(model, load)
+        result = with_turning_checked(model, result)
+    if model.prepared.has_obstacles_only:
+        return result
+    from bemkit.model.finite_sliding import with_sliding_checked
+
+    return with_sliding_checked(model, result)
+
+
+def why_not(model: Model, result: ContactSolution) -> str:
+    """Say why a load cannot be balanced, or what the driver says of another failure."""
+    load = find_unsolvable_load(model.problem) if result.status is Status.UNSOLVABLE_LOAD else None
+    return result.message if load is None else explained(model, load)
+
+
+def explained(model: Model, load: UnsolvableLoad) -> str:
+    """Say how a load moves bodies that nothing holds, and the remedy."""
+    from bemkit.model.free_motion import describe
+
+    return describe(model.prepared, load)
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,7 +104,7 @@ class History(Generic[AnySolution]):
         Receives the solution of each step but the last, with the steps up to it as its load history.
     """
 
-    asked: Scene | Assembly
+    asked: Stated
     times: Sequence[float]
     is_recorded: bool
     done: AnySolution | None = None
@@ -107,8 +113,8 @@ class History(Generic[AnySolution]):
     @classmethod
     def of(
         cls,
-        asked: Scene | Assembly,
-        steps: Sequence[Scene | Assembly],
+        asked: Stated,
+        steps: Sequence[Stated],
         done: AnySolution | None = None,
         finished: Callable[[AnySolution], None] | None = None,
     ) -> History[AnySolution]:
@@ -129,48 +135,48 @@ class History(Generic[AnySolution]):
 
 
 def solved_history(
-    kind: Kind[AnyModel, AnySolution],
-    asked: Sequence[AnyScene],
-    meshes: Any = None,
+    scenes: Sequence[Stated],
+    meshes: Meshes = None,
     callback: Callback = None,
     done: AnySolution | None = None,
     finished: Callable[[AnySolution], None] | None = None,
-    guess: Callable[[AnyModel], ContactState] | None = None,
+    guess: Callable[[Model], ContactState] | None = None,
+    executor: Executor | None = None,
 ) -> tuple[History[AnySolution], tuple[AnySolution, ...]]:
-    """Solve scenes that follow each other in time, of one body or of several, on one mesh of each body.
+    """Solve scenes that follow each other in time on one mesh of each body.
 
     Parameters
     ----------
-    kind : Kind
-    asked : sequence of Scene or of Assembly
+    scenes : sequence of Scene or of Assembly
         One with several steps or load factors is as many.
     meshes : BoundaryMesh, or mapping of str to BoundaryMesh, optional
-        As `bemkit.run` and `bemkit.run_assembly_history` take them.
+        As `bemkit.run` takes them.
     callback : callable, optional
         Receives a record of every step of the solver.
     done, finished : optional
         See `History`.
     guess : callable, optional
         Model -> where to start the first step.
+    executor : Executor, optional
+        Where bodies are assembled and factored.
 
     Returns
     -------
     History, tuple of solutions
         See `solve_steps`.
     """
-    steps = [step for each in asked for step in load_steps(each)]
-    history: History[AnySolution] = History.of(asked[-1], steps, done, finished)
-    prepared, plan, clock = kind.planned(steps, meshes)
+    steps = [step for each in scenes for step in load_steps(each)]
+    history: History[AnySolution] = History.of(scenes[-1], steps, done, finished)
+    prepared, plan, clock = planned(steps, meshes)
     with blas_threads_for(prepared[0].largest_matrix):
-        model, clock = kind.built(prepared[0], clock)
+        model, clock = built(prepared[0], clock, executor)
         start = None if guess is None else guess(model)
-        return history, solve_steps(kind, model, prepared, plan, history, clock=clock, guess=start, callback=callback)
+        return history, solve_steps(model, prepared, plan, history, clock=clock, guess=start, callback=callback)
 
 
 def solve_steps(
-    kind: Kind[AnyModel, AnySolution],
-    model: AnyModel,
-    steps: Sequence[Any],
+    model: Model,
+    steps: Sequence[Prepared],
     plan: Plan,
     history: History[AnySolution],
     *,
@@ -182,10 +188,9 @@ def solve_steps(
 
     Parameters
     ----------
-    kind : Kind
-    model : Model or AssembledModel
+    model : Model
         Of the first step.
-    steps : sequence of Prepared or PreparedAssembly
+    steps : sequence of Prepared
     plan : Plan
     history : History
     clock : StageClock
@@ -217,19 +222,19 @@ def solve_steps(
         clock = clock.closed(Stage.CONDENSE)
         reached = reach(_path(model, before, end, history, number), guess, callback)
         if before is None and not reached.result.history:
-            raise UnsolvableSceneError(kind.why_not(model, reached.result))
+            raise UnsolvableSceneError(why_not(model, reached.result))
         model = replace(model, problem=reached.problem)
-        result = kind.checked(model, reached.result)
+        result = checked(model, reached.result)
         clock = clock.closed(Stage.SOLVE)
         if before is not None and not result.is_converged:
-            words, why = result.message, kind.why_not(model, result)
+            words, why = result.message, why_not(model, result)
             if why != words:
                 words = f"{result.status.value} {why}."
             former = solutions[-1] if solutions else history.done
             solutions.append(_not_reached(former, replace(result, message=words), clock))
             break
         with np.errstate(over="ignore", invalid="ignore"):  # the status says what is not finite
-            solution = kind.solution(model, result, plan, clock, reached.end.motion)
+            solution = solution_of(model, result, plan, clock, reached.end.motion)
         solution = with_missed_contact_named(solution)
         if history.is_recorded and solution.is_converged:
             solution = replace(solution, loading=_loading(history, solutions, model, reached, solution))
@@ -256,15 +261,15 @@ def joined(history: History[AnySolution], solutions: Sequence[AnySolution]) -> A
     return whole
 
 
-def solved_once(kind: Kind[AnyModel, AnySolution], model: AnyModel, start: ContactState | None) -> ContactSolution:
+def solved_once(model: Model, start: ContactState | None) -> ContactSolution:
     """Solve a model under a single load; UnsolvableSceneError if nothing can balance it."""
     result = solve(model.problem, model.solver, start=start, throw=False)
     if not result.history:
-        raise UnsolvableSceneError(kind.why_not(model, result))
-    return kind.checked(model, result)
+        raise UnsolvableSceneError(why_not(model, result))
+    return checked(model, result)
 
 
-def _path(model: AnyModel, before: AnyModel | None, end: Standing, history: History[AnySolution], number: int) -> Path:
+def _path(model: Model, before: Model | None, end: Standing, history: History[AnySolution], number: int) -> Path:
     def between(share: float) -> ContactProblem:
         problem: ContactProblem = model.problem if before is None else model.between(before, share)
         return problem
@@ -277,7 +282,7 @@ def _path(model: AnyModel, before: AnyModel | None, end: Standing, history: Hist
 def _loading(
     history: History[AnySolution],
     solutions: Sequence[AnySolution],
-    model: AnyModel,
+    model: Model,
     reached: ReachedStep,
     solution: AnySolution,
 ) -> LoadHistory:

@@ -6,18 +6,18 @@ import numpy as np
 
 from bemkit.contact.body import ContactState
 from bemkit.errors import InputError
-from bemkit.model.contact_model import Model
-from bemkit.results.solution import Solution
+from bemkit.model.model import Model
+from bemkit.results.solved_problem import SolvedProblem
 
 
-def state_on(model: Model, solution: Solution) -> ContactState:
+def state_on(model: Model, solution: SolvedProblem) -> ContactState:
     """Interpolate the contact state of a solution onto the contact nodes of a model.
 
     Parameters
     ----------
     model : Model
-    solution : Solution
-        On any mesh, coarse or fine, of a scene with the same contact parts.
+    solution : Solution or AssemblySolution
+        On any mesh, coarse or fine, of a scene with the same contacts.
 
     Returns
     -------
@@ -36,12 +36,12 @@ def state_on(model: Model, solution: Solution) -> ContactState:
         "sigma_n": units.stress,
         "sigma_t": units.stress,
     }
-    parts, arc_length = model.contact.parts, model.contact.arc_length
+    parts, arc_length = model.prepared.names, model.prepared.column("arc_length")
     values = {name: np.zeros(len(parts)) for name in scales}
     for part in dict.fromkeys(parts):
         known = np.flatnonzero(table.rows(part))
         if not known.size:
-            raise InputError(f"the start has no contact part {part!r}: it has {', '.join(table.parts)}")
+            raise InputError(f"the start has no contact {part!r}: it has {', '.join(table.parts)}")
         own = np.flatnonzero(np.equal(parts, part))
         known = known[np.argsort(table.s[known])]
         for name, scale in scales.items():

@@ -209,6 +209,8 @@ class Assembly(Stated):
         super().__post_init__()
         if not self.bodies:
             raise InputError("bodies is empty: give at least one body")
+        for body in self.bodies:
+            body.check_name()
         names = [*(body.name for body in self.placed_bodies), *(body.name for body in self.rigid)]
         check_names("bodies", names, "bodies")
         laws = {f"law of contact {pair.name!r}": self.law_of(pair) for pair in self.contacts}
@@ -315,7 +317,7 @@ class Assembly(Stated):
         """Return the parts and sides of a placed body that contacts name."""
         return self._listed_parts.get(body, ())
 
-    def contact_parts(self, body: Body) -> tuple[str, ...]:
+    def touching_parts(self, body: Body) -> tuple[str, ...]:
         """Return the names of the parts and sides of a placed body that may touch other bodies."""
         listed = self.listed_parts(body.name)
         if self.touching is None:
@@ -341,7 +343,7 @@ class Assembly(Stated):
         key = (
             *(id(entry) for entry in stated),
             body.material,
-            self.contact_parts(body),
+            self.touching_parts(body),
             lines_across(body, self.symmetry),
         )
         if key not in self._scenes:
@@ -350,7 +352,7 @@ class Assembly(Stated):
 
     def _new_scene(self, body: Body) -> Scene:
         named = {part.name for part in body.parts}
-        facing = [body.contact_part(name) for name in self.contact_parts(body)]
+        facing = [body.contact_part(name) for name in self.touching_parts(body)]
         parts: tuple[Part, ...] = (*body.parts, *(part for part in facing if part.name not in named))
         touches_obstacle = any(isinstance(part.condition, Contact) for part in parts)
         try:

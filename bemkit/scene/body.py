@@ -24,6 +24,7 @@ from bemkit.scene.steps import check_names
 
 _ALONG = np.linspace(0.0, 1.0, 33)
 """Parameters of curves at which the extent of a body is taken."""
+_NAME = "the body name {name!r} does not do: give printable text without a dot"
 _ON_LINE = 1e-9
 """Share of its size by which a body that ends on a symmetry line may cross it by round-off."""
 
@@ -56,7 +57,7 @@ class Body:
     Raises
     ------
     InputError
-        If the name is empty or has a dot, two parts share a name, or the mesh options ask for an accuracy.
+        If the name has a dot, two parts share a name, or the mesh options ask for an accuracy.
     """
 
     name: str
@@ -70,12 +71,17 @@ class Body:
     mesh: MeshOptions | None = None
 
     def __post_init__(self) -> None:
-        if not self.name or not self.name.isprintable() or "." in self.name:
-            raise InputError(f"the body name {self.name!r} does not do: give printable text without a dot")
+        if not self.name.isprintable() or "." in self.name:
+            raise InputError(_NAME.format(name=self.name))
         check_objects(self, f"body {self.name!r}")
         check_names(f"body {self.name!r}", (part.name for part in self.parts), "parts")
         if self.mesh is not None and self.mesh.accuracy is not None:
             raise InputError(f"body {self.name!r}: an accuracy is that of all bodies: give it to the assembly")
+
+    def check_name(self) -> None:
+        """Raise InputError unless contacts can name the body; the only body of a scene needs no name."""
+        if not self.name:
+            raise InputError(_NAME.format(name=self.name))
 
     @property
     def is_held(self) -> bool:

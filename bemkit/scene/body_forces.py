@@ -4,16 +4,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 
 from bemkit.arrays import FloatArray
 from bemkit.errors import InputError
 from bemkit.formulas import ScalarField, check_field, evaluate_field
-
-if TYPE_CHECKING:
-    from bemkit.geometry.placement import Placement
+from bemkit.geometry.placement import Placement
 
 
 @dataclass(frozen=True)
@@ -124,7 +122,9 @@ BodyForce: TypeAlias = Gravity | Rotation | Heating
 
 
 def seen_from(force: BodyForce, placement: Placement) -> BodyForce:
-    """Return a body force in the coordinates of the shape of a placed body."""
+    """Return a body force in the coordinates of the shape of a placed body; the same where it was not moved."""
+    if placement == Placement():
+        return force
     match force:
         case Gravity(acceleration=acceleration):
             x, y = placement.turned_back(np.array(acceleration)).tolist()

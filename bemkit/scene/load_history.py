@@ -11,7 +11,7 @@ import math
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields, replace
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 from bemkit.arrays import FloatArray
 from bemkit.errors import InputError
@@ -19,15 +19,14 @@ from bemkit.formulas import Expression, ExpressionError, ScalarField
 from bemkit.scene.body_forces import scaled_body_force
 from bemkit.scene.conditions import with_fields
 from bemkit.scene.scene import Scene
-from bemkit.scene.steps import Step, TimeValue
+from bemkit.scene.steps import Stated, Step, TimeValue
 
 if TYPE_CHECKING:
-    from bemkit.scene.assembly import Assembly
     from bemkit.scene.body import Body
 
 _TIME, _COORDINATES = re.compile(r"\bt\b"), re.compile(r"\b[xy]\b")
 
-AnyScene = TypeVar("AnyScene", "Scene", "Assembly")
+AnyScene = TypeVar("AnyScene", bound=Stated)
 
 
 def load_steps(scene: AnyScene) -> tuple[AnyScene, ...]:
@@ -137,13 +136,15 @@ def with_scaled_loads(scene: AnyScene, factor: float) -> AnyScene:
     """
     if factor == 1.0 and scene.load_factors == (1.0,):
         return scene
-    if not isinstance(scene, Scene):
+    changes: dict[str, Any] = {"load_factors": (1.0,)}
+    if isinstance(scene, Scene):
+        changes |= _scaled(scene, factor, {})
+        changes["far"] = None if scene.far is None else scene.far.scaled(factor)
+    else:
         known: dict[int, Any] = {}
-        bodies = tuple(replace(body, **_scaled(body, factor, known)) for body in scene.bodies)
-        rigid = tuple(body.scaled(factor) for body in scene.rigid)
-        return replace(scene, bodies=bodies, rigid=rigid, load_factors=(1.0,))
-    far = None if scene.far is None else scene.far.scaled(factor)
-    return replace(scene, **_scaled(scene, factor, {}), far=far, load_factors=(1.0,))
+        changes["rigid"] = tuple(body.scaled(factor) for body in scene.rigid)
+        changes["bodies"] = tuple(replace(body, **_scaled(body, factor, known)) for body in cast(Any, scene).bodies)
+    return replace(scene, **changes)
 
 
 def _scaled(loaded: Scene | Body, factor: float, known: dict[int, Any]) -> dict[str, Any]:

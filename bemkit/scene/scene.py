@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -38,6 +39,7 @@ from bemkit.solvers.fallbacks import Fallbacks
 
 if TYPE_CHECKING:
     from bemkit.geometry.meshing.partition import Partition
+    from bemkit.scene.body import Body
 
 
 class NoContactError(InputError):
@@ -152,6 +154,18 @@ class Scene(Stated):
                 f"mesh.accuracy is {accuracy}: {self.discretisation.method} has no error estimate: choose the "
                 "discretisation 'quadratic' or 'linear', or give elements"
             )
+
+    @cached_property
+    def placed_bodies(self) -> tuple[Body, ...]:
+        """The only body, which has no name."""
+        from bemkit.scene.body import Body
+
+        body = Body(name="", shape=self.shape, material=self.material, parts=self.parts, body_forces=self.body_forces)
+        return (body,)
+
+    def scene_of(self, body: Body) -> Scene:
+        """Return the scene itself."""
+        return self
 
     @property
     def contact_parts(self) -> tuple[Part, ...]:

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 from types import MappingProxyType
-from typing import Any, TypeAlias
+from typing import TYPE_CHECKING, Any, ClassVar, Self, TypeAlias
 
 import numpy as np
 
@@ -16,6 +16,15 @@ from bemkit.contact.laws import FrictionLaw
 from bemkit.errors import InputError
 from bemkit.notebook import ShownInNotebooks
 from bemkit.scene.objects import check_objects
+
+if TYPE_CHECKING:
+    from bemkit.geometry.symmetry import Symmetry
+    from bemkit.operators.linear.solvers import LinearSolverChoice
+    from bemkit.scene.discretisation import Discretisation
+    from bemkit.scene.mesh_options import MeshOptions
+    from bemkit.scene.plane_motion import RigidBody
+    from bemkit.scene.unit_names import UnitNames
+    from bemkit.solvers.base import ContactSolver
 
 TimeValue: TypeAlias = float | str | Callable[[float], float]
 """A number, a formula in the time t, or a Python function of it."""
@@ -73,6 +82,54 @@ class Stated(ShownInNotebooks):
     title: str
     load_factors: tuple[float, ...]
     steps: tuple[Step, ...]
+
+    if TYPE_CHECKING:  # of both
+        __dataclass_fields__: ClassVar[dict[str, Any]]
+        law: FrictionLaw
+        discretisation: Discretisation
+        linear_solver: LinearSolverChoice
+        symmetry: Symmetry | None
+        mesh: MeshOptions
+        solver: ContactSolver
+        units: UnitNames | None
+
+        @property
+        def placed_bodies(self) -> tuple[Any, ...]:
+            """The elastic bodies, every copy a body of its own."""
+
+        def scene_of(self, body: Any) -> Any:
+            """Return the scene of one placed body, in which sides in contact with other bodies are free parts."""
+
+        def with_contacts(self, contacts: tuple[Any, ...]) -> Self:
+            """Return the scene with all its contacts listed."""
+
+    @property
+    def contacts(self) -> tuple[Any, ...]:
+        """The contacts of bodies with each other and with rigid bodies."""
+        return ()
+
+    @property
+    def touching(self) -> Any:
+        """How further contacts are found."""
+        return None
+
+    @property
+    def rigid(self) -> tuple[RigidBody, ...]:
+        """Obstacles that move."""
+        return ()
+
+    @property
+    def elastic_contacts(self) -> tuple[Any, ...]:
+        """The contacts that no rigid body takes part in."""
+        return ()
+
+    def listed_parts(self, body: str) -> tuple[str, ...]:
+        """Return the parts and sides of a placed body that contacts name."""
+        return ()
+
+    def touching_parts(self, body: Any) -> tuple[str, ...]:
+        """Return the names of the parts and sides of a placed body that may touch other bodies."""
+        return ()
 
     def __post_init__(self) -> None:
         check_objects(self)

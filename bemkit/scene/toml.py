@@ -20,6 +20,7 @@ from bemkit.scene.mesh_options import MeshOptions
 from bemkit.scene.registry import FILE_KINDS, RISING, SOLVERS
 from bemkit.scene.scene import Scene
 from bemkit.scene.serialisation import StructureError, UnstructureError, structure, unstructure
+from bemkit.scene.steps import Stated
 from bemkit.scene.unit_names import UnitNames
 from bemkit.solvers.base import ContactSolver
 from bemkit.solvers.fallbacks import Fallbacks
@@ -212,7 +213,7 @@ def _with_places_of_files(table: dict[str, Any], folder: Path | None, path: str)
     return located
 
 
-def scene_to_toml(scene: Scene | Assembly) -> str:
+def scene_to_toml(scene: Stated) -> str:
     """Write a scene as TOML text, without keys that have their default value.
 
     Returns
@@ -248,7 +249,7 @@ def scene_to_toml(scene: Scene | Assembly) -> str:
     return tomli_w.dumps(_ordered(table, _SCENE_KEYS), multiline_strings=True)
 
 
-AnyScene = TypeVar("AnyScene", bound="Scene | Assembly")
+AnyScene = TypeVar("AnyScene", bound=Stated)
 
 
 def with_overrides(
@@ -309,7 +310,7 @@ def with_overrides(
             changes["solver"] = _with_rho(changes.get("solver", scene.solver), rho)
         if not isinstance(scene, Scene):
             own: dict[str, Any] = {name: None for name in ("mesh", "discretisation") if name in changes}
-            changes["bodies"] = tuple(replace(body, **own) for body in scene.bodies)
+            changes["bodies"] = tuple(replace(body, **own) for body in cast(Any, scene).bodies)
         return replace(scene, **changes)
     except ValueError as error:
         raise SceneError(printable(str(error))) from error

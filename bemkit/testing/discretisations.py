@@ -117,7 +117,7 @@ def _check_contact(discretisation: Discretisation, name: str) -> None:
 
 
 def _solved(scene: Scene, name: str) -> Solution:
-    solution = run(scene)
+    solution: Solution = run(scene)
     demand(
         solution.is_converged, f"{name}: a block of {scene.mesh.elements} elements is not solved: {solution.message}"
     )

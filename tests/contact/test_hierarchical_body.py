@@ -15,7 +15,7 @@ from bemkit.contact.condensation.nodes import NoContactNodesError, contact_condi
 from bemkit.contact.conditions import separated, stick
 from bemkit.contact.problem import ContactProblem
 from bemkit.errors import InputError
-from bemkit.model.contact_model import Model, build_model
+from bemkit.model.model import Model, build_model
 from bemkit.model.prepared import prepare
 from bemkit.operators.hierarchy.compression import Compression
 from bemkit.operators.hierarchy.element_laws import ElementLaws
@@ -250,18 +250,19 @@ def test_a_free_body_is_singular() -> None:
 def test_contact_nodes_that_a_support_holds_move_in_its_frame(travel: float) -> None:
     """Five nodes slide along a line that is neither along the contact boundary nor across it."""
     model = model_of(in_both_ways(loose_block(), 240)[0])
-    prepared, elastic = model.prepared, model.elastic
+    prepared, (elastic,) = model.prepared, model.elastic
+    body_data, candidates = prepared.only, prepared.only.candidates
     assert isinstance(elastic, HierarchicalCollocation)
-    held = prepared.candidates.nodes.nodes[:5]
+    held = candidates.nodes.nodes[:5]
     across = np.broadcast_to([[0.6, 0.8]], (5, 1, 2))
     support = Support("guide", held, across, lambda x: np.full(x.shape, travel))
-    conditions, contact = contact_conditions(prepared.space, [support], prepared.candidates.nodes)
-    body = hierarchical_body(elastic, conditions, contact, prepared.force)
-    dense = condensed_body(elastic, conditions, contact, prepared.force)
+    conditions, contact = contact_conditions(body_data.own_space, [support], candidates.nodes)
+    body = hierarchical_body(elastic, conditions, contact, body_data.force)
+    dense = condensed_body(elastic, conditions, contact, body_data.force)
     np.testing.assert_array_equal(body.tangent_follows, dense.tangent_follows)
     assert body.tangent_follows.sum() == 5
-    law = prepared.scene.law_at(prepared.contact.parts, prepared.contact.points)
-    problems = [ContactProblem(each, prepared.contact.gap, law) for each in (body, dense)]
+    law = prepared.scene.law_at(candidates.parts, candidates.points)
+    problems = [ContactProblem(each, candidates.gap, law) for each in (body, dense)]
     ask = stick(0.01 * np.cos(np.arange(body.n_contact)), np.zeros(body.n_contact))
     opened = np.zeros((body.n_contact, 2), bool)
     opened[[3, 40]] = True

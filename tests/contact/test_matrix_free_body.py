@@ -10,7 +10,7 @@ import pytest
 import bemkit as bk
 from bemkit.contact.condensation.hierarchical_body import HierarchicalBody
 from bemkit.contact.conditions import stick
-from bemkit.model.contact_model import build_model
+from bemkit.model.model import build_model
 from bemkit.model.prepared import prepare
 from bemkit.operators.linear.solvers import DenseCholesky, MatrixFree
 from tests.contact.test_hierarchical_body import loose_block, tilted

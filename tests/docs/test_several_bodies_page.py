@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from bemkit import Assembly, Body, ContactPair, Placement, RigidBody, Touching, scene_from_toml
-from bemkit.model.assembled.prepared import prepare_assembly_steps
+from bemkit.model.prepared import prepare_steps
 from bemkit.scene import registry as kinds
 from bemkit.scene.toml import SceneError
 from tests.docs.pages import Row, blocks, plain, read, section, table
@@ -32,7 +32,7 @@ TABLES = {
 def test_every_example_can_be_prepared(text: str) -> None:
     scene = scene_from_toml(text)
     assert isinstance(scene, Assembly)
-    assert prepare_assembly_steps([scene])[0].n_contact > 0
+    assert prepare_steps([scene])[0].n_contact > 0
 
 
 @pytest.mark.parametrize(("text", "error"), [example for example in EXAMPLES if example[1]])

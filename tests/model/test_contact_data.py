@@ -10,7 +10,7 @@ import pytest
 
 import bemkit as bk
 from bemkit.model.contact_data import find_contact
-from bemkit.model.contact_model import Model, build_model
+from bemkit.model.model import Model, build_model
 from bemkit.model.prepared import prepare
 from bemkit.model.solved_contact import contact_warnings
 from bemkit.result_warning import ResultWarning
@@ -120,7 +120,9 @@ def test_a_smooth_floor_pushes_a_tilted_block_straight_up(degrees: float, discre
     )
     model = build_model(prepare(scene, scene.build_mesh()))
     result = solve(model.problem, scene.solver)
-    force = np.einsum("n,nk,nkc->c", model.nodes.weights, result.state.traction, model.nodes.frame)
+    force = np.einsum(
+        "n,nk,nkc->c", model.prepared.contact_nodes.weights, result.state.traction, model.prepared.contact_nodes.frame
+    )
     assert force[1] > 0.0
     assert abs(force[0]) <= 1e-14 * force[1]  # only round-off of the frames
     _, forces = model.body.recover(result.state)
@@ -206,8 +208,8 @@ def test_obstacles_may_turn_their_directions_from_step_to_step() -> None:
 def warnings_of(scene: bk.Scene) -> tuple[ResultWarning, ...]:
     model: Model = build_model(prepare(scene, scene.build_mesh()))
     result = solve(model.problem, scene.solver)
-    displacement, _, _ = model.boundary_fields(result.state)
-    return contact_warnings(model, displacement, result.node_status)
+    ((displacement, _, _),) = model.boundary_fields(result.state)
+    return contact_warnings(model, [displacement], result.node_status)
 
 
 def test_contact_at_a_large_angle_is_warned_of() -> None:

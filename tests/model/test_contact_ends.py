@@ -13,7 +13,7 @@ import pytest
 
 import bemkit as bk
 from bemkit.arrays import FloatArray
-from bemkit.model.contact_model import build_model
+from bemkit.model.model import build_model
 from bemkit.model.prepared import prepare
 from bemkit.reference import DiscBetweenPlates
 from bemkit.solvers.base import solve
@@ -135,8 +135,12 @@ def test_tangents_in_a_corner_follow_the_displacements_towards_both_obstacles(an
     model = build_model(prepare(scene, scene.build_mesh()))
     state = solve(model.problem, scene.solver).state
     displacement, _ = model.body.recover(state)
-    in_corner = np.flatnonzero(model.nodes.is_shared)
-    motion = np.einsum("nkc,nc->nk", model.nodes.frame[in_corner], displacement[model.nodes.nodes[in_corner]])
+    in_corner = np.flatnonzero(model.prepared.contact_nodes.is_shared)
+    motion = np.einsum(
+        "nkc,nc->nk",
+        model.prepared.contact_nodes.frame[in_corner],
+        displacement[model.prepared.contact_nodes.nodes[in_corner]],
+    )
     assert np.abs(motion).max() > 1e-3 * np.abs(displacement).max()
     np.testing.assert_allclose(state.displacement[in_corner], motion, atol=1e-12)
 

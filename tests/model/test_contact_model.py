@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import bemkit as bk
-from bemkit.model.units import find_units
+from bemkit.model.prepared import prepare
 from tests.slow import slow_except
 
 ELEMENTS = [bk.Galerkin(1), bk.ConstantCollocation()]
@@ -165,6 +165,6 @@ def test_the_unit_of_stress_is_that_of_the_largest_overlap():
         loaded = dataclasses.replace(plain, parts=(floor, load))
         mesh = loaded.build_mesh()
         # lengths in diameters of the unit square
-        units = find_units(loaded, mesh)
+        units = prepare(loaded, mesh).units
         strain = units.stress / units.modulus
         assert strain == pytest.approx(expected / mesh.diameter if gap < 0.0 else expected, rel=1e-12)

@@ -10,8 +10,8 @@ import pytest
 
 import bemkit as bk
 from bemkit.contact.solvability import UnsolvableLoad
-from bemkit.model.contact_model import build_model
 from bemkit.model.free_motion import describe
+from bemkit.model.model import build_model
 from bemkit.model.prepared import prepare
 from bemkit.runs.run import UnsolvableSceneError
 from tests.scene.test_load_history import block
@@ -139,12 +139,12 @@ def test_a_body_that_turns_about_the_only_node_that_touches_does_not_slide(node:
     """It neither lifts nor moves there, so that the motion along the obstacle is none."""
     scene = column(0.001, bk.Coulomb(0.3), bk.HalfPlane())
     model = build_model(prepare(scene, scene.build_mesh()))
-    arms = model.nodes.points - model.nodes.points[node]
+    arms = model.prepared.contact_nodes.points - model.prepared.contact_nodes.points[node]
     turn = np.stack([-arms[:, 1], arms[:, 0]], axis=1)
-    motion = np.einsum("nc,nkc->nk", turn, model.nodes.frame)
+    motion = np.einsum("nc,nkc->nk", turn, model.prepared.contact_nodes.frame)
     lift = np.where(np.arange(len(arms)) == node, 0.0, np.nan)
     escape = UnsolvableLoad(motion / np.abs(motion).max(), lift, work=1.0)
     assert not escape.is_sliding
-    x, y = model.units.to_physical(model.nodes.points[node])
+    x, y = model.units.to_physical(model.prepared.contact_nodes.points[node])
     assert abs(y) < 1e-15
     assert describe(model.prepared, escape).startswith(f"the load turns the body anticlockwise about ({x:.4g}, 0) with")

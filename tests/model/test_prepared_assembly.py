@@ -9,21 +9,21 @@ import numpy as np
 import bemkit as bk
 from bemkit.contact.further_laws import PiecewiseLaw
 from bemkit.contact.laws import Coulomb, LawOfCoefficients
-from bemkit.model.assembled.contact_tractions import ContactSpread
-from bemkit.model.assembled.prepared import prepare_assembly_steps
+from bemkit.model.contact_tractions import ContactSpread
+from bemkit.model.prepared import prepare_steps
 from bemkit.scene.load_history import load_steps
 from tests.runs.masonry import wall
 
 
 def test_contacts_of_equal_laws_have_one_and_laws_of_the_place_each_their_own() -> None:
     assembly = wall(2, 2, push=True)
-    prepared = prepare_assembly_steps([replace(assembly, load_factors=(1.0,))])[0]
+    prepared = prepare_steps([replace(assembly, load_factors=(1.0,))])[0]
     assert isinstance(prepared.law, Coulomb)
-    pairs = prepared.assembly.contacts
+    pairs = prepared.scene.contacts
     other, placed = Coulomb(0.1), Coulomb(lambda x, y: 0.2 + 0.0 * x)
     laws = [placed, other, placed, *(Coulomb(0.1) for _ in pairs[3:])]
     listed = tuple(replace(pair, law=law) for pair, law in zip(pairs, laws, strict=True))
-    mixed = prepare_assembly_steps([replace(assembly, touching=None, contacts=listed)])[0]
+    mixed = prepare_steps([replace(assembly, touching=None, contacts=listed)])[0]
     law = mixed.law
     assert isinstance(law, PiecewiseLaw)
     assert [each.is_uniform for each in law.laws if isinstance(each, LawOfCoefficients)] == [False, True, False, True]
@@ -33,12 +33,13 @@ def test_contacts_of_equal_laws_have_one_and_laws_of_the_place_each_their_own() 
 
 
 def test_forces_of_contacts_are_spread_alike_in_all_steps_of_a_history() -> None:
-    steps = prepare_assembly_steps(load_steps(replace(wall(2, 2, push=True), load_factors=(0.0, 1.0))))
+    steps = prepare_steps(load_steps(replace(wall(2, 2, push=True), load_factors=(0.0, 1.0))))
     known = steps[0].spread
-    following = steps[0].under(steps[1].assembly)
+    following = steps[0].under(steps[1].scene)
     assert following.spread is known
     anew = ContactSpread.of(following.bodies, following.rows)
-    np.testing.assert_array_equal(anew.by_force.toarray(), known.by_force.toarray())
+    for one, other in zip(anew.sides, known.sides, strict=True):
+        np.testing.assert_array_equal(one.by_force, other.by_force)
     # forces arrive whole: as many as there are on both sides, against each other
     forces = np.random.default_rng(0).normal(size=(following.n_contact, 2))
     sums = np.zeros((len(following.bodies), 2))
@@ -51,11 +52,11 @@ def test_forces_of_contacts_are_spread_alike_in_all_steps_of_a_history() -> None
 
 def test_a_law_that_a_later_step_changes_reaches_contacts_found_by_touching() -> None:
     steps = (bk.Step(1.0), bk.Step(2.0, {"law.friction_coefficient": 0.6}))
-    first, last = prepare_assembly_steps(load_steps(replace(bk.load_scene("masonry-arch"), steps=steps)))
+    first, last = prepare_steps(load_steps(replace(bk.load_scene("masonry-arch"), steps=steps)))
     assert first.law == bk.Coulomb(0.7)
     assert last.law == bk.Coulomb(0.6)
     own = (bk.Step(1.0), bk.Step(2.0, {"touching.law": {"kind": "coulomb", "friction_coefficient": 0.6}}))
-    _, last = prepare_assembly_steps(load_steps(replace(bk.load_scene("masonry-arch"), steps=own)))
+    _, last = prepare_steps(load_steps(replace(bk.load_scene("masonry-arch"), steps=own)))
     between = [rows.law for rows in last.rows if rows.other >= 0]
     assert between == [bk.Coulomb(0.6)] * len(between)
     assert between

@@ -1,10 +1,10 @@
 from bemkit.contact.joined.sparse_form import sparse_solver_name
-from bemkit.plan.assembly_plan import make_assembly_plan
+from bemkit.plan import make_plan
 from tests.runs.masonry import wall
 
 
 def _contact_line(courses, per_course):
-    items = {item.name: item for item in make_assembly_plan(wall(courses, per_course, push=False)).items}
+    items = {item.name: item for item in make_plan(wall(courses, per_course, push=False)).items}
     return items["contact system"].reason
 
 

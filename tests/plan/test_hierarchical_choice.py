@@ -29,7 +29,8 @@ def scene_of(n_elements: int, **changes: object) -> bk.Scene:
 
 
 def chosen(scene: bk.Scene) -> ChosenLinearSolver:
-    return prepare(scene, scene.build_mesh()).linear_solver
+    prepared = prepare(scene, scene.build_mesh())
+    return prepared.linear_solver(prepared.only)
 
 
 def test_large_bodies_are_compressed_and_small_ones_are_not() -> None:
@@ -93,7 +94,7 @@ def test_only_what_does_not_fit_otherwise_is_compressed_for_want_of_memory(monke
     monkeypatch.setattr(compiled, "is_installed", lambda: False)  # with numba 1000 elements are compressed anyhow
     scene = scene_of(1000)
     assert chosen(scene).hierarchical is None
-    monkeypatch.setattr("bemkit.model.prepared.physical_memory", lambda: 5e7)
+    monkeypatch.setattr("bemkit.model.given.physical_memory", lambda: 5e7)
     assert chosen(scene).hierarchical is not None
     assert "dense ones need about" in chosen(scene).reason
 

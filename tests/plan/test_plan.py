@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import re
 import tracemalloc
+from collections.abc import Sequence
 
 import pytest
 
@@ -237,13 +238,13 @@ def test_a_million_elements_are_refused_before_the_mesh_is_made(
     command: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     built: list[int | None] = []
-    build_mesh = bk.Scene.build_mesh
+    divided = bk.Scene.divided
 
-    def watched(scene: bk.Scene) -> bk.BoundaryMesh:
+    def watched(scene: bk.Scene, contact: Sequence[str]) -> bk.BoundaryMesh:
         built.append(scene.mesh.elements)
-        return build_mesh(scene)
+        return divided(scene, contact)
 
-    monkeypatch.setattr(bk.Scene, "build_mesh", watched)
+    monkeypatch.setattr(bk.Scene, "divided", watched)
     with pytest.raises(SystemExit, match="2"):
         main([command, "paper-1", "--elements", "1000000", "--degree", "3"])
     message = r"1000000 elements need about \S+ GB, there are \S+ GB: use at most \d+ elements"

@@ -10,8 +10,8 @@ import pytest
 
 import bemkit as bk
 from bemkit.errors import InputError
-from bemkit.model.assembled.contacts import OverlapError
-from bemkit.runs.adaptive import run_assembly_adaptive
+from bemkit.model.contacts import OverlapError
+from bemkit.runs.adaptive import run_adaptive
 from bemkit.runs.steps import UnsolvableSceneError
 from tests.slow import slow_except
 
@@ -209,7 +209,7 @@ def test_two_cylinders_are_those_of_hertz() -> None:
 
 def test_meshes_follow_the_solution_on_both_sides() -> None:
     assembly = replace(bk.load_scene("two-cylinders"), mesh=bk.MeshOptions(accuracy=0.02))
-    solutions = run_assembly_adaptive(assembly)
+    solutions = run_adaptive(assembly)
     assert len(solutions) > 1
     for body in solutions[-1].bodies.values():
         near = np.abs(body.mesh.centres[:, 0]) < 0.05
@@ -338,7 +338,7 @@ def test_steps_follow_each_other_and_slip_is_remembered() -> None:
         sides = tuple(replace(part, condition=bk.Traction(0.0, np.sign(part.condition.y) * shear)) for part in free)
         return replace(pressed, bodies=(pressed.bodies[0], replace(upper, parts=(load, *sides))))
 
-    steps = bk.run_assembly_history([under(0.0), under(0.1), under(SHEAR)])
+    steps = bk.run_history([under(0.0), under(0.1), under(SHEAR)])
     assert [step.is_converged for step in steps] == [True] * 3
     assert steps[0].contacts[0].force_tangential == pytest.approx(0.0, abs=1e-12)
     assert steps[1].contacts[0].force_tangential == pytest.approx(-0.1, rel=1e-10)
@@ -391,10 +391,12 @@ def test_an_interference_that_is_given_is_pressed_together() -> None:
 
 
 def test_what_goes_with_one_body_alone_is_refused() -> None:
-    with pytest.raises(bk.InputError, match="mesh is given with an assembly of several bodies: remove it"):
+    with pytest.raises(bk.InputError, match="mesh is given for 2 bodies: give a mesh for each by its name"):
         bk.run(patch(1), mesh=bk.discretise(bk.Rectangle(1.0, 1.0).outline(), n_elements=8))  # type: ignore[call-overload]
-    with pytest.raises(bk.InputError, match="assemblies is empty"):
-        bk.run_assembly_history([])
+    with pytest.raises(bk.InputError, match="mesh names 'cake': the bodies are "):
+        bk.run(patch(1), mesh={"cake": bk.discretise(bk.Rectangle(1.0, 1.0).outline(), n_elements=8)})
+    with pytest.raises(bk.InputError, match="scenes is empty"):
+        bk.run_history([])
     with pytest.raises(bk.InputError, match="no two bodies are in contact: list contacts"):
         bk.run(replace(patch(1), contacts=()))
 

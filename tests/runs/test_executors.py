@@ -15,9 +15,9 @@ import numpy as np
 import pytest
 
 import bemkit as bk
-from bemkit.model.assembled.shapes import NotSentError
-from bemkit.model.contact_model import build_model
+from bemkit.model.model import build_model
 from bemkit.model.prepared import prepare
+from bemkit.model.shapes import NotSentError
 from bemkit.operators.linear.dense import SingularMatrixError
 
 SAME = 1e-9
@@ -99,14 +99,13 @@ def test_a_cluster_gives_the_same() -> None:
         ("paper-1", {"discretisation": bk.Galerkin(1)}),
         ("paper-1", {"discretisation": bk.ConstantCollocation()}),
         ("gravity-column", {}),
-        ("cylinder-on-half-plane", {}),
     ],
 )
 def test_condensed_bodies_can_be_sent(name: str, changes: Any) -> None:
     scene = bk.load_scene(name)
     scene = replace(scene, mesh=replace(scene.mesh, elements=24, accuracy=None, density={}), **changes)
     model = build_model(prepare(scene, scene.build_mesh()))
-    condensed = model.elastic.condense(model.prepared.conditions, model.prepared.force)
+    condensed = model.elastic[0].condense(model.prepared.only.conditions, model.prepared.only.force)
     sent = pickle.loads(pickle.dumps(condensed))
     displacement = np.linspace(-1.0, 1.0, len(condensed.load))
     force, fixed = condensed.recover(displacement)[1], np.zeros_like(condensed.recover(displacement)[0])
@@ -133,9 +132,12 @@ class Counted(Executor):
         return future
 
 
-def test_one_body_takes_no_executor(processes: Executor) -> None:
-    with pytest.raises(bk.InputError, match="executor is given with one body, which is a single piece of work"):
-        bk.run(bk.load_scene("paper-1"), executor=processes)  # type: ignore[call-overload]
+def test_one_body_is_condensed_elsewhere_or_not_at_all(processes: Executor) -> None:
+    scene = replace(bk.load_scene("paper-1"), mesh=bk.MeshOptions(elements=48))
+    here, there = bk.run(scene), bk.run(scene, executor=processes)
+    np.testing.assert_allclose(here.contact.sigma_n, there.contact.sigma_n, rtol=1e-13)
+    with pytest.raises(bk.InputError, match="the only body is not condensed onto contact nodes: remove it"):
+        bk.run(bk.load_scene("bending"), executor=processes)
 
 
 class Fading(bk.Galerkin):

@@ -10,7 +10,7 @@ import pytest
 
 import bemkit as bk
 from bemkit.contact.further_laws import SlipWeakening
-from bemkit.model.contact_model import build_model
+from bemkit.model.model import build_model
 from bemkit.model.prepared import prepare_steps
 from bemkit.results.load_history import LoadHistory, StepWork
 from bemkit.runs import load_path

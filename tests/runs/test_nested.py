@@ -10,7 +10,7 @@ import pytest
 
 import bemkit as bk
 from bemkit.cli.main import main
-from bemkit.model.contact_model import build_model
+from bemkit.model.model import build_model
 from bemkit.model.prepared import prepare
 from bemkit.runs.nested import run_cascade
 from bemkit.runs.warm_start import state_on
@@ -62,7 +62,7 @@ def test_interpolation_keeps_fields_and_units() -> None:
     solution = bk.run(scene)
     model = build_model(prepare(example(1, "constant", 240), example(1, "constant", 240).build_mesh()))
     state = state_on(model, solution)
-    x = model.units.to_physical(model.nodes.points)[:, 0]
+    x = model.units.to_physical(model.prepared.contact_nodes.points)[:, 0]
     contact = solution.contact
     np.testing.assert_allclose(state.u_n * model.units.displacement, np.interp(x, contact.x, contact.u_n), rtol=1e-9)
     np.testing.assert_allclose(state.sigma_t * model.units.stress, np.interp(x, contact.x, contact.sigma_t), atol=1e-12)
@@ -71,7 +71,7 @@ def test_interpolation_keeps_fields_and_units() -> None:
 
 def test_starts_need_the_same_parts() -> None:
     solution = bk.run(example(1, "linear", 40))
-    with pytest.raises(ValueError, match="the start has no contact part 'floor': it has foundation"):
+    with pytest.raises(ValueError, match="the start has no contact 'floor': it has foundation"):
         bk.run(block(), start=solution)
 
 

@@ -10,13 +10,13 @@ import pytest
 
 import bemkit as bk
 from bemkit.cli.console import print_summary
-from bemkit.model.assembled.contacts import OverlapError
-from bemkit.model.assembled.model import build_assembled_model
-from bemkit.model.assembled.prepared import prepare_assembly_steps
+from bemkit.model.contacts import OverlapError
+from bemkit.model.model import build_model
+from bemkit.model.prepared import prepare_steps
 from bemkit.pictures import draw_deformation
 from bemkit.results.assembly_solution import AssemblySolution
 from bemkit.results.tables import to_json
-from bemkit.runs.adaptive import run_assembly_adaptive
+from bemkit.runs.adaptive import run_adaptive
 from bemkit.runs.steps import UnsolvableSceneError
 from bemkit.solvers.base import solve
 from tests.slow import slow_except
@@ -172,7 +172,7 @@ def test_a_disc_that_contact_alone_holds_rests_between_two_blocks() -> None:
     assert solution.rigid["disc"].force_y == pytest.approx(-weight, rel=1e-10)
     weightless = solved(replace(stack, rigid=(replace(disc, force_y=0.0),)))
     assert weightless.certificate.force_imbalance < 1e-12  # though nothing remains of the forces on the disc
-    model = build_assembled_model(prepare_assembly_steps([stack])[0])
+    model = build_model(prepare_steps([stack])[0])
     dense, sparse = (
         solve(replace(model.problem, body=replace(model.body, is_dense=is_dense)), stack.solver).state.traction
         for is_dense in (True, False)
@@ -227,10 +227,10 @@ def test_a_given_motion_is_felt_like_that_of_a_support() -> None:
 def test_a_turning_disc_drags_each_node_by_its_radius() -> None:
     """Whatever the gap: what a node may touch is a point of the disc, at the end of the gap."""
     disc = bk.RigidBody(name="punch", obstacle=bk.Circle((1.0, 1.6), 0.5), centre=(1.0, 1.6), turn=0.01)
-    (rows,) = prepare_assembly_steps([replace(PRESSED, rigid=(disc,), law=SOME)])[0].rows
+    (rows,) = prepare_steps([replace(PRESSED, rigid=(disc,), law=SOME)])[0].rows
     assert np.ptp(rows.gap) > 0.1
-    assert isinstance(rows.on_other, np.ndarray)
-    dragged = np.einsum("nkc,ncm,m->nk", rows.frame, rows.on_other, disc.motion)
+    assert rows.motions is not None
+    dragged = np.einsum("nkc,ncm,m->nk", rows.frame, rows.motions, disc.motion)
     # tangents (-d_y, d_x) of directions d towards the centre run the other way round
     np.testing.assert_allclose(dragged, np.broadcast_to([0.0, -0.01 * 0.5], dragged.shape), atol=1e-16)
 
@@ -327,7 +327,7 @@ def test_a_side_between_an_elastic_and_a_rigid_body_passes_on_both_tractions() -
 def test_steps_of_motions_and_forces_follow_each_other() -> None:
     """Down by force, sideways by motion, and back beyond the start: friction remembers."""
     steps = [replace(driven(x=x), law=SOME) for x in (0.0, 1e-3, 1e-2, -1e-2)]
-    solutions = bk.run_assembly_history(steps)
+    solutions = bk.run_history(steps)
     assert [one.is_converged for one in solutions] == [True] * 4
     forces = [one.rigid["punch"].force_x for one in solutions]
     assert abs(forces[0]) < 1e-12
@@ -335,14 +335,14 @@ def test_steps_of_motions_and_forces_follow_each_other() -> None:
     # all slips one way, then the other
     assert (forces[2], forces[3]) == pytest.approx((0.3 * FORCE, -0.3 * FORCE), rel=1e-10)
     assert [one.rigid["punch"].force_y for one in solutions] == pytest.approx([-FORCE] * 4, rel=1e-10)
-    pushed = bk.run_assembly_history([driven(), driven(force_y=-2.0 * FORCE)])
+    pushed = bk.run_history([driven(), driven(force_y=-2.0 * FORCE)])
     assert pushed[1].rigid["punch"].y == pytest.approx(2.0 * pushed[0].rigid["punch"].y, rel=1e-10)
     with pytest.raises(bk.InputError, match="rigid body 'punch' changes its shape, its place or what is given of it"):
-        bk.run_assembly_history([driven(), driven(force_y=None, y=-1e-3)])
+        bk.run_history([driven(), driven(force_y=None, y=-1e-3)])
     more, pair = bk.RigidBody(name="more", obstacle=bk.HalfPlane()), bk.ContactPair(("block.left", "more"))
     longer = replace(PRESSED, rigid=(PUNCH, more), contacts=(*PRESSED.contacts, pair))
     with pytest.raises(bk.InputError, match="rigid body 'more' changes its shape"):
-        bk.run_assembly_history([driven(), longer])
+        bk.run_history([driven(), longer])
 
 
 def test_load_factors_scale_motions_and_forces() -> None:
@@ -381,7 +381,7 @@ def test_forces_and_motions_set_the_units(scale: float) -> None:
 def test_the_unit_of_stress_is_that_of_the_largest_force_or_motion(
     changes: dict[str, float | None], expected: float
 ) -> None:
-    units = prepare_assembly_steps([driven(**changes)])[0].units
+    units = prepare_steps([driven(**changes)])[0].units
     assert units.length == pytest.approx(np.sqrt(5.0), rel=1e-12)
     assert units.stress == pytest.approx(expected, rel=1e-12)
 
@@ -412,7 +412,7 @@ def test_meshes_follow_the_solution_under_a_rigid_body() -> None:
     roll = replace(PUNCH, obstacle=bk.Circle((1.0, 2.0), 1.0))
     block = replace(BLOCK, mesh=None)
     assembly = replace(PRESSED, bodies=(block,), rigid=(roll,), mesh=bk.MeshOptions(accuracy=0.03))
-    last = run_assembly_adaptive(assembly)[-1]
+    last = run_adaptive(assembly)[-1]
     assert last.is_converged
     mesh = last.bodies["block"].mesh
     is_near = np.hypot(*(mesh.centres - [1.0, 1.0]).T) < 0.1

@@ -13,7 +13,7 @@ import bemkit as bk
 import bemkit.runs.adaptive
 from bemkit.geometry.meshing.partition import STEEPEST, better_partition
 from bemkit.reference import DiscBetweenPlates
-from bemkit.runs.adaptive import _SceneRefinement, run_adaptive
+from bemkit.runs.adaptive import _Refinement, run_adaptive
 from bemkit.runs.density import DensityMeshes
 from bemkit.runs.earlier_steps import EarlierSteps
 from bemkit.runs.mesh_sequence import Level
@@ -110,11 +110,11 @@ def test_a_mesh_that_is_accurate_enough_is_the_best_one() -> None:
     """Whatever the first look, whose zones end inside of elements, says of its own error."""
     coarse, fine = adapted(1, "quadratic", 1e-2)
 
-    class Refinement(_SceneRefinement):
+    class Refinement(_Refinement):
         def error(self, solution: bk.Solution) -> float:
             return 1e-3 if solution is coarse else 5e-3
 
-    refinement = Refinement(DensityMeshes(accuracy=1e-2), None, EarlierSteps())
+    refinement = Refinement(DensityMeshes(accuracy=1e-2), None, EarlierSteps(), None)
     assert _best_last((coarse, fine), "", 1e-2, refinement)[-1].n_elements == fine.n_elements
     assert _best_last((coarse, fine), "an obstacle", 1e-2, refinement)[-1].n_elements == coarse.n_elements
 
@@ -173,13 +173,13 @@ def test_times_and_solves_are_those_of_all_meshes() -> None:
 def test_a_finer_mesh_that_fails_leaves_the_result_of_the_coarser_one(monkeypatch: pytest.MonkeyPatch) -> None:
     scene = paper(1, mesh=bk.MeshOptions(accuracy=1e-3))
 
-    solved = _SceneRefinement.solved
+    solved = _Refinement.solved
 
     def failing(refinement: Any, level: Level, start: bk.Solution | None) -> bk.Solution:
         solution = solved(refinement, level, start)
         return solution if level.n_elements < 100 else dataclasses.replace(solution, status=bk.Status.STALLED)
 
-    monkeypatch.setattr(_SceneRefinement, "solved", failing)
+    monkeypatch.setattr(_Refinement, "solved", failing)
     failed, best = run_adaptive(scene)
     assert failed.status is bk.Status.STALLED
     assert best.status is bk.Status.ACCURACY_NOT_REACHED
@@ -188,7 +188,7 @@ def test_a_finer_mesh_that_fails_leaves_the_result_of_the_coarser_one(monkeypatc
 
 
 def test_a_start_that_leads_nowhere_is_left_for_a_cold_one(monkeypatch: pytest.MonkeyPatch) -> None:
-    def failing(scene: bk.Scene, mesh: bk.BoundaryMesh, start: bk.Solution | None, callback: Any) -> bk.Solution:
+    def failing(scene: bk.Scene, mesh: bk.BoundaryMesh, start: bk.Solution | None, *_: Any) -> bk.Solution:
         solution = bk.run(scene, mesh=mesh, start=start)
         return solution if start is None else dataclasses.replace(solution, status=bk.Status.STALLED)
 
@@ -197,7 +197,7 @@ def test_a_start_that_leads_nowhere_is_left_for_a_cold_one(monkeypatch: pytest.M
 
 
 def test_a_finer_mesh_that_is_refused_loses_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
-    def refusing(scene: bk.Scene, mesh: bk.BoundaryMesh, start: bk.Solution | None, callback: Any) -> bk.Solution:
+    def refusing(scene: bk.Scene, mesh: bk.BoundaryMesh, start: bk.Solution | None, *_: Any) -> bk.Solution:
         if start is not None:
             raise bk.InputError("no memory left")
         return bk.run(scene, mesh=mesh)
@@ -255,7 +255,7 @@ def test_scene_files_hold_the_accuracy() -> None:
 def test_the_time_of_the_next_mesh_follows_from_the_plans() -> None:
     """Ten times the elements take longer, but not a thousand times: small meshes cost more than dense algebra."""
     meshes = DensityMeshes(accuracy=1e-3)
-    refinement = _SceneRefinement(meshes, None, EarlierSteps())
+    refinement = _Refinement(meshes, None, EarlierSteps(), None)
     level = Level.first(paper(1, bk.Galerkin(1), bk.MeshOptions(accuracy=1e-3)))
     solution = bk.run(level.scene, mesh=level.partition.mesh)
     assert refinement.expected_seconds(level, solution, 1.0) == pytest.approx(1.0)

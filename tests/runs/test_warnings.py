@@ -57,7 +57,7 @@ def test_doubts_about_meshes_are_found_when_asked_for(monkeypatch: pytest.Monkey
         asked.append(solution.n_elements)
         return find_warnings(solution)
 
-    monkeypatch.setattr("bemkit.runs.history.find_warnings", counted)
+    monkeypatch.setattr("bemkit.runs.solution_of.find_warnings", counted)
     first, last = run_adaptive(paper(1, bk.Galerkin(2), MeshOptions(accuracy=2e-3, rising_degrees=True)))
     assert asked == []
     assert first.warnings == find_warnings(first)

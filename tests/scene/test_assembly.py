@@ -55,7 +55,7 @@ BLOCKS = Assembly(title="Two blocks", bodies=(LOWER, SMALL), contacts=(PAIR,))
 def test_sides_in_contact_are_free_parts_of_the_scene_of_a_body() -> None:
     scene = BLOCKS.scene_of(SMALL)
     assert [(part.name, type(part.condition)) for part in scene.parts] == [("load", Pressure), ("bottom", Free)]
-    assert BLOCKS.contact_parts(LOWER) == ("top",)
+    assert BLOCKS.touching_parts(LOWER) == ("top",)
 
 
 def test_copies_stand_in_a_grid_around_a_centre_or_in_a_list() -> None:
@@ -182,7 +182,10 @@ def test_what_does_not_fit_together_is_named(change: dict[str, object], message:
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: replace(LOWER, name=""), "the body name '' does not do: give printable text without a dot"),
+        (
+            lambda: replace(BLOCKS, bodies=(replace(LOWER, name=""),)),
+            "the body name '' does not do: give printable text without a dot",
+        ),
         (lambda: replace(LOWER, name="a.b"), "the body name 'a.b' does not do"),
         (lambda: replace(LOWER, parts=LOWER.parts * 2), "body 'lower': 'base' is the name of two parts"),
         (lambda: replace(LOWER, mesh=MeshOptions(accuracy=1e-3)), "body 'lower': an accuracy is that of all bodies"),

@@ -9,7 +9,7 @@ import pytest
 
 import bemkit as bk
 from bemkit.contact.further_laws import PiecewiseLaw
-from bemkit.model.contact_model import build_model
+from bemkit.model.model import build_model
 from bemkit.model.prepared import prepare
 from bemkit.scene.toml import SceneError, scene_from_toml, scene_to_toml, shipped_files
 from tests.scene.test_load_history import block
@@ -52,7 +52,7 @@ def test_each_part_may_have_its_own_law() -> None:
     scene = scene_from_toml(PAPER_1.replace(WALL, condition))
     assert scene_from_toml(scene_to_toml(scene)).parts[1].condition.law.friction_coefficient == 0.1
     model = build_model(prepare(scene, scene.build_mesh()))
-    parts = model.contact.parts
+    parts = model.prepared.names
     assert isinstance(model.problem.law, PiecewiseLaw)
     expected = np.where(np.array(parts) == "foundation", 0.5, 0.1)
     np.testing.assert_array_equal(model.problem.friction_bound(np.full(len(parts), -1.0)), expected)

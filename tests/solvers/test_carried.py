@@ -13,7 +13,7 @@ import bemkit as bk
 from bemkit.contact.equilibrium import NOISE_FACTOR, Unbalanced
 from bemkit.contact.laws import Coulomb, Frictionless
 from bemkit.contact.problem import ContactState
-from bemkit.model.contact_model import build_model
+from bemkit.model.model import build_model
 from bemkit.model.prepared import prepare
 from bemkit.solvers.newton import carried_on
 from bemkit.testing.independent_check import violations_of_body

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from bemkit.contact import projection
 from bemkit.contact.laws import Coulomb, Tresca
 from bemkit.contact.problem import ContactProblem, ContactState
-from bemkit.model.contact_model import build_model
+from bemkit.model.model import build_model
 from bemkit.model.prepared import prepare
 from bemkit.solvers import active_sets
 from bemkit.solvers.active_sets import ProjectionEquations

@@ -9,7 +9,7 @@ import bemkit as bk
 from bemkit.contact.body import ContactState, LinearBody
 from bemkit.contact.equilibrium import Imbalance
 from bemkit.contact.problem import ContactProblem, DenseBody
-from bemkit.model.contact_model import build_model
+from bemkit.model.model import build_model
 from bemkit.model.prepared import prepare
 from bemkit.testing import CheckFailed, check_body
 from tests.contact.test_following_tangents import SCENES
@@ -35,8 +35,8 @@ def test_a_body_with_another_load():
 def test_bodies_of_scenes(name, discretisation):
     scene = replace(SCENES[name](), discretisation=discretisation)
     model = build_model(prepare(scene, scene.build_mesh()))
-    nodes, space = model.body.conditions.displacement, model.elastic.displacement_space
-    reloaded = model.body.under(0.5 * nodes, np.ones((space.n_dofs // 2, 2)))
+    nodes, (elastic,) = model.body.conditions.displacement, model.elastic
+    reloaded = model.body.under(0.5 * nodes, np.ones((elastic.displacement_space.n_dofs // 2, 2)))
     check_body(model.body, is_symmetric=isinstance(discretisation, bk.Galerkin), reloaded=reloaded)
 
 

@@ -126,12 +126,7 @@ def contact_conditions(
     motion = np.where(conditions.is_fixed[candidates.nodes][:, :, None], 0.0, conditions.frame[candidates.nodes])
     approach = np.abs(np.einsum("nkc,nc->nk", motion, candidates.directions)).max(axis=1)
     contact = candidates.take(approach > APPROACH_TOLERANCE)
-    # the frame of a node is that of contact, unless a support or the first of two obstacles has given it another one
-    frame, is_retained = conditions.frame.copy(), conditions.is_retained.copy()
-    is_own = ~held_nodes(conditions, contact) & ~contact.is_second
-    frame[contact.nodes[is_own]] = contact.frame[is_own]
-    is_retained[contact.nodes] = ~conditions.is_fixed[contact.nodes]
-    return replace(conditions, frame=frame, is_retained=is_retained), contact
+    return opened(conditions, contact), contact
 
 
 def held_nodes(conditions: NodalConditions, contact: ContactNodes) -> BoolArray:
@@ -146,6 +141,18 @@ def following_tangents(conditions: NodalConditions, contact: ContactNodes) -> Bo
     obstacles from the displacements towards both.
     """
     return held_nodes(conditions, contact) | contact.is_shared
+
+
+def opened(conditions: NodalConditions, contact: ContactNodes) -> NodalConditions:
+    """Turn the frames of contact nodes into the directions of contact, and retain what no support fixes there.
+
+    The frame of a node is that of contact, unless a support or the first of two obstacles has given it another one.
+    """
+    frame, is_retained = conditions.frame.copy(), conditions.is_retained.copy()
+    is_own = ~held_nodes(conditions, contact) & ~contact.is_second
+    frame[contact.nodes[is_own]] = contact.frame[is_own]
+    is_retained[contact.nodes] = ~conditions.is_fixed[contact.nodes]
+    return replace(conditions, frame=frame, is_retained=is_retained)
 
 
 def free_motions(conditions: NodalConditions, contact: ContactNodes, space: BoundarySpace) -> FloatArray:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -13,7 +14,6 @@ from bemkit.geometry.neighbours import break_nodes
 from bemkit.results.solved_problem import SolvedProblem
 from bemkit.scene.assembly import Assembly
 from bemkit.scene.conditions import Contact, Part
-from bemkit.scene.load_history import AnyScene
 from bemkit.scene.scene import Scene
 from bemkit.scene.transform import AffineMap, transformed_scene
 from bemkit.studies.stability.similar_assembly import AssemblySimilarity
@@ -36,7 +36,7 @@ def precision_elsewhere(solution: SolvedProblem, distance: float) -> float:
     return PRECISION + 4.0 * np.finfo(float).eps * distance * loss
 
 
-def with_friction(scene: AnyScene, coefficient: float) -> AnyScene:
+def with_friction(scene: Any, coefficient: float) -> Any:
     """Return a scene or an assembly with one friction coefficient, and no laws of single contacts."""
 
     def parts(own: Sequence[Part]) -> tuple[Part, ...]:

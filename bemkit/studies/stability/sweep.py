@@ -10,7 +10,7 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from bemkit.errors import BemkitError, InputError
-from bemkit.model.contact_model import build_model
+from bemkit.model.model import build_model
 from bemkit.model.prepared import prepare
 from bemkit.operators.linear.threads import blas_threads_for
 from bemkit.results.assembly_solution import AssemblySolution
@@ -195,10 +195,11 @@ def condition_number(scene: Scene | Assembly, case: Case) -> float:
         return math.nan
     mesh = case.mesh(scene)
     with blas_threads_for(2 * mesh.n_elements):
-        body = build_model(prepare(scene, mesh)).body
-        if body.condensed is None:
+        model = build_model(prepare(scene, mesh))
+        body, condensed = model.body, model.condensed_map(0)
+        if condensed is None:
             return math.nan
-        stiffness = body.condensed.stiffness
+        stiffness = condensed.stiffness
         diagonal = np.abs(np.diagonal(stiffness))
         scale = 1.0 / np.sqrt(np.where(diagonal > 0.0, diagonal, 1.0))
         singular = np.linalg.svd(scale[:, None] * stiffness * scale, compute_uv=False)

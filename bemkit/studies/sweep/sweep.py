@@ -130,14 +130,13 @@ def sweep_tasks(
     for values in scenes:
         of_body = tuple(value for key, value in zip(keys, values, strict=True) if not key.keeps_bodies)
         groups.setdefault(of_body, []).append(values)
-    has_one_load = all(key.is_of_law for key in keys if key.keeps_bodies)
     tasks = []
     for of_body, rows in groups.items():
         shared = [scenes[values] for values in rows]
         # a single scene shares nothing, nor do meshes that follow each solution
         body = None
         if len(rows) > 1 and shared[0].mesh.accuracy is None:
-            body = SharedBody(shared, has_one_load=has_one_load, starts_cold=cold)
+            body = SharedBody(shared, starts_cold=cold)
         left = [values for values in rows if values not in finished]
         for values in rows:
             solve = partial(run if body is None else body.run, scenes[values])

@@ -12,7 +12,7 @@ import numpy as np
 from bemkit.contact.laws import Coulomb
 from bemkit.results.assembly_solution import AssemblySolution
 from bemkit.results.solution import Solution
-from bemkit.runs.assembly import run_assembly_history
+from bemkit.runs.history import run_history
 from bemkit.runs.run import run
 from bemkit.runs.steps import UnsolvableSceneError
 from bemkit.scene.assembly import Assembly
@@ -28,7 +28,7 @@ Solve: TypeAlias = Callable[[float], Solution | AssemblySolution]
 def at_resolution(scene: Scene | Assembly, degree: Literal["hp"] | None = None) -> Solve:
     """Return what solves a scene with a number of elements, or to an accuracy, which is less than one."""
 
-    def solve(resolution: float) -> Solution | AssemblySolution:
+    def solve(resolution: float) -> Any:
         if resolution < 1.0:
             return run(with_overrides(scene, accuracy=resolution, degree=degree))
         return run(with_overrides(scene, elements=int(resolution)))
@@ -39,7 +39,7 @@ def at_resolution(scene: Scene | Assembly, degree: Literal["hp"] | None = None) 
 def _unmatched(scene: Assembly) -> Solve:
     """Divide the second body into 1.7 times as many elements as the first."""
 
-    def solve(n: float) -> AssemblySolution:
+    def solve(n: float) -> Any:
         meshes = (MeshOptions(elements=int(n)), MeshOptions(elements=int(1.7 * n)))
         bodies = tuple(replace(body, mesh=mesh) for body, mesh in zip(scene.bodies, meshes, strict=True))
         return run(replace(scene, bodies=bodies))
@@ -56,11 +56,11 @@ def _pressed_then_sheared(scene: Assembly) -> Solve:
         pushed = replace(upper.parts[0], condition=PrescribedDisplacement(shift, -0.0022))
         return replace(scene, bodies=(replace(upper, parts=(pushed, *upper.parts[1:])), lower))
 
-    def solve(accuracy: float) -> AssemblySolution:
+    def solve(accuracy: float) -> Any:
         fitted = run(with_overrides(under(0.0008), accuracy=accuracy))
         meshes = {name: body.mesh for name, body in fitted.bodies.items()}
         steps = [with_overrides(under(shift), elements=100) for shift in (0.0, 0.0008)]
-        return run_assembly_history(steps, meshes=meshes)[-1]
+        return run_history(steps, mesh=meshes)[-1]
 
     return solve
 
@@ -95,7 +95,8 @@ def _least_friction(scene: Assembly) -> Solve:
     """Halve a range of the friction coefficient until the arch is known to fall just below the one that is returned."""
 
     def solve(n: float) -> AssemblySolution:
-        known, least, most = None, 0.3, 0.33
+        known: AssemblySolution | None = None
+        least, most = 0.3, 0.33
         while most - least > 3e-5 or known is None:
             friction = 0.5 * (least + most)
             try:

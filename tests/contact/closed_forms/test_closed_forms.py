@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import bemkit as bk
-from bemkit.model.contact_model import build_model
+from bemkit.model.model import build_model
 from bemkit.model.prepared import prepare
 from bemkit.solvers.alm import BoundUpdate
 from bemkit.solvers.lemke import LemkePivoting
@@ -175,5 +175,7 @@ def test_the_tie_on_the_whole_body_ends_whatever_the_driver() -> None:
         solution = bk.solve(model.problem, driver, throw=False)
         assert solution.is_converged or solution.status is bk.Status.STALLED
         if solution.is_converged:
-            force = model.nodes.weights @ solution.state.sigma_t * model.units.stress * model.units.length
+            force = (
+                model.prepared.contact_nodes.weights @ solution.state.sigma_t * model.units.stress * model.units.length
+            )
             assert force == pytest.approx(-0.25, rel=1e-6)

@@ -11,7 +11,7 @@ import bemkit as bk
 from bemkit.contact.body import ContactState, SingularResponse
 from bemkit.contact.conditions import LinearConditions, separated
 from bemkit.contact.half_plane.periodic_body import PeriodicBody
-from bemkit.model.contact_model import build_model
+from bemkit.model.model import build_model
 from bemkit.model.prepared import prepare
 from bemkit.operators.half_plane.flexibility import mean_logarithms
 from bemkit.operators.half_plane.periodic import PeriodicElasticity, wave_flexibility

@@ -10,7 +10,7 @@ import pytest
 
 import bemkit as bk
 from bemkit.contact.condensation.direct_body import DirectBody
-from bemkit.model.contact_model import build_model
+from bemkit.model.model import build_model
 from bemkit.model.prepared import Prepared, prepare
 from bemkit.operators.hierarchy.system import HierarchicalSystem
 from bemkit.operators.linear.solvers import DenseCholesky, Hierarchical
@@ -46,10 +46,11 @@ SCENES = {
 @pytest.mark.parametrize("name", slow_only(SCENES, "floating plate with a round hole"))
 def test_the_condensed_map_is_that_of_dense_equations(name: str) -> None:
     scene, slopes = SCENES[name]
-    given = prepared(scene, slopes=slopes)
-    mesh, conditions = given.mesh.unit, given.conditions
-    tree = HierarchicalCollocation(mesh, given.material, Hierarchical(TOLERANCE), slopes=slopes)
-    dense = CollocationElasticity(mesh, given.material, slopes=slopes).condense(conditions, given.force)
+    prepared_scene = prepared(scene, slopes=slopes)
+    given, material = prepared_scene.only, prepared_scene.material_of(prepared_scene.only)
+    mesh, conditions = given.own_mesh.unit, given.conditions
+    tree = HierarchicalCollocation(mesh, material, Hierarchical(TOLERANCE), slopes=slopes)
+    dense = CollocationElasticity(mesh, material, slopes=slopes).condense(conditions, given.force)
     condensed = tree.condense(conditions, given.force)
     # two to four times the tolerance are found on all shapes
     close = 20.0 * TOLERANCE
@@ -69,8 +70,9 @@ def test_the_condensed_map_is_that_of_dense_equations(name: str) -> None:
 
 
 def test_a_rigid_motion_far_away_takes_no_force() -> None:
-    given = prepared(loose(bk.Rectangle(2.0, 1.0)))
-    tree = HierarchicalCollocation(given.mesh.unit, given.material, Hierarchical(TOLERANCE))
+    prepared_scene = prepared(loose(bk.Rectangle(2.0, 1.0)))
+    given, material = prepared_scene.only, prepared_scene.material_of(prepared_scene.only)
+    tree = HierarchicalCollocation(given.own_mesh.unit, material, Hierarchical(TOLERANCE))
     condensed = tree.condense(given.conditions, np.zeros_like(given.force))
     way = 1e3 * np.tile([0.6, -0.8], (given.mesh.n_elements, 1))
     retained = np.einsum("nkc,nc->nk", given.conditions.frame, way)[given.conditions.is_retained]
@@ -123,8 +125,9 @@ def test_several_bodies_are_those_of_dense_equations(name: str, elements: int) -
 
 
 def test_equations_that_are_less_accurate_than_promised_are_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    given = prepared(paper(1))
-    tree = HierarchicalCollocation(given.mesh.unit, given.material, Hierarchical(TOLERANCE))
+    prepared_scene = prepared(paper(1))
+    given, material = prepared_scene.only, prepared_scene.material_of(prepared_scene.only)
+    tree = HierarchicalCollocation(given.own_mesh.unit, material, Hierarchical(TOLERANCE))
     exact = HierarchicalSystem.everywhere
 
     def wrong(system: HierarchicalSystem) -> tuple[np.ndarray, np.ndarray]:

@@ -12,7 +12,7 @@ import bemkit as bk
 from bemkit.geometry.neighbours import break_nodes
 from bemkit.geometry.reflection import antisymmetric_dofs, reflected_to_whole
 from bemkit.geometry.spaces import BoundarySpace
-from bemkit.model.contact_model import build_model
+from bemkit.model.model import build_model
 from bemkit.model.prepared import prepare
 from bemkit.operators.steklov_poincare.operator import SteklovPoincareOperator
 from bemkit.testing import check_double_layer, check_operator, check_space
@@ -138,7 +138,7 @@ def test_only_translations_along_the_line_are_left(
     motions = build_model(prepare(scene, scene.build_mesh())).body.rigid_motions()
     assert len(motions) == n_floating
     if n_floating == 1:
-        frame = build_model(prepare(scene, scene.build_mesh())).nodes.frame
+        frame = build_model(prepare(scene, scene.build_mesh())).prepared.contact_nodes.frame
         along = np.array([0.0, 1.0]) if symmetry.x is not None else np.array([1.0, 0.0])  # type: ignore[union-attr]
         expected = frame @ along
         is_held = np.isclose(motions[0][:, 1], 0.0) & ~np.isclose(expected[:, 1], 0.0)  # on a line

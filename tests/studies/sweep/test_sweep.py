@@ -56,7 +56,6 @@ def bodies_made(monkeypatch: pytest.MonkeyPatch) -> list[str]:
         monkeypatch.setattr(shared_module, name, lambda prepared: made.append(name) or build(prepared))
 
     counted("build_model")
-    counted("build_assembled_model")
     return made
 
 

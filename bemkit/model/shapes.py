@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from concurrent.futures import BrokenExecutor, Executor
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from bemkit.arrays import FloatArray
 from bemkit.errors import CANNOT_BE_SENT, InputError, why_not_sent
 from bemkit.geometry.mesh import BoundaryMesh
-from bemkit.model.assembled.placed import groups
-from bemkit.model.assembled.prepared import PreparedAssembly, linear_solver
+from bemkit.model.placed import groups
+from bemkit.model.prepared import Prepared, PreparedBody
+from bemkit.operators.half_plane.far_drive import FarDrive
+from bemkit.operators.half_plane.surface import SurfaceElasticity
 from bemkit.operators.linear.dense import SingularMatrixError
 from bemkit.operators.linear.solvers import ChosenLinearSolver
 from bemkit.operators.linear.threads import blas_threads_for
@@ -18,6 +20,9 @@ from bemkit.operators.steklov_poincare import CondensedMap, SteklovPoincare
 from bemkit.operators.steklov_poincare.forces_inside import ForcesInside, HeavyElasticity
 from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions
 from bemkit.scene.discretisation import Discretisation
+
+if TYPE_CHECKING:
+    from concurrent.futures import Executor
 
 
 class NotSentError(InputError):
@@ -33,32 +38,41 @@ class Shape:
     mesh: BoundaryMesh
     material: Material
     linear_solver: ChosenLinearSolver
+    drive: FarDrive
     inside: ForcesInside | None
     conditions: NodalConditions
     force: FloatArray
 
     @classmethod
-    def of(cls, prepared: PreparedAssembly, number: int) -> Shape:
+    def of(cls, prepared: Prepared, body: PreparedBody) -> Shape:
         """Return that of a body, under its own load."""
-        body = prepared.bodies[number]
         return cls(
             body.name,
             body.scene.discretisation,
             body.own_mesh.unit,
-            body.material.scaled(prepared.units.modulus),
-            linear_solver(prepared, number),
-            prepared.insides[number],
-            prepared.conditions[number],
-            prepared.forces[number],
+            prepared.material_of(body),
+            prepared.linear_solver(body),
+            body.drive,
+            body.inside,
+            body.conditions,
+            body.force,
         )
+
+    @property
+    def map(self) -> SteklovPoincare:
+        """The elastic map without forces inside."""
+        map_ = self.discretisation.chosen_map(self.mesh, self.material, self.linear_solver)
+        return driven_by(map_, self.drive)
 
     def condensed(self) -> tuple[SteklovPoincare, CondensedMap]:
         """Return the map without forces inside, and the body condensed under its load."""
         try:
-            map_ = self.discretisation.chosen_map(self.mesh, self.material, self.linear_solver)
+            map_ = self.map
             loaded = map_ if self.inside is None else HeavyElasticity(map_, self.inside)
             return map_, loaded.condense(self.conditions, self.force)
         except SingularMatrixError as error:
+            if not self.name:
+                raise
             raise type(error)(f"body {self.name!r}: {error}") from error
 
     def condensed_elsewhere(self) -> tuple[SteklovPoincare, CondensedMap]:
@@ -67,19 +81,32 @@ class Shape:
             return self.condensed()
 
 
+def driven_by(elastic: SteklovPoincare, drive: FarDrive) -> SteklovPoincare:
+    """Return a half-plane that moves otherwise far away; a body that ends somewhere stays as it is."""
+    return elastic.driven_by(drive) if isinstance(elastic, SurfaceElasticity) else elastic
+
+
+def elastic_map(prepared: Prepared, body: PreparedBody) -> SteklovPoincare:
+    """Return the elastic map of a body under its forces inside."""
+    map_ = Shape.of(prepared, body).map
+    return map_ if body.inside is None else HeavyElasticity(map_, body.inside)
+
+
 def condensed_shapes(
-    prepared: PreparedAssembly, executor: Executor | None = None
+    prepared: Prepared, executor: Executor | None = None
 ) -> list[tuple[SteklovPoincare, CondensedMap]]:
     """Return the map without forces inside and the condensed body of each group of copies, in their order.
 
     Raises
     ------
     SingularMatrixError, NotSentError
-        See `build_assembled_model`.
+        See `bemkit.model.model.build_model`.
     """
-    shapes = [Shape.of(prepared, int(group[0])) for group in groups(prepared.bodies)]
+    shapes = [Shape.of(prepared, prepared.bodies[int(group[0])]) for group in groups(prepared.bodies)]
     if executor is None:
         return [shape.condensed() for shape in shapes]
+    from concurrent.futures import BrokenExecutor
+
     try:
         return list(executor.map(Shape.condensed_elsewhere, shapes))
     except BrokenExecutor as error:

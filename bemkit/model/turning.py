@@ -16,9 +16,9 @@ import numpy as np
 from bemkit.arrays import FloatArray, IntArray
 from bemkit.geometry.quadrature import gauss_legendre
 from bemkit.geometry.vectors import cross, norms
-from bemkit.model.assembled.model import AssembledModel
-from bemkit.model.assembled.placed import PlacedBody
-from bemkit.model.assembled.prepared import PreparedAssembly
+from bemkit.model.model import Model
+from bemkit.model.placed import PlacedBody
+from bemkit.model.prepared import Prepared
 from bemkit.scene.conditions import Clamped, PrescribedDisplacement, Pressure, Roller, Traction
 from bemkit.scene.unit_names import amount
 from bemkit.solvers.base import ContactSolution, Status
@@ -34,7 +34,7 @@ _Side: TypeAlias = tuple[PlacedBody, IntArray]
 """A body, and elements of its boundary."""
 
 
-def with_turning_checked(model: AssembledModel, result: ContactSolution) -> ContactSolution:
+def with_turning_checked(model: Model, result: ContactSolution) -> ContactSolution:
     """Return the outcome of a solve, named UNSOLVABLE_LOAD if nothing but meshes keeps a body from turning.
 
     Bodies that friction joins are judged together; those with forces inside are not.
@@ -47,7 +47,7 @@ def with_turning_checked(model: AssembledModel, result: ContactSolution) -> Cont
     return replace(result, status=status, message=f"{status.value} [{reason}]") if reason else result
 
 
-def _joined_by_friction(prepared: PreparedAssembly) -> list[tuple[list[PlacedBody], list[_Side]]]:
+def _joined_by_friction(prepared: Prepared) -> list[tuple[list[PlacedBody], list[_Side]]]:
     """Return bodies that friction joins, and the sides by which they touch others without; none that friction holds."""
     bodies, rows = prepared.bodies, prepared.rows
     group, is_held = np.arange(len(bodies)), np.zeros(len(bodies), bool)
@@ -69,7 +69,7 @@ def _joined_by_friction(prepared: PreparedAssembly) -> list[tuple[list[PlacedBod
     return [([bodies[m] for m in members[k]], sides[k]) for k in sides if not is_held[members[k]].any()]
 
 
-def _turned(prepared: PreparedAssembly, bodies: list[PlacedBody], sides: list[_Side]) -> str:
+def _turned(prepared: Prepared, bodies: list[PlacedBody], sides: list[_Side]) -> str:
     """Say how the load turns bodies that may turn by these sides; empty if it does not."""
     if not all(_may_turn(body) for body in bodies):
         return ""
@@ -81,7 +81,7 @@ def _turned(prepared: PreparedAssembly, bodies: list[PlacedBody], sides: list[_S
         return ""
     diameter = max(body.mesh.diameter for body in bodies)
     x, y = np.where(np.abs(centre) < _ROUND_OFF * diameter, 0.0, centre).tolist()
-    by = amount(abs(moment), "energy", prepared.assembly.units)
+    by = amount(abs(moment), "energy", prepared.scene.units)
     sense = "anticlockwise" if moment > 0.0 else "clockwise"
     names = " and ".join(repr(body.name) for body in bodies)
     return (

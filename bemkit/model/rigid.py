@@ -7,14 +7,9 @@ from scipy import sparse
 
 from bemkit.arrays import FloatArray
 from bemkit.contact.joined.member import Member
-from bemkit.model.assembled.prepared import PreparedAssembly
-from bemkit.model.units import Units
+from bemkit.model.prepared import Prepared
+from bemkit.model.units import Units, motion_units
 from bemkit.scene.plane_motion import RigidBody
-
-
-def motion_units(units: Units) -> FloatArray:
-    """Return (3,) the lengths [-, -, m] by which motions x, y, turn become displacements."""
-    return np.array([1.0, 1.0, units.length])
 
 
 def rigid_motions(body: RigidBody, units: Units) -> tuple[sparse.csr_array, FloatArray]:
@@ -29,7 +24,7 @@ def rigid_motions(body: RigidBody, units: Units) -> tuple[sparse.csr_array, Floa
     return chosen, body.motion * motion_units(units) / units.displacement
 
 
-def rigid_members(prepared: PreparedAssembly) -> tuple[Member, ...]:
+def rigid_members(prepared: Prepared) -> tuple[Member, ...]:
     """Return a member for each rigid body that loads drive.
 
     What is rigid yields less than anything: its modulus is the largest of all bodies, so that its partners decide.
@@ -37,7 +32,7 @@ def rigid_members(prepared: PreparedAssembly) -> tuple[Member, ...]:
     units = prepared.units
     modulus = max(body.material.plane_modulus for body in prepared.bodies) / units.modulus
     members = []
-    for body in prepared.assembly.rigid:
+    for body in prepared.scene.rigid:
         is_driven = body.is_driven
         n_driven = int(np.count_nonzero(is_driven))
         if n_driven:

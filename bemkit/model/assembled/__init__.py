@@ -1,1 +1,0 @@
-"""Several elastic bodies made ready to solve."""

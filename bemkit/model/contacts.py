@@ -1,0 +1,242 @@
+"""The contacts of elastic bodies with obstacles and rigid bodies, node by node; the form of all contacts."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from bemkit.arrays import BoolArray, FloatArray, IntArray
+from bemkit.contact.laws import FrictionLaw
+from bemkit.errors import InputError
+from bemkit.model.contact_data import ContactData, FacingPart, find_contact
+from bemkit.model.placed import PlacedBody, groups
+from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions
+from bemkit.scene.steps import Stated
+
+if TYPE_CHECKING:
+    from scipy import sparse
+
+    from bemkit.scene.assembly import ContactPair
+
+OVERLAP_TOLERANCE = 1e-6
+"""Share of the size of the smaller body by which shapes may overlap without anybody meaning it: round-off of curves."""
+HELD_COSINE = 1e-3
+"""Cosine of the angle between the free direction of a supported node and the direction of contact below which it does
+not approach."""
+_SAME_DIRECTION = 1e-12
+
+
+class OverlapError(InputError):
+    """Bodies that overlap by more than an interference that was given."""
+
+
+@dataclass(frozen=True, eq=False)
+class ContactRows:
+    """The nodes of one contact: where relative displacements and tractions are unknown.
+
+    Parameters
+    ----------
+    name : str
+        Of the contact; of a fixed obstacle ``"body.part"``.
+    law : FrictionLaw
+    part : str
+        Of the body, where the nodes are.
+    body, other : int
+        The body whose nodes these are (the non-mortar side), and its partner: rigid bodies count on after the elastic
+        ones, and a fixed obstacle is -1.
+    nodes : (n,) array
+        Scalar dofs of the body.
+    points : (n, 2) array [m]
+    arc_length : (n,) array [m]
+        From the start of the side.
+    frame : (n, 2, 2) array
+        Direction of contact, out of the body, and tangent.
+    weights, gap : (n,) arrays [m]
+    couplings : two sparse (n, n_nodes) arrays, or None
+        Between elastic bodies the relative displacement of row i is ``frame[i] @ (B[i] @ u - C[i] @ u_other)`` with
+        both of them. With an obstacle or a rigid body row i belongs to node ``nodes[i]`` only.
+    motions : (n, 2, 3) array or None
+        How the motions of a rigid body displace what the nodes may touch.
+    elements, other_elements : int arrays
+        Of both sides; none of a rigid obstacle.
+    tangent_follows : (n,) bool array
+        Where a support, or a second obstacle in a corner, gives the tangential displacement.
+    is_on_line : (n,) bool array
+        Where the node lies on a symmetry line across its tangent: neither slips nor carries friction.
+    is_frictionless : (n,) bool array
+        Where a support holds the node in one direction and the partner moves: the tangent follows from both, and a
+        friction of its own would repeat what other nodes say.
+    """
+
+    name: str
+    law: FrictionLaw
+    part: str
+    body: int
+    other: int
+    nodes: IntArray
+    points: FloatArray
+    arc_length: FloatArray
+    frame: FloatArray
+    weights: FloatArray
+    gap: FloatArray
+    couplings: tuple[sparse.csr_array, sparse.csr_array] | None
+    motions: FloatArray | None
+    elements: IntArray
+    other_elements: IntArray
+    tangent_follows: BoolArray
+    is_on_line: BoolArray
+    is_frictionless: BoolArray
+
+    @property
+    def n_contact(self) -> int:
+        """Number of nodes."""
+        return self.nodes.size
+
+    def at_nodes(self, values: FloatArray) -> FloatArray:
+        """Return the values (n, ...) of each row from those of the nodes of the body (n_nodes, ...)."""
+        return np.asarray(values[self.nodes] if self.couplings is None else self.couplings[0] @ values)
+
+    @property
+    def touched_nodes(self) -> list[tuple[int, IntArray]]:
+        """The elastic bodies, and their nodes that take part."""
+        if self.couplings is None:
+            return [(self.body, self.nodes)]
+        return [(number, np.asarray(of.indices)) for number, of in zip(self.sides, self.couplings, strict=True)]
+
+    @property
+    def sides(self) -> tuple[int, int]:
+        """The body and its partner."""
+        return self.body, self.other
+
+    def add_forces(self, forces: FloatArray, of_bodies: Sequence[FloatArray]) -> None:
+        """Add the forces (n, 2) of the contact nodes to those of the nodes of each elastic body (n_nodes, 2)."""
+        if self.couplings is None:
+            np.add.at(of_bodies[self.body], self.nodes, forces)
+            return
+        on_body, on_other = self.couplings
+        of_bodies[self.body][:] += on_body.T @ forces
+        of_bodies[self.other][:] -= on_other.T @ forces
+
+    def is_coupled_like(self, other: ContactRows) -> bool:
+        """Whether its nodes take part in both sides as they do in another step of the same load history."""
+        if self.couplings is not None:
+            return self.couplings is other.couplings
+        columns = ((self.nodes, other.nodes), (self.weights, other.weights))
+        is_alike = self.name == other.name and all(np.array_equal(one, two) for one, two in columns)
+        return is_alike and np.allclose(self.frame, other.frame, rtol=0.0, atol=_SAME_DIRECTION)
+
+
+def approaches(nodes: IntArray, directions: FloatArray, frame: FloatArray, is_fixed: BoolArray) -> BoolArray:
+    """Return (n,) bool: nodes that their supports let move along directions (n, 2)."""
+    free = np.where(is_fixed[nodes][:, :, None], 0.0, frame[nodes])
+    return np.asarray(np.abs(np.einsum("nkc,nc->nk", free, directions)).max(axis=1) > HELD_COSINE)
+
+
+def check_overlap(pair: ContactPair, overlap: float, deepest: FloatArray, size: float) -> None:
+    """Refuse bodies that overlap, at the point `deepest`, by more than the interference of their contact.
+
+    Raises
+    ------
+    OverlapError
+    """
+    if overlap > pair.interference + OVERLAP_TOLERANCE * size:
+        x, y = deepest
+        raise OverlapError(
+            f"contact {pair.name!r}: the bodies overlap by {overlap:.4g} at ({x:.6g}, {y:.6g}), and an "
+            f"interference of {pair.interference:g} is given: move them apart, or give the interference that is meant"
+        )
+
+
+def candidates_of(scene: Stated, body: PlacedBody) -> ContactData:
+    """Return the nodes of a body that may touch an obstacle or a rigid body, held by supports or not."""
+    own = [pair for pair in scene.contacts if pair.rigid_body is not None and pair.elastic_parts[0][0] == body.name]
+    obstacles = {each.name: each.obstacle for each in scene.rigid}
+    facing = [
+        FacingPart(pair.name, _part(pair), obstacles[str(pair.rigid_body)], _law_of(scene, pair).is_frictionless)
+        for pair in own
+    ]
+    return find_contact(body.scene, body.mesh, body.space_in_place, facing)
+
+
+def obstacle_rows(
+    scene: Stated,
+    bodies: Sequence[PlacedBody],
+    candidates: Sequence[ContactData],
+    conditions: Sequence[NodalConditions],
+) -> Iterator[ContactRows]:
+    """Yield the contacts with fixed obstacles and with rigid bodies.
+
+    Notes
+    -----
+    A rigid body is measured at its position before it moves. Its point that a node may touch lies at the gap along the
+    direction of contact: this point, not the node, is what friction drags along and what the moment of the contact is
+    taken at.
+    """
+    rigid = {body.name: number for number, body in enumerate(scene.rigid)}
+    pairs = {pair.name: pair for pair in scene.contacts if pair.rigid_body is not None}
+    for number, (body, found) in enumerate(zip(bodies, candidates, strict=True)):
+        frames, fixed = conditions[number].frame, conditions[number].is_fixed
+        can_touch = approaches(found.nodes.nodes, found.nodes.directions, frames, fixed)
+        for name in dict.fromkeys(found.parts):
+            rows = np.equal(found.parts, name) & can_touch
+            nodes, gap, points = found.nodes.take(rows), found.gap[rows], found.points[rows]
+            if not nodes.nodes.size:
+                continue
+            motions: FloatArray | None = None
+            title, part, law, other = body.contact_title(name), name, body.scene.laws.get(name, scene.law), -1
+            if name in pairs:
+                pair, deepest = pairs[name], int(np.argmin(gap))
+                check_overlap(pair, -float(gap[deepest]), points[deepest], body.mesh.diameter)
+                touched = points + np.where(np.isfinite(gap), gap, 0.0)[:, None] * nodes.directions
+                k = rigid[str(pair.rigid_body)]
+                title, part, law, other = name, _part(pair), _law_of(scene, pair), len(bodies) + k
+                gap, motions = gap + pair.gap, scene.rigid[k].motions_at(touched)
+            is_held = np.asarray(fixed[nodes.nodes].any(axis=1))
+            moves = motions is not None and bool(scene.rigid[other - len(bodies)].is_driven.any())
+            yield ContactRows(
+                name=title,
+                law=law,
+                part=part,
+                body=number,
+                other=other,
+                nodes=nodes.nodes,
+                points=points,
+                arc_length=found.arc_length[rows],
+                frame=nodes.frame,
+                weights=nodes.weights * body.mesh.diameter,
+                gap=gap,
+                couplings=None,
+                motions=motions,
+                elements=body.mesh.part(part),
+                other_elements=np.zeros(0, np.intp),
+                tangent_follows=nodes.is_shared | is_held,
+                is_on_line=np.zeros(nodes.nodes.size, bool),
+                is_frictionless=is_held if moves else np.zeros_like(is_held),
+            )
+
+
+def retained_for(
+    bodies: Sequence[PlacedBody], conditions: Sequence[NodalConditions], rows: Sequence[ContactRows]
+) -> tuple[NodalConditions, ...]:
+    """Retain all nodes that a contact row involves, alike in all bodies that share a mesh."""
+    touched = [np.zeros(body.space.n_dofs // 2, bool) for body in bodies]
+    for one in rows:
+        for number, nodes in one.touched_nodes:
+            touched[number][nodes] = True
+    for group in groups(bodies):
+        union = np.any([touched[number] for number in group], axis=0)
+        for number in group.tolist():
+            touched[number] = union
+    pairs = zip(conditions, touched, strict=True)
+    return tuple(replace(of_body, is_retained=nodes[:, None] & ~of_body.is_fixed) for of_body, nodes in pairs)
+
+
+def _law_of(scene: Stated, pair: ContactPair) -> FrictionLaw:
+    return scene.law if pair.law is None else pair.law
+
+
+def _part(pair: ContactPair) -> str:
+    return pair.elastic_parts[0][1]

@@ -1,0 +1,75 @@
+"""From nodal displacements and forces of a body to its energy, and to tractions where they are given."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+
+import numpy as np
+
+from bemkit.arrays import FloatArray
+from bemkit.geometry.local_values import projector
+from bemkit.geometry.mesh import BoundaryMesh
+from bemkit.geometry.quadrature import gauss_legendre
+from bemkit.geometry.spaces import BoundarySpace, dof_points
+from bemkit.operators.half_plane.surface import SurfaceElasticity
+from bemkit.operators.rigid_modes import without_motion
+from bemkit.operators.steklov_poincare import SteklovPoincare
+from bemkit.operators.steklov_poincare.forces_inside import HeavyElasticity
+from bemkit.scene.conditions import Free, Pressure, Traction
+from bemkit.scene.scene import Scene
+
+_MORE_POINTS = 4
+"""Gauss points of an element at which given loads are evaluated, beyond the degree of the tractions."""
+
+
+def map_fields(elastic: SteklovPoincare, displacement: FloatArray, force: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return nodal displacements and forces (n_nodes, 2) less those of what acts inside the body or far away."""
+    if isinstance(elastic, SurfaceElasticity):
+        return elastic.strain_displacement(force), force
+    if isinstance(elastic, HeavyElasticity):
+        return displacement - elastic.inside.displacement, force - elastic.inside.force
+    return displacement, force
+
+
+def elastic_energy(
+    elastic: SteklovPoincare, space: BoundarySpace, displacement: FloatArray, force: FloatArray
+) -> float:
+    """Return the elastic energy of the stresses in the plane, dimensionless, from nodal fields (n_nodes, 2)."""
+    of_map, map_force = map_fields(elastic, displacement, force)
+    # the forces are in equilibrium: on a rigid motion, which may be huge, they would only do the work of round-off
+    strained = without_motion(space.mesh, dof_points(space), of_map)
+    return 0.5 * float(np.sum(strained * map_force)) + float(energy_beyond(elastic, of_map, map_force).sum())
+
+
+def energy_beyond(elastic: SteklovPoincare, displacement: FloatArray, force: FloatArray) -> FloatArray:
+    """Return the parts of the energy that what acts inside adds to that of `map_fields`; see `HeavyElasticity`."""
+    return elastic.energy_beyond(displacement, force) if isinstance(elastic, HeavyElasticity) else np.zeros(0)
+
+
+def insert_loads(
+    traction: FloatArray, scene: Scene, mesh: BoundaryMesh, space: BoundarySpace, touching: Collection[str] = ()
+) -> None:
+    """Replace the tractions of loaded elements by the projection of the loads, of free elements by zero.
+
+    Parameters
+    ----------
+    traction : (n_elements, n_local, 2) array [Pa]
+        At the local nodes of their space; changed in place, but for elements in contact and those that supports hold.
+    scene : Scene
+    mesh : BoundaryMesh
+        In physical units.
+    space : BoundarySpace
+        Of the tractions.
+    touching : collection of str
+        Free parts that other bodies touch: they are left as they are.
+    """
+    xi, weights = gauss_legendre(space.degree + 1 + _MORE_POINTS)
+    projection = projector(space, xi, weights)
+    is_free = np.ones(mesh.n_elements, bool)
+    for part, elements in scene.parts_on(mesh):
+        is_free[elements] = isinstance(part.condition, Free) and part.name not in touching
+        if isinstance(part.condition, Traction | Pressure):
+            points, normals = mesh.points(elements, xi), mesh.normals_at(elements, xi)
+            values = part.condition.at(points.reshape(-1, 2), normals.reshape(-1, 2)).reshape(points.shape)
+            traction[elements] = np.einsum("lq,eqc->elc", projection, values)
+    traction[is_free] = 0.0

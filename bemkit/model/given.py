@@ -1,0 +1,167 @@
+"""What the user gives of a body in dimensionless form: supports, loads, motion far away; and its linear solver."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from itertools import zip_longest
+
+import numpy as np
+
+from bemkit.arrays import FloatArray
+from bemkit.errors import InputError
+from bemkit.geometry.mesh import BoundaryMesh
+from bemkit.geometry.spaces import BoundarySpace, element_nodes
+from bemkit.model.units import Units
+from bemkit.operators.half_plane.far_drive import FarDrive
+from bemkit.operators.linear.solvers import (
+    ChosenLinearSolver,
+    Hierarchical,
+    LinearSolverChoice,
+    choose_linear_solver,
+)
+from bemkit.operators.steklov_poincare import TractionField
+from bemkit.operators.steklov_poincare.forces_inside import ForcesInside
+from bemkit.operators.steklov_poincare.hierarchical_needs import choose_collocation_solver
+from bemkit.operators.steklov_poincare.needs import BodyCase, physical_memory
+from bemkit.operators.steklov_poincare.nodal_conditions import (
+    GivenData,
+    NodalConditions,
+    Support,
+    integrate_traction,
+)
+from bemkit.scene.conditions import Clamped, Part, PrescribedDisplacement, Pressure, Roller, Traction
+from bemkit.scene.discretisation import Discretisation
+from bemkit.scene.scene import Scene
+
+
+def supports_on(scene: Scene, mesh: BoundaryMesh, units: Units, space: BoundarySpace) -> list[Support]:
+    """Return the supports of the parts that hold the body, their displacements in the units given."""
+    result = []
+    for part, elements in scene.parts_on(mesh):
+        condition = part.condition
+        axes = np.broadcast_to(np.eye(2), (elements.size, 2, 2))
+        if isinstance(condition, Roller):
+            normals = mesh.normals_at(elements, element_nodes(space)[elements])
+            result.append(Support(part.name, elements, normals[:, :, None, :]))
+        elif isinstance(condition, Clamped):
+            result.append(Support(part.name, elements, axes))
+        elif isinstance(condition, PrescribedDisplacement):
+            result.append(
+                Support(
+                    part.name, elements, axes[:, list(condition.is_prescribed)], _dimensionless_motion(condition, units)
+                )
+            )
+    return result
+
+
+def _dimensionless_motion(condition: PrescribedDisplacement, units: Units) -> Callable[[FloatArray], FloatArray]:
+    def field(points: FloatArray) -> FloatArray:
+        return condition.at(units.to_physical(points)) / units.displacement
+
+    return field
+
+
+def nodal_forces(scene: Scene, mesh: BoundaryMesh, space: BoundarySpace, units: Units) -> FloatArray:
+    """Return the (n_nodes, 2) dimensionless forces of all loads on the nodes of a space on the unit mesh."""
+    force = np.zeros((space.n_dofs // 2, 2))
+    for part, elements in scene.parts_on(mesh):
+        if isinstance(part.condition, Traction | Pressure):
+            force += integrate_traction(space, elements, dimensionless_load(part.condition, units))
+    return force
+
+
+def dimensionless_load(load: Traction | Pressure, units: Units) -> TractionField:
+    """Return a load as a function of dimensionless points."""
+
+    def field(points: FloatArray, normals: FloatArray) -> FloatArray:
+        return load.at(units.to_physical(points), normals) / units.stress
+
+    return field
+
+
+def far_drive(scene: Scene, units: Units) -> FarDrive:
+    """Return how a half-plane moves far away, in the units given; at rest by default."""
+    far = scene.far
+    if far is None:
+        return FarDrive()
+    motion = far.motion / (units.displacement, units.displacement, units.displacement / units.length)
+    load = far.load / (units.stress * units.length * np.array([1.0, 1.0, units.length]))
+    centre = (np.array(far.centre) - units.centre) / units.length
+    driven = tuple(np.flatnonzero(far.is_driven).tolist())
+    return FarDrive(driven, *(tuple(array.tolist()) for array in (motion, load, centre)))
+
+
+def given_data(conditions: NodalConditions, force: FloatArray, inside: ForcesInside | None) -> GivenData:
+    """Return the forces and displacements under which an elastic map is solved, without what acts inside the body."""
+    if inside is not None:
+        conditions, force = inside.left_of(conditions, force)
+    return GivenData.of(conditions, force, conditions.displacement)
+
+
+def check_same_body(
+    scene: Scene, other: Scene, parts: Sequence[Part], changed_parts: Sequence[Part], name: str
+) -> None:
+    """Check that a body has the same matrices on the same mesh in another scene; `name` is that of the body.
+
+    Its stated parts are compared: the scenes also have those that touch other bodies.
+
+    Raises
+    ------
+    InputError
+        Naming the first difference.
+    """
+    of_body = f"body {name!r}: " if name else ""
+    for key in ("shape", "material", "symmetry", "discretisation"):
+        if getattr(scene, key) is not getattr(other, key) and getattr(scene, key) != getattr(other, key):
+            value = getattr(other, key)
+            raise InputError(f"{of_body}{key} is {value}: keep {getattr(scene, key)}, or build a new model")
+    if _driven(scene) != _driven(other):
+        raise InputError(f"{of_body}far drives other motions: change numbers only, or build a new model")
+    if [type(force) for force in scene.body_forces] != [type(force) for force in other.body_forces]:
+        raise InputError(f"{of_body}body_forces change their kinds or order: change numbers only, or build a new model")
+    for part, changed in zip_longest(parts, changed_parts):
+        if part is changed:
+            continue
+        if part is None or changed is None or _layout(part) != _layout(changed):
+            part_name = (part or changed).name
+            raise InputError(
+                f"{of_body}part {part_name!r} changes its place or its kind: change numbers only, or build a new model"
+            )
+
+
+def _driven(scene: Scene) -> list[bool]:
+    return [] if scene.far is None else scene.far.is_driven.tolist()
+
+
+def _layout(part: Part) -> tuple[object, ...]:
+    condition = part.condition
+    components = condition.is_prescribed if isinstance(condition, PrescribedDisplacement) else ()
+    return part.name, part.sides, part.where, type(condition), components
+
+
+def linear_solver_of(
+    requested: LinearSolverChoice, discretisation: Discretisation, case: BodyCase
+) -> ChosenLinearSolver:
+    """Choose the linear solver of a map.
+
+    Parameters
+    ----------
+    requested : LinearSolver, Hierarchical or Automatic
+    discretisation : Discretisation
+    case : BodyCase
+        Its linear solver counts for nothing.
+
+    Raises
+    ------
+    InputError
+        If compressed equations of Galerkin's method are requested: there are none.
+    """
+    if not discretisation.is_symmetric:
+        return choose_collocation_solver(requested, case, physical_memory(), discretisation.why_dense(case.mesh))
+    if isinstance(requested, Hierarchical) and case.mesh.surface is None:
+        raise InputError(
+            f"linear_solver is 'hierarchical', but discretisation {discretisation.method} has dense equations only: "
+            'take discretisation = "constant", whose equations are compressed, or hp with an accuracy and '
+            'linear_solver = "automatic"'
+        )
+    return choose_linear_solver(requested)

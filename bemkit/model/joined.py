@@ -1,0 +1,107 @@
+"""Bodies that are condensed and joined at their contacts, and the same bodies in another load step."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from bemkit.arrays import FloatArray
+from bemkit.contact.joined.joined_bodies import JoinedBodies
+from bemkit.contact.joined.member import Member
+from bemkit.model.coupling import offset, relative
+from bemkit.model.placed import groups, shape_numbers
+from bemkit.model.prepared import Prepared, PreparedBody
+from bemkit.model.rigid import rigid_members
+from bemkit.operators.counts import OperationCounts
+from bemkit.operators.steklov_poincare import CondensedMap, SteklovPoincare
+from bemkit.operators.steklov_poincare.forces_inside import condensed_under
+
+
+def joined_bodies(prepared: Prepared, condensed: Sequence[CondensedMap]) -> JoinedBodies:
+    """Return bodies that are condensed, one of each shape with its stiffness, joined at their contacts."""
+    numbers, firsts = shape_numbers(prepared.bodies), [int(group[0]) for group in groups(prepared.bodies)]
+    motions = [_motions(prepared.bodies[first]) for first in firsts]
+    members = tuple(
+        Member(
+            stiffness=condensed[firsts[number]].stiffness,
+            load=map_.load,
+            motions=motions[number],
+            modulus=body.material.plane_modulus / prepared.units.modulus,
+            name=body.name,
+        )
+        for map_, body, number in zip(condensed, prepared.bodies, numbers, strict=True)
+    )
+    return JoinedBodies(
+        members=(*members, *rigid_members(prepared)),
+        relative=relative(prepared),
+        offset=offset(prepared),
+        weights=prepared.column("weights") / prepared.units.length,
+        tangent_follows=prepared.tangent_follows,
+    )
+
+
+def joined_under(
+    prepared: Prepared, before: Prepared, joined: JoinedBodies, condensed: Sequence[CondensedMap]
+) -> JoinedBodies:
+    """Return the joined bodies of a step, whose condensed maps are given; those of the step before keep factors."""
+    if not (before.has_same_unknowns(prepared) and before.is_coupled_like(prepared)):
+        return joined_bodies(prepared, condensed)
+    loads = [*(map_.load for map_ in condensed), *(member.load for member in rigid_members(prepared))]
+    return joined.under(loads, offset(prepared))
+
+
+def condensed_under_step(
+    prepared: Prepared, before: Prepared, elastic: Sequence[SteklovPoincare], condensed: Sequence[CondensedMap]
+) -> tuple[tuple[CondensedMap, ...], OperationCounts]:
+    """Return the condensed maps of all bodies in another step, and the work of that."""
+    if not before.has_same_unknowns(prepared):
+        result = _condensed_again(prepared, elastic)
+    else:
+        result = tuple(
+            old if _is_loaded_alike(*bodies) else _condensed_under(old, map_, *bodies)
+            for old, map_, *bodies in zip(condensed, elastic, before.bodies, prepared.bodies, strict=True)
+        )
+    work = (result[int(group[0])].work for group in groups(prepared.bodies))
+    return result, sum(work, OperationCounts())
+
+
+def _condensed_again(prepared: Prepared, elastic: Sequence[SteklovPoincare]) -> tuple[CondensedMap, ...]:
+    """Condense the bodies onto other nodes in contact; copies once."""
+    firsts: dict[int, CondensedMap] = {}
+    condensed = []
+    for number, map_, body in zip(shape_numbers(prepared.bodies), elastic, prepared.bodies, strict=True):
+        if number in firsts:
+            condensed.append(loaded_alone(firsts[number], body))
+        else:
+            condensed.append(firsts.setdefault(number, map_.condense(body.conditions, body.force)))
+    return tuple(condensed)
+
+
+def _condensed_under(
+    condensed: CondensedMap, elastic: SteklovPoincare, before: PreparedBody, body: PreparedBody
+) -> CondensedMap:
+    """Return a condensed map under the loads and the motion far away of a body in another step."""
+    if before.drive == body.drive:
+        return loaded_alone(condensed, body)
+    again = elastic.condense(body.conditions, body.force)  # its stiffness is the same
+    return replace(again, stiffness=condensed.stiffness)
+
+
+def loaded_alone(condensed: CondensedMap, body: PreparedBody) -> CondensedMap:
+    """Return a condensed map under the loads of a body."""
+    return condensed_under(condensed, body.conditions, body.force, body.inside)
+
+
+def _is_loaded_alike(one: PreparedBody, two: PreparedBody) -> bool:
+    """Whether loads, body forces, prescribed displacements and motions far away are the same objects in two steps."""
+    data, other = ((body.force, body.inside, body.conditions.displacement) for body in (one, two))
+    return one.drive == two.drive and all(a is b for a, b in zip(data, other, strict=True))
+
+
+def _motions(body: PreparedBody) -> FloatArray:
+    """Return the rigid motions (n_motions, n_retained) that no support resists."""
+    conditions = body.conditions
+    along = np.einsum("nkc,mnc->mnk", conditions.frame, body.free_modes)
+    return np.asarray(along[:, conditions.is_retained])

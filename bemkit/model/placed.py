@@ -1,0 +1,188 @@
+"""The bodies of a scene in their places, with their meshes and spaces."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TypeAlias
+
+import numpy as np
+
+from bemkit.arrays import IntArray
+from bemkit.errors import InputError
+from bemkit.geometry.errors import GeometryError
+from bemkit.geometry.mesh import BoundaryMesh
+from bemkit.geometry.placement import Placement
+from bemkit.geometry.spaces import BoundarySpace
+from bemkit.model.units import Units, check_position
+from bemkit.operators.material import Material
+from bemkit.scene.body import Body
+from bemkit.scene.scene import Scene
+from bemkit.scene.steps import Stated
+
+Meshes: TypeAlias = BoundaryMesh | Mapping[str, BoundaryMesh] | None
+"""Meshes of bodies by name, or the mesh of the only body; None for those that the scene describes."""
+
+
+@dataclass(frozen=True, eq=False)
+class PlacedBody:
+    """A body of a scene on a mesh.
+
+    Operators are assembled on its own mesh. That of a copy is the mesh of the shape where it was drawn, which all
+    copies share; a body that supports or rigid obstacles hold has no copies, and its own mesh is the one in place.
+
+    Parameters
+    ----------
+    body : Body
+    scene : Scene
+        The scene of this body without the others; see `Scene.scene_of`.
+    mesh : BoundaryMesh
+        In its place, in physical units.
+    own_mesh : BoundaryMesh
+    space : BoundarySpace
+        Of the displacements, on the mesh in place.
+    own_space, space_in_place : BoundarySpace
+        The same on the dimensionless own mesh, and on the dimensionless mesh in place; nodes have the same numbers.
+    """
+
+    body: Body
+    scene: Scene
+    mesh: BoundaryMesh
+    own_mesh: BoundaryMesh
+    space: BoundarySpace
+    own_space: BoundarySpace
+    space_in_place: BoundarySpace
+
+    @classmethod
+    def on(cls, body: Body, scene: Scene, mesh: BoundaryMesh, own_mesh: BoundaryMesh) -> PlacedBody:
+        """Return a body on its meshes, with the spaces of its discretisation."""
+        space_on = scene.discretisation.displacement_space
+        own_space = space_on(own_mesh.unit)
+        in_place = own_space if own_mesh is mesh else space_on(mesh.unit)
+        return cls(body, scene, mesh, own_mesh, space_on(mesh), own_space, in_place)
+
+    def is_loaded_like(self, other: PlacedBody) -> bool:
+        """Whether its parts and body forces are the very objects that another one has, and it moves alike far away."""
+        own, others = ((*each.body.parts, *each.body.body_forces) for each in (self, other))
+        is_alike = len(own) == len(others) and all(one is two for one, two in zip(own, others, strict=True))
+        return is_alike and self.scene.far == other.scene.far
+
+    @property
+    def name(self) -> str:
+        """The name of the body; empty of the only body of a scene."""
+        return self.body.name
+
+    @property
+    def title(self) -> str:
+        """What messages call the body."""
+        return f"body {self.name!r}" if self.name else "the body"
+
+    @property
+    def material(self) -> Material:
+        """Its material, in physical units."""
+        return self.body.material
+
+    @property
+    def turn(self) -> Placement:
+        """The motion from the own mesh to the mesh in place."""
+        return Placement() if self.own_mesh is self.mesh else self.body.placement
+
+    @property
+    def traction_space(self) -> BoundarySpace:
+        """The space of the tractions on the mesh in place."""
+        return self.scene.discretisation.traction_space(self.mesh)
+
+    def contact_title(self, part: str) -> str:
+        """Return the name of the contact of a part with a fixed obstacle: ``"body.part"``."""
+        return f"{self.name}.{part}" if self.name else part
+
+    def units(self, modulus: float, force: float, mesh: BoundaryMesh | None = None) -> Units:
+        """Return its units, in which forces and displacements are those of all bodies of the scene.
+
+        Parameters
+        ----------
+        modulus : float [Pa]
+        force : float [N/m]
+        mesh : BoundaryMesh, optional
+            The mesh in place; the own one by default.
+        """
+        mesh = self.own_mesh if mesh is None else mesh
+        return Units(mesh.centre, mesh.diameter, modulus, force / mesh.diameter)
+
+
+def place(scene: Stated, meshes: Meshes = None) -> tuple[PlacedBody, ...]:
+    """Divide the bodies of a scene and put them in their places.
+
+    Parameters
+    ----------
+    scene : Scene or Assembly
+    meshes : BoundaryMesh or mapping of str to BoundaryMesh, optional
+        Meshes of bodies by name, in the coordinates of their shapes, or that of the only body; by default what the
+        scene describes.
+
+    Raises
+    ------
+    GeometryError
+        If a body cannot be divided.
+    TooFarError
+        If a body lies more than 1e7 diameters from the origin.
+    """
+    given = _by_name(scene.placed_bodies, meshes)
+    divided: dict[int, BoundaryMesh] = {}
+    placed = []
+    for body in scene.placed_bodies:
+        own_scene = scene.scene_of(body)
+        if body.name in given:
+            drawn = given[body.name]
+        else:
+            drawn = divided.setdefault(id(own_scene), divided.get(id(own_scene)) or _divided(own_scene, scene, body))
+        check_body_symmetry(own_scene, drawn)
+        mesh = body.placement.mesh(drawn)
+        where = f"body {body.name!r}" if body.name else "the body"
+        check_position(drawn, f"{where}, where it is drawn," if body.name else where)
+        check_position(mesh, where)
+        placed.append(PlacedBody.on(body, own_scene, mesh, mesh if body.is_held else drawn))
+    return tuple(placed)
+
+
+def _by_name(bodies: Sequence[Body], meshes: Meshes) -> Mapping[str, BoundaryMesh]:
+    if not isinstance(meshes, BoundaryMesh):
+        meshes = meshes or {}
+        if unknown := sorted(set(meshes) - {body.name for body in bodies}):
+            raise InputError(f"mesh names {unknown[0]!r}: the bodies are {', '.join(repr(b.name) for b in bodies)}")
+        return meshes
+    if len(bodies) > 1:
+        raise InputError(f"mesh is given for {len(bodies)} bodies: give a mesh for each by its name")
+    return {bodies[0].name: meshes}
+
+
+def check_body_symmetry(scene: Scene, mesh: BoundaryMesh) -> None:
+    """Raise GeometryError unless a scene of one body is symmetric about the lines that it names, like its mesh."""
+    if scene.symmetry is not None or mesh.symmetry is not None:
+        from bemkit.scene.symmetry import check_symmetry
+
+        check_symmetry(scene, mesh)
+
+
+def _divided(own_scene: Scene, scene: Stated, body: Body) -> BoundaryMesh:
+    even = [*(part.name for part in own_scene.contact_parts), *scene.touching_parts(body)]
+    try:
+        return own_scene.divided(even)
+    except GeometryError as error:
+        if not body.name:
+            raise
+        raise type(error)(f"body {body.name!r}: {error}") from error
+
+
+def shape_numbers(bodies: Sequence[PlacedBody]) -> list[int]:
+    """Return for each body which of the different own meshes it has, in the order of `groups`."""
+    number_of: dict[int, int] = {}
+    return [number_of.setdefault(id(body.own_mesh), len(number_of)) for body in bodies]
+
+
+def groups(bodies: Sequence[PlacedBody]) -> list[IntArray]:
+    """Return the numbers of the bodies that share an own mesh, in the order of the first of each."""
+    found: dict[int, list[int]] = {}
+    for number, body in enumerate(bodies):
+        found.setdefault(id(body.own_mesh), []).append(number)
+    return [np.array(numbers) for numbers in found.values()]

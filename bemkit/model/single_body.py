@@ -1,0 +1,98 @@
+"""The only body of a scene between fixed obstacles, or without contact nodes: what contact sees of it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, TypeAlias
+
+from bemkit.contact.condensation.direct_body import DirectBody
+from bemkit.contact.condensation.nodes import NoContactNodesError, opened
+from bemkit.contact.condensation.whole_body import WholeBody
+from bemkit.errors import InputError
+from bemkit.model.prepared import Prepared
+from bemkit.operators.half_plane.surface import SurfaceElasticity
+from bemkit.operators.steklov_poincare import CondensedMap, SteklovPoincare
+from bemkit.operators.steklov_poincare.forces_inside import HeavyElasticity
+
+if TYPE_CHECKING:
+    from bemkit.contact.condensation.hierarchical_body import HierarchicalBody
+    from bemkit.contact.half_plane.surface_body import SurfaceBody
+    from bemkit.model.untouched_body import UntouchedBody
+
+SingleBody: TypeAlias = "DirectBody | HierarchicalBody | SurfaceBody | UntouchedBody"
+
+
+def is_single(prepared: Prepared) -> bool:
+    """Whether the relative displacements of contact nodes are those of one body, which touches obstacles at most.
+
+    Raises
+    ------
+    NoContactNodesError
+        If supports leave no node of the contact boundary free to move towards the obstacle.
+    InputError
+        If no two of several bodies are in contact.
+    """
+    if not prepared.n_contact:
+        _check_without_nodes(prepared)
+    return prepared.has_obstacles_only
+
+
+def _check_without_nodes(prepared: Prepared) -> None:
+    if prepared.scene.contacts or any(body.scene.contact_parts for body in prepared.bodies):
+        raise NoContactNodesError(
+            "supports fix every node of the contact boundary: use more elements, or restrict the supports"
+        )
+    if len(prepared.bodies) > 1:
+        raise InputError("no two bodies are in contact: list contacts, or solve each body as a scene of its own")
+
+
+def is_direct(prepared: Prepared) -> bool:
+    """Whether contact sees the condensed stiffness of the only body."""
+    if not prepared.n_contact or prepared.only.mesh.surface is not None:
+        return False
+    return prepared.is_condensed or prepared.linear_solver(prepared.only).hierarchical is None
+
+
+def single_body(prepared: Prepared, elastic: SteklovPoincare, condensed: CondensedMap | None = None) -> SingleBody:
+    """Return the only body as contact sees it, with its equations in the frames of contact.
+
+    Parameters
+    ----------
+    prepared : Prepared
+    elastic : SteklovPoincare
+    condensed : CondensedMap, optional
+        The map condensed under the conditions and forces of the body, if that is known and `is_direct`.
+
+    Raises
+    ------
+    FreeBodyError
+        If nothing is in contact and the supports leave a rigid motion free.
+    """
+    body = prepared.only
+    if not prepared.n_contact:
+        from bemkit.model.free_motion import check_held
+
+        check_held(prepared)
+    if isinstance(elastic, SurfaceElasticity):
+        from bemkit.contact.half_plane.bodies import surface_body
+
+        nodes = prepared.contact_nodes
+        return surface_body(elastic, opened(body.conditions, nodes), nodes, body.force)
+    if not prepared.n_contact:
+        from bemkit.model.untouched_body import UntouchedBody
+
+        return UntouchedBody(body.own_space, body.conditions, body.force, elastic.condense(body.conditions, body.force))
+    nodes = prepared.contact_nodes
+    if is_direct(prepared):
+        conditions = body.conditions
+        if condensed is None:
+            conditions = opened(body.conditions, nodes)
+            condensed = elastic.condense(conditions, body.force)
+        whole = WholeBody.of(body.own_space, condensed, conditions, body.force, body.free_modes)
+        return DirectBody.of(whole, nodes, elastic.material.plane_modulus)
+    conditions = opened(body.conditions, nodes)
+    from bemkit.contact.condensation.hierarchical_body import hierarchical_body
+    from bemkit.operators.steklov_poincare.hierarchical import HierarchicalCollocation
+
+    weightless = elastic.weightless if isinstance(elastic, HeavyElasticity) else elastic
+    assert isinstance(weightless, HierarchicalCollocation)
+    return hierarchical_body(weightless, conditions, nodes, body.force, body.inside)

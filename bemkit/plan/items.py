@@ -1,0 +1,233 @@
+"""What a plan lists: what a scene needs and skips, and why, with the numbers of its elements and unknowns."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from bemkit.contact.laws import FrictionLaw
+from bemkit.geometry.symmetry import Symmetry
+from bemkit.model.placed import PlacedBody, groups
+from bemkit.model.prepared import Prepared
+from bemkit.operators.rigid_modes import admissible_modes
+from bemkit.operators.steklov_poincare.needs import PlanItem
+from bemkit.scene.registry import BODY_FORCES
+from bemkit.scene.scene import Scene
+from bemkit.scene.steps import Stated
+
+_MOST_NAMED = 12
+"""Different bodies up to which each has a line of its own."""
+_DEGREES = ("constant", "linear", "quadratic")
+
+
+@dataclass(frozen=True)
+class Sizes:
+    """Numbers of elements and unknowns.
+
+    Parameters
+    ----------
+    n_elements, n_curved, n_loops : int
+        Elements, those of them that are curved, and closed curves of the boundary.
+    n_sources : int
+        Elements of the whole body, images by symmetry included.
+    displacement_degree, traction_degree : int
+        Of the polynomials on each element.
+    n_displacements, n_tractions : int
+        Components at all nodes of the two spaces.
+    n_fixed, n_free, n_open : int
+        Displacement components that supports prescribe, that carry a known force, and that contact decides.
+    n_contact, n_contact_unknowns : int
+        Contact nodes, and the order of their system.
+    n_motions, n_free_motions : int
+        Rigid motions that cause no traction (3, or none on an exterior), and those of them that no support holds.
+    """
+
+    n_elements: int
+    n_curved: int
+    n_loops: int
+    n_sources: int
+    displacement_degree: int
+    traction_degree: int
+    n_displacements: int
+    n_tractions: int
+    n_fixed: int
+    n_free: int
+    n_open: int
+    n_contact: int
+    n_contact_unknowns: int
+    n_motions: int
+    n_free_motions: int
+
+
+def find_sizes(prepared: Prepared) -> Sizes:
+    """Count the elements and unknowns of all bodies."""
+    bodies, n_driven = prepared.bodies, n_driven_motions(prepared.scene)
+    return Sizes(
+        n_elements=sum(body.mesh.n_elements for body in bodies),
+        n_curved=sum(int(np.count_nonzero(~body.mesh.is_straight)) for body in bodies),
+        n_loops=sum(len(body.mesh.loops) for body in bodies),
+        n_sources=sum(body.mesh.whole.n_elements for body in bodies),
+        displacement_degree=max(body.space.degree for body in bodies),
+        traction_degree=max(body.traction_space.degree for body in bodies),
+        n_displacements=sum(body.space.n_dofs for body in bodies),
+        n_tractions=sum(body.traction_space.n_dofs for body in bodies),
+        n_fixed=sum(int(np.count_nonzero(body.conditions.is_fixed)) for body in bodies),
+        n_free=sum(int(np.count_nonzero(body.conditions.is_free)) for body in bodies),
+        n_open=sum(int(np.count_nonzero(body.conditions.is_retained)) for body in bodies),
+        n_contact=prepared.n_contact,
+        n_contact_unknowns=2 * prepared.n_contact - int(np.count_nonzero(prepared.tangent_follows)),
+        n_motions=sum(len(admissible_modes(body.mesh)) for body in bodies) + 3 * len(prepared.scene.rigid),
+        n_free_motions=n_driven + sum(len(body.free_modes) for body in bodies),
+    )
+
+
+def items_of_one(
+    scene: Scene, sizes: Sizes, of_body: tuple[PlanItem, ...], n_steps: int, proposal: Symmetry | None = None
+) -> tuple[PlanItem, ...]:
+    """Say what a scene of one body needs and what it skips, in the order in which it is used.
+
+    Besides the sizes that is what the discretisation says of its map, the number of load steps, and a symmetry that the
+    scene has but does not use.
+    """
+    return (
+        *_mesh_items(scene, sizes, proposal),
+        *of_body,
+        _body_force_item(scene),
+        *_contact_items(scene, sizes, n_steps),
+        *_last_items(n_steps, "displacement inside the body", "stress inside the body"),
+    )
+
+
+def _further_meshes(accuracy: float | None, given: str, first: str) -> PlanItem:
+    """Say whether meshes follow the solution, in words for what is given otherwise and for what is planned first."""
+    reason = given
+    if accuracy is not None:
+        reason = f"until the estimated error is below {accuracy:g}; this plan is for the {first}"
+    return PlanItem("further meshes", accuracy is not None, reason)
+
+
+def _friction_item(laws: Iterable[FrictionLaw], kind: str = "") -> PlanItem:
+    """Say which laws there are."""
+    names = ", ".join(dict.fromkeys(type(law).__name__ for law in laws if not law.is_frictionless))
+    return PlanItem("friction", bool(names), f"law {names}{kind}" if names else "the law allows no tangential traction")
+
+
+def _last_items(n_steps: int, *inside: str) -> Iterator[PlanItem]:
+    """Yield what follows the contact system; fields inside by the names they have."""
+    history = f"{n_steps} load steps; slip counts from the end of the step before"
+    yield PlanItem("load history", n_steps > 1, history if n_steps > 1 else "the whole load comes in one step")
+    yield PlanItem("fields on the boundary", True, "part of every result")
+    for name in inside:
+        yield PlanItem(name, False, "not asked for; see interior_fields")
+    yield PlanItem("result file (h5py)", False, "no part of the solve; loaded and written after it where asked for")
+    yield PlanItem("figures (matplotlib)", False, "no part of the solve; loaded and drawn after it where asked for")
+
+
+def _mesh_items(scene: Scene, sizes: Sizes, proposal: Symmetry | None) -> Iterator[PlanItem]:
+    """Yield what elements, symmetry and spaces need."""
+    n, n_curved = sizes.n_elements, sizes.n_curved
+    outline = scene.shape.outline()
+    if outline.drawing is not None:
+        read = "; ".join(outline.drawing.notes) or "taken as it is"
+        yield PlanItem("drawn outline", True, f"{_count(len(outline.sides), 'side')}; {read}")
+    yield PlanItem("elements", True, f"{n} on {_count(sizes.n_loops, 'closed curve')}")
+    yield _further_meshes(scene.mesh.accuracy, "the number of elements is given", "first mesh")
+    curved = f"{n_curved} of {n} elements are curved" if n_curved else "all elements are straight"
+    yield PlanItem("quadrature on curved elements", n_curved > 0, curved)
+    if not sizes.n_motions and scene.symmetry is None:
+        where = "outside of the boundary" if outline.surface is None else "half-plane below its surface"
+        yield PlanItem("exterior domain", True, f"the body fills the {where}")
+    reason = "not asked for"
+    if scene.symmetry is not None:
+        reason = f"about {scene.symmetry}: {n} of {sizes.n_sources} elements carry unknowns"
+    elif proposal is not None:
+        share = "half" if proposal.n_images == 2 else "a quarter"
+        reason = f"proposed: the scene is symmetric about {proposal}, and {share} of its unknowns would do"
+    yield PlanItem("symmetry", scene.symmetry is not None, reason)
+    displacements, tractions = (
+        _DEGREES[degree] if degree < len(_DEGREES) else f"degree {degree}"
+        for degree in (sizes.displacement_degree, sizes.traction_degree)
+    )
+    reason = (
+        f"{scene.discretisation.method}: {sizes.n_displacements} displacements and {sizes.n_tractions} tractions, "
+        f"{sizes.n_fixed} of the displacements held, {sizes.n_open} retained for contact"
+    )
+    yield PlanItem(f"{displacements} displacements, {tractions} tractions", True, reason)
+
+
+def _body_force_item(scene: Scene) -> PlanItem:
+    kinds = ", ".join(dict.fromkeys(BODY_FORCES.kind_of(force) for force in scene.body_forces))
+    reason = f"{kinds}, in closed form: no elements inside the body" if kinds else "nothing acts inside the body"
+    return PlanItem("particular solution", bool(kinds), reason)
+
+
+def _contact_items(scene: Scene, sizes: Sizes, n_steps: int) -> Iterator[PlanItem]:
+    """Yield what contact needs."""
+    c, n, n_free = sizes.n_contact_unknowns, sizes.n_contact, sizes.n_free_motions
+    if not scene.contact_parts:
+        yield PlanItem("contact system", False, "no part may touch an obstacle: the body is solved at once")
+        return
+    yield PlanItem("contact system", True, f"{n} nodes may touch; every contact step solves for {c} unknowns")
+    yield PlanItem("second elastic body", False, "the obstacles are rigid")
+    yield _friction_item(scene.laws.values(), ", static" if n_steps == 1 else ", incremental")
+    tangential = f"{c - n} of {_count(n, 'contact node')}" if c > n else "supports give all of them"
+    yield PlanItem("tangential unknowns", c > n, tangential)
+    modes = "the supports hold all rigid motions"
+    if n_free:
+        modes = f"{n_free} of {sizes.n_motions} rigid motions {'is' if n_free == 1 else 'are'} held only by contact"
+    yield PlanItem("rigid motions as unknowns", n_free > 0, modes)
+
+
+def items_of_several(prepared: Prepared, sizes: Sizes, n_steps: int, *, is_dense: bool) -> Iterator[PlanItem]:
+    """Say what several bodies, or one with rigid bodies or contacts of its own, need and skip."""
+    scene = prepared.scene
+    shapes = [[prepared.bodies[number] for number in group] for group in groups(prepared.bodies)]
+    n_bodies = len(prepared.bodies)
+    yield PlanItem("bodies", True, f"{n_bodies}, of {len(shapes)} that are assembled and factored")
+    shared = n_bodies - len(shapes)
+    reason = f"{shared} bodies share what another one has" if shared else "every body differs, or is held by supports"
+    yield PlanItem("copies", shared > 0, reason)
+    for bodies in shapes[:_MOST_NAMED]:
+        yield PlanItem(f"body {_names(bodies)}", True, _body_line(bodies[0]))
+    if len(shapes) > _MOST_NAMED:
+        yield PlanItem(f"{len(shapes) - _MOST_NAMED} bodies more", True, "of the same kinds")
+    yield _further_meshes(scene.mesh.accuracy, "the numbers of elements are given", "first meshes")
+    n_pairs = len(scene.elastic_contacts)
+    n_fixed = sum(rows.other < 0 for rows in prepared.rows)
+    yield PlanItem("contacts between bodies", n_pairs > 0, f"{n_pairs}, coupled by mortar integrals")
+    yield PlanItem("rigid obstacles", n_fixed > 0, f"{n_fixed} parts face them" if n_fixed else "no part faces one")
+    n_rigid = len(scene.rigid)
+    moving = f"{n_rigid} in {len(scene.contacts) - n_pairs} contacts, {n_driven_motions(scene)} motions driven by loads"
+    yield PlanItem("rigid bodies", n_rigid > 0, moving if n_rigid else "there are none")
+    yield _friction_item(rows.law for rows in prepared.rows)
+    form = "one dense matrix of relative displacements"
+    if not is_dense:
+        from bemkit.contact.joined.sparse_form import sparse_solver_name
+
+        form = f"a sparse system, factored in every step by {sparse_solver_name()}"
+    yield PlanItem("contact system", True, f"{sizes.n_contact} nodes, {sizes.n_contact_unknowns} unknowns: {form}")
+    modes = "supports hold all bodies"
+    if sizes.n_free_motions:
+        modes = f"{sizes.n_free_motions} of {sizes.n_motions} rigid motions are held only by contact"
+    yield PlanItem("rigid motions as unknowns", sizes.n_free_motions > 0, modes)
+    yield from _last_items(n_steps, "fields inside the bodies")
+
+
+def n_driven_motions(scene: Stated) -> int:
+    """Return how many motions of rigid bodies are unknown."""
+    return sum(int(np.count_nonzero(body.is_driven)) for body in scene.rigid)
+
+
+def _names(bodies: Sequence[PlacedBody]) -> str:
+    return bodies[0].name if len(bodies) == 1 else f"{bodies[0].name} and {len(bodies) - 1} copies"
+
+
+def _body_line(body: PlacedBody) -> str:
+    method, mesh = body.scene.discretisation.method, body.own_mesh
+    return f"{mesh.n_elements} elements, {body.space.n_dofs} displacements ({method})"
+
+
+def _count(number: int, name: str) -> str:
+    return f"{number} {name}" if number == 1 else f"{number} {name}s"

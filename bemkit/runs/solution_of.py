@@ -1,0 +1,153 @@
+"""From what the driver found to a solution: physical fields, contact table, forces, transitions and warnings."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import partial
+from typing import TYPE_CHECKING, Any, cast
+
+import numpy as np
+
+from bemkit.arrays import IntArray
+from bemkit.contact.body import ContactState, SlipHistory
+from bemkit.geometry.local_values import mean_tractions
+from bemkit.geometry.spaces import dof_points
+from bemkit.model.model import Model
+from bemkit.model.solved_contact import contact_warnings
+from bemkit.plan import Plan
+from bemkit.result_warning import ResultWarning
+from bemkit.results.contact_table import ContactTable, bound_at, find_transitions
+from bemkit.results.solution import BoundaryFields, Solution
+from bemkit.results.warnings import find_warnings
+from bemkit.scene.scene import Scene
+from bemkit.solvers.base import ContactSolution, Status
+from bemkit.stopwatch import Stage, StageClock
+
+if TYPE_CHECKING:
+    from bemkit.model.prepared import Prepared
+    from bemkit.results.assembly_solution import SideName
+
+
+def solution_of(
+    model: Model, result: ContactSolution, plan: Plan, clock: StageClock, motion: SlipHistory | None = None
+) -> Any:
+    """Turn what the driver found into the physical fields of all bodies; the slip is for laws that depend on it."""
+    prepared = model.prepared
+    state, node_status = result.state, result.node_status
+    solved, reactions = model.boundary_fields(state), model.reactions(state)
+    table = _contact_table(model, state, node_status)
+    displacements = [displacement for displacement, _, _ in solved]
+    of_contact = contact_warnings(model, displacements, node_status) if result.is_converged else ()
+    fields = [
+        BoundaryFields(
+            dof_points(body.space),
+            displacement,
+            body.mesh.centres.copy(),
+            mean_tractions(body.traction_space, traction),
+            traction.reshape(-1, 2),
+            reaction,
+        )
+        for body, (displacement, traction, _), reaction in zip(prepared.bodies, solved, reactions, strict=True)
+    ]
+    clock = clock.closed(Stage.RECOVER)
+    finite = (np.isfinite(each).all() for own in solved for each in own)
+    if result.is_converged and not all(finite):
+        result = replace(result, status=Status.NOT_FINITE, message=Status.NOT_FINITE.value)
+    common: dict[str, Any] = {
+        "status": result.status,
+        "certificate": result.certificate,
+        "contact": table,
+        "history": result.history,
+        "linear_solves": result.linear_solves,
+        "outer_steps": result.steps,
+        "transitions": find_transitions(table, table.u_t - model.problem.slip_origin * model.units.displacement),
+        "timings": clock.timings,
+        "memory": clock.memory,
+        "plan": plan,
+        "work": model.work,
+        "message": result.message,
+    }
+    energies = [energy for _, _, energy in solved]
+    if isinstance(prepared.scene, Scene):
+        solution: Any = Solution(
+            scene=prepared.scene,
+            mesh=prepared.only.mesh,
+            boundary=fields[0],
+            force_normal=float(np.sum(-table.weight * table.sigma_n)),
+            force_tangential=float(np.sum(table.weight * table.sigma_t)),
+            energy=energies[0],
+            **common,
+        )
+    else:
+        solution = _several(model, state, fields, energies, motion, common)
+    return solution.with_warnings(partial(_warnings, of_contact))
+
+
+def _several(
+    model: Model,
+    state: ContactState,
+    fields: list[BoundaryFields],
+    energies: list[float],
+    motion: SlipHistory | None,
+    common: dict[str, Any],
+) -> Any:
+    from bemkit.results.assembly_solution import AssemblySolution, BodyResult
+    from bemkit.results.part_forces import RigidResult, contact_forces, nodal_resultants
+
+    prepared, table = model.prepared, common["contact"]
+    law = prepared.law if motion is None else prepared.law.at_slip(motion)
+    bodies = {
+        body.name: BodyResult(body.name, body.scene, body.mesh, own, energy)
+        for body, own, energy in zip(prepared.bodies, fields, energies, strict=True)
+    }
+    rigid = {
+        body.name: RigidResult(body.name, *reaction.tolist(), *moved.tolist())
+        for body, (moved, reaction) in zip(prepared.scene.rigid, model.rigid_bodies(state), strict=True)
+    }
+    resultants = nodal_resultants(table, prepared.frame, prepared.acting_at)
+    return AssemblySolution(
+        assembly=cast(Any, prepared.scene),
+        bodies=bodies,
+        contact_sides=_contact_sides(prepared),
+        contact_directions=prepared.frame[:, 0].copy(),
+        friction_bound=bound_at(table, law),
+        contacts=contact_forces(table, resultants, common["transitions"]),
+        rigid=rigid,
+        **common,
+    )
+
+
+def _contact_sides(prepared: Prepared) -> dict[str, tuple[SideName, ...]]:
+    """Return the sides of elastic bodies in each contact, first the one with the nodes."""
+    from bemkit.results.assembly_solution import SideName
+
+    sides = {pair.name: tuple(SideName(*each) for each in pair.elastic_parts) for pair in prepared.scene.contacts}
+    for rows in prepared.rows:
+        with_nodes = SideName(prepared.bodies[rows.body].name, rows.part)
+        sides[rows.name] = (with_nodes, *(side for side in sides.get(rows.name, ()) if side != with_nodes))
+    return sides
+
+
+def _warnings(of_contact: tuple[ResultWarning, ...], solution: Any) -> tuple[ResultWarning, ...]:
+    """Return the warnings about a solution, last those about its contact."""
+    return (*find_warnings(solution), *of_contact)
+
+
+def _contact_table(model: Model, state: ContactState, node_status: IntArray) -> ContactTable:
+    prepared, units = model.prepared, model.units
+    displacement = state.displacement * units.displacement
+    points, gap = prepared.column("points"), prepared.column("gap")
+    return ContactTable(
+        part=prepared.names,
+        x=points[:, 0].copy(),
+        y=points[:, 1].copy(),
+        s=prepared.column("arc_length"),
+        u_n=displacement[:, 0].copy(),
+        u_t=displacement[:, 1].copy(),
+        sigma_n=state.sigma_n * units.stress,
+        sigma_t=state.sigma_t * units.stress,
+        gap=gap,
+        clearance=gap - displacement[:, 0],
+        status=np.asarray(node_status).copy(),
+        weight=prepared.column("weights"),
+    )
