@@ -25,7 +25,7 @@ class NoResultError(BemkitError, RuntimeError):
 
 
 CANNOT_BE_SENT = (pickle.PicklingError, AttributeError, TypeError)
-"""What Python raises for a value that cannot be sent to another process, among other things."""
+"""Exceptions that Python raises for a value that cannot be pickled, among others."""
 
 
 def why_not_sent(value: object) -> str:

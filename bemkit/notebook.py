@@ -1,4 +1,4 @@
-"""What notebooks show of a value instead of its `repr`: a table, and a picture if matplotlib is installed."""
+"""HTML representation of values in notebooks: a table, and a picture if matplotlib is installed."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where the time and the memory of a run go: stage by stage, and in assembly wherever on the way that happens."""
+"""Time and memory of a run by stage, and those of assembly in any stage."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from contextvars import ContextVar
 from dataclasses import dataclass, replace
 
 PROGRESS = logging.getLogger("bemkit.progress")
-"""Where runs say what they are doing, at the level DEBUG."""
+"""Logger of the progress of runs, at the level DEBUG."""
 
 _running: ContextVar[AssemblyTime | None] = ContextVar("assembly time", default=None)
 
 
 @dataclass
 class AssemblyTime:
-    """What was spent in assembly since the stopwatch was started.
+    """Time and memory of assembly since the start of the stopwatch.
 
     Parameters
     ----------
@@ -96,11 +96,11 @@ class Stage(enum.Enum):
     SOLVE = "solve"
     RECOVER = "recover"
     WRITE = "write"
-    """Of the step before into a result file that grows with the steps."""
+    """Write the step before to a result file that grows with the steps."""
 
 
 _FOLLOWING = {Stage.MESH: Stage.ASSEMBLE, Stage.CONDENSE: Stage.SOLVE, Stage.SOLVE: Stage.RECOVER}
-"""What comes after the end of a stage."""
+"""The stage that follows the end of a stage."""
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""What the command line prints for people: summary, plan, convergence table, and what a run took."""
+"""Terminal output: summary, plan, convergence table, time and memory of a run."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What several commands have in common: changes of the scene, degrees, pictures, where results go, progress."""
+"""Options of several commands: changes of the scene, degrees, pictures, outputs, progress."""
 
 from __future__ import annotations
 

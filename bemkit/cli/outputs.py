@@ -1,4 +1,4 @@
-"""Where results go: texts and tables to files or standard output, figures to a folder, tables to the terminal.
+"""Outputs of a command: texts and tables to files or standard output, figures to a folder, tables to the terminal.
 
 Files are checked before any work is done, then replaced as a whole or not at all.
 """
@@ -115,7 +115,7 @@ class TableFile(Generic[Content]):
 
 @dataclass(frozen=True)
 class Outputs(Generic[Content]):
-    """Where a content goes; each is optional.
+    """Files of a result; each is optional.
 
     Parameters
     ----------

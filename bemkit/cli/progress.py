@@ -1,4 +1,4 @@
-"""What a person sees while a command computes: stage, mesh and step, and a bar with the time left."""
+"""Progress in a terminal: stage, mesh and step, and a bar with the remaining time."""
 
 from __future__ import annotations
 
@@ -130,7 +130,7 @@ class _PlannedBar(BarColumn):
 
 
 class _TimeLeft(ProgressColumn):
-    """What is left of the planned time."""
+    """The remaining planned time."""
 
     def render(self, task: Task) -> Text:
         """Return nothing without a plan, and when it is over."""

@@ -1,4 +1,4 @@
-"""What ``bemkit outline`` reads and prints: the sides of a body."""
+"""The sides of a body, read and printed by ``bemkit outline``."""
 
 from __future__ import annotations
 

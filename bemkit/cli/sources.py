@@ -1,4 +1,4 @@
-"""What commands draw and report: a result file, or a scene, which is solved first."""
+"""Sources of pictures and reports: a result file, or a scene, which is solved first."""
 
 from __future__ import annotations
 

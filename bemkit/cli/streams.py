@@ -14,7 +14,7 @@ from bemkit.errors import BemkitError
 _CLOSED = io.TextIOWrapper(io.BytesIO())
 _CLOSED.close()
 _LINES = str.maketrans("─━╸╺│┃╷╵", "----||||")
-"""What lines of tables and bars become where the encoding has only ASCII."""
+"""ASCII replacements of the lines of tables and bars."""
 
 
 class StreamError(BemkitError):
@@ -66,7 +66,7 @@ class GuardedStream(io.TextIOBase):
 
     @property
     def encoding(self) -> str:  # type: ignore[override]  # the base class has an attribute that is never set
-        """Of the stream."""
+        """Encoding of the stream."""
         return getattr(self._stream, "encoding", None) or "utf-8"
 
     def isatty(self) -> bool:

@@ -227,9 +227,9 @@ class LinearBody(Protocol):
         return "the obstacle"
 
     def shares(self, forces: FloatArray) -> FloatArray:
-        """Return by which share of the largest force the certificate measures each node; by default by all of it.
+        """Return the share of the largest force that scales each node in the certificate; by default 1.
 
-        Of several bodies a node is measured by the contact forces of its own partners, not by those of all bodies.
+        With several bodies the scale of a node is the contact force of its own partners, not of all bodies.
 
         Parameters
         ----------

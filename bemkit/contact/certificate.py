@@ -121,7 +121,7 @@ def certify(problem: ContactProblem, state: ContactState) -> Certificate:
 
 @dataclass(frozen=True, eq=False)
 class Scales:
-    """What the certificate divides by.
+    """Scales of the certificate.
 
     ===================  ===========================================  ===================================
     regime               stress [Pa]                                  length [m]

@@ -56,7 +56,7 @@ class Imbalance:
 
 @dataclass(frozen=True, eq=False)
 class Unbalanced:
-    """What a state of contact leaves of the balance of forces [N/m].
+    """Residual of the balance of forces of a contact state [N/m].
 
     Parameters
     ----------
@@ -153,7 +153,7 @@ def resultant_imbalance(
     volume_force : (3,) array, optional
         Resultants along x and y, and moment about the origin, of forces inside the body; none by default.
     inner_force : float [N/m]
-        Sum of the sizes of the forces that what acts inside could exert on the boundary, balanced or not.
+        Sum of the magnitudes of the forces that body forces and heat exert on the boundary, balanced or not.
 
     Returns
     -------

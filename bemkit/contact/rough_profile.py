@@ -15,7 +15,7 @@ from bemkit.errors import InputError, printable
 _LARGEST_STEP = 5.0
 """Distance of two neighbours, in usual steps, from which on points are missing between them."""
 _POINTS_OF_WAVE = 16
-"""Of the shortest wave: a spline through them is off by less than 1e-4 of its height."""
+"""Points of the shortest wave: the error of a spline through them is less than 1e-4 of its height."""
 _MOST_WAVES = 1_000_000
 
 

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from bemkit.geometry.arclength import ArcLength
 
 CURVE_MEMBERS = ("is_straight", "is_analytic", "magnitude", "point", "derivative")
-"""What every curve has; see `Curve`."""
+"""Members of every curve; see `Curve`."""
 _SAMPLES = np.linspace(0.0, 1.0, 17)
 _N_CHECK_INTERVALS = 8
 _N_CHECK_POINTS = 8

@@ -30,7 +30,7 @@ class DrawnSide(Protocol):
 
     @property
     def to(self) -> Point:
-        """Where it ends [m]."""
+        """End point [m]."""
         ...
 
     @property
@@ -206,7 +206,7 @@ class Loop:
 
     @property
     def starts(self) -> tuple[Point, ...]:
-        """Where each side starts."""
+        """Start point of each side."""
         return (self.start, *(side.to for side in self.sides[:-1]))
 
 

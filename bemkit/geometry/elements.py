@@ -1,4 +1,4 @@
-"""What a boundary mesh is made of, as plain arrays, and its bisection."""
+"""Arrays of a boundary mesh, and its bisection."""
 
 from collections.abc import Mapping
 from typing import NamedTuple

@@ -1,4 +1,4 @@
-"""Errors of the geometry: a boundary that bounds no body, or a name nobody gave."""
+"""Errors of the geometry: a boundary that bounds no body, or an unknown name."""
 
 from bemkit.arrays import FloatArray
 from bemkit.errors import InputError

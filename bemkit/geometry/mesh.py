@@ -327,7 +327,7 @@ class BoundaryMesh:
         return BoundaryMesh(*self._moved(shift, factor))
 
     def _moved(self, shift: tuple[float, float], factor: float) -> tuple[Any, ...]:
-        """Return what the constructor takes."""
+        """Return the arguments of the constructor."""
         symmetry, nodes = self.symmetry, (self.nodes - np.array(shift)) * factor
         if symmetry is not None:
             symmetry = symmetry.transformed(shift, factor)

@@ -1,4 +1,4 @@
-"""What lies beside what along a boundary: elements in their order, corners between them, ends of parts."""
+"""Neighbours along a boundary: elements in order, corners between them, ends of parts."""
 
 from __future__ import annotations
 

@@ -56,7 +56,7 @@ class Side:
 
 @dataclass(frozen=True)
 class Drawing:
-    """What else is known of an outline that was drawn.
+    """Further properties of an outline from a file.
 
     Parameters
     ----------

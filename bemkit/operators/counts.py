@@ -1,4 +1,4 @@
-"""What has been computed, in numbers that are the same on every computer.
+"""Operation counts, which are the same on every computer.
 
 The code that does the work counts it and returns the count with its result; nothing is collected behind the scenes.
 """

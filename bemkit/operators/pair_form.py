@@ -84,7 +84,7 @@ class PairForm(ABC):
 
     @property
     def tags(self) -> frozenset[Tag]:
-        """What is promised of its matrix."""
+        """Promised properties of its matrix."""
         return frozenset()
 
     @property

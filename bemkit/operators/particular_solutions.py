@@ -155,12 +155,12 @@ class ParticularSolution:
 
     @property
     def forces(self) -> ParticularSolution:
-        """Of the forces."""
+        """Particular solution of the forces."""
         return replace(self, sources=tuple(source for source in self.sources if not source.is_expansion))
 
     @property
     def expansions(self) -> ParticularSolution:
-        """Of the thermal strains."""
+        """Particular solution of the thermal strains."""
         return replace(self, sources=tuple(source for source in self.sources if source.is_expansion))
 
     def displacement(self, points: FloatArray) -> FloatArray:

@@ -1,4 +1,4 @@
-"""What all figures share: colours, frames without ornament, and axes that ignore round-off.
+"""Common style of all figures: colours, plain frames, and axes that ignore round-off.
 
 Drawn with matplotlib's object interface, so that no display and no global state is involved.
 """

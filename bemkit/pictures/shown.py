@@ -1,4 +1,4 @@
-"""What pictures show of a scene or a result: all bodies in their places, moved or not, with their contacts."""
+"""Content of pictures: all bodies of a scene or a result in their positions, moved or not, with their contacts."""
 
 from __future__ import annotations
 

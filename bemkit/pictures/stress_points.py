@@ -32,7 +32,7 @@ _SMALLEST = 1.0 / 8.0
 _CROWDED = 0.25
 """Distance of points of a layer, by that from the boundary, below which one of them represents all."""
 _GROWTH = 2.0
-"""Of the distances from the boundary, from one layer of points to the next."""
+"""Ratio of the distances of successive layers of points from the boundary."""
 _PER_ELEMENT = 2
 """Points of an element whose fields vary along it."""
 _DIFFERENCE = 1e-4

@@ -1,4 +1,4 @@
-"""What a solution is compared with: fields at places of the contact boundary, resultants, and ends of zones.
+"""Reference data: fields at points of the contact boundary, resultants, and transition points.
 
 References are exact, come from elsewhere, or are fine solutions.
 """
@@ -62,7 +62,7 @@ class Zone:
 
 @dataclass(frozen=True, eq=False)
 class Places:
-    """Where fields are compared along one contact part.
+    """Points at which fields are compared along one contact part.
 
     Parameters
     ----------
@@ -84,7 +84,7 @@ class Places:
 
 @dataclass(frozen=True, eq=False)
 class Answer:
-    """What is compared; columns run over all places of all parts.
+    """Fields to compare; columns run over all points of all parts.
 
     Parameters
     ----------

@@ -56,7 +56,7 @@ class DiscBetweenPlates:
 
     @cached_property
     def half_angle(self) -> float:
-        """Where contact ends [rad]."""
+        """End of contact [rad]."""
         # Hertz: approach / radius = e^2 / 2 times a slowly varying logarithm
         share = self.approach / self.radius
         near = 0.5 * np.sqrt(share)

@@ -92,7 +92,7 @@ class PinInHole:
 
     @cached_property
     def half_angle(self) -> float:
-        """Where contact ends [rad]."""
+        """End of contact [rad]."""
         return half_width_for(self.load, self._load_on, 0.3)
 
     @property

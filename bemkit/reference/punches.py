@@ -59,7 +59,7 @@ class FlatPunch:
 
     @property
     def contact_start(self) -> float:
-        """Where contact begins [m]: -a unless the tilt lifts this side off."""
+        """Start of contact [m]: -a unless the tilt lifts this side off."""
         a = self.half_width
         if 0.5 * np.pi * self.modulus * self.tilt * a <= self.load:
             return -a

@@ -61,7 +61,7 @@ class RecedingLayer:
 
     @cached_property
     def half_width(self) -> float:
-        """Where contact ends [m]."""
+        """End of contact [m]."""
         return self.thickness * half_width_for(0.0, lambda c: self._solved(c)[1], 1.0)
 
     @property

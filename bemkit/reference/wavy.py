@@ -98,7 +98,7 @@ class WavyObstacle:
 
     @cached_property
     def half_width(self) -> float:
-        """Where contact ends [m]."""
+        """End of contact [m]."""
         modulus = self.material.plane_modulus
         near = westergaard_half_width(self.mean_pressure, self.amplitude, self.wavelength, modulus)
         load = self.mean_pressure * self.wavelength

@@ -1,4 +1,4 @@
-"""What notebooks show of scenes, plans and results: a short table, and a picture if matplotlib is installed."""
+"""HTML of scenes, plans and results in notebooks: a short table, and a picture if matplotlib is installed."""
 
 from __future__ import annotations
 

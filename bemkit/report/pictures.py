@@ -50,7 +50,7 @@ def _caption(picture: Picture, part: str | None) -> str:
 
 
 def _in_words(result: Result, part: str | None) -> str:
-    """Return what is most important of a contact, or of all."""
+    """Return the most important numbers of a contact, or of all."""
     table = result.contact
     if not table.n_contact:
         return f"Of: {result.title}."

@@ -1,4 +1,4 @@
-"""What reports say of a result in words and tables, from its summary."""
+"""Text and tables of a report, from the summary of a result."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from bemkit.scene.unit_names import amount
 from bemkit.version import __version__
 
 _MOST_ROWS = 200
-"""Of a table; the files hold all."""
+"""Largest number of rows of a table; the files hold all."""
 _QUANTITIES = {"force_normal": "force", "force_tangential": "force", "energy": "energy"}
 _COUNTED = ("n_bodies", "n_elements", "n_contact", "linear_solves", "outer_steps")
 

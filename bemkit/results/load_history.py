@@ -1,4 +1,4 @@
-"""What a result says of the steps of a load history: forces, status and work of each, position of the last."""
+"""Results of the steps of a load history: forces, status and work of each, position of the last."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 class StepEnd(Protocol):
-    """What a step needs of the solution at its end: `Solution` and `AssemblySolution` are some."""
+    """Members of a solution that a step needs: `Solution` and `AssemblySolution` have them."""
 
     @property
     def energy(self) -> float:
@@ -24,7 +24,7 @@ class StepEnd(Protocol):
 
     @property
     def contact(self) -> ContactTable:
-        """What every contact node carries."""
+        """The table of contact nodes."""
 
 
 _COARSE = 0.01

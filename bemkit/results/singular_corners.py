@@ -28,7 +28,7 @@ from bemkit.solvers.active_sets import NodeStatus
 _PARALLEL = 1e-6
 """Component along the normal, or along the tangent, that is none."""
 _DIGITS = 6
-"""Of angles: round-off of short elements must not separate equal ones."""
+"""Digits of angles: round-off of short elements must not separate equal ones."""
 _BEFORE, _AFTER = 0, 1
 """The element that ends at a node, and the one that starts there."""
 
@@ -124,7 +124,7 @@ def _normal(mesh: BoundaryMesh, element: int, xi: float) -> FloatArray:
 
 
 class _GivenSides:
-    """What is given on the elements of a solved body at either of their ends."""
+    """Conditions on the elements of a solved body at either of their ends."""
 
     def __init__(
         self, body: SolvedBody, contact: ContactTable, motion: SlipHistory | None, unknown: Collection[str]
@@ -138,7 +138,7 @@ class _GivenSides:
         self.may_touch: BoolArray = np.isin(self._part, [part.name for part in body.scene.contact_parts])
 
     def at_start(self, element: int) -> WedgeSide | None:
-        """Return what is given where an element starts; None if that is unknown, or displacements at an angle to it."""
+        """Return the condition at the start of an element; None if unknown, or a displacement at an angle to it."""
         return self._at(element, -1.0)
 
     def at_end(self, element: int) -> WedgeSide | None:
@@ -169,7 +169,7 @@ class _GivenSides:
         return ROLLER if isinstance(condition, Roller) else FREE
 
     def _in_contact(self, element: int) -> WedgeSide:
-        """Return what the contact node next to the middle of an element does."""
+        """Return the status of the contact node nearest to the middle of an element."""
         own = np.flatnonzero(self._table.rows(self._part[element]))
         row = int(own[np.argmin(norms(self._points[own] - self._mesh.centres[element]))])
         status = NodeStatus(int(self._table.status[row]))

@@ -18,7 +18,7 @@ import numpy as np
 from bemkit.arrays import ComplexArray, read_only
 
 _STARTS = np.append(np.arange(0.08, 0.9, 0.12), (0.93, 0.975, 0.995))[:, None] + 1j * np.array([0.0, 0.07, 0.2, 0.5])
-"""Where the search for roots begins: oscillating fields have imaginary parts below 1/2."""
+"""Start values of the search for roots: oscillating fields have imaginary parts below 1/2."""
 _MOST_STEPS, _LONGEST_STEP = 25, 0.15
 _DIFFERENCE = 1e-6
 _IS_ROOT = 1e-8
@@ -32,7 +32,7 @@ _IS_COSINE = read_only(np.array([True, False, True, False]))
 
 @dataclass(frozen=True)
 class WedgeSide:
-    """What is given on one side of a corner: of each direction the displacement, or else the traction.
+    """Conditions on one side of a corner: in each direction the displacement or the traction is given.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Where zones of one contact status end: elements and places on them."""
+"""Ends of zones of one contact status: elements and points on them."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ NEIGHBOURHOOD = 1e-3
 LYING_AT = 1e-9
 """Distance, relative to a side, within which an element ends at a point."""
 _MOST_STEPS = 20
-"""Of Newton's method for the place on a curved element: two or three are enough."""
+"""Steps of Newton's method for the point on a curved element: two or three are enough."""
 
 
 class ZoneEnd(NamedTuple):

@@ -26,7 +26,7 @@ from bemkit.testing.spaces import check_space
 
 _MATERIAL = Material(2.0, 0.3)
 _ROUND_OFF = 1e-9
-"""Of a map of a hundred unknowns, relative to its largest entry."""
+"""Round-off of an operator of a hundred unknowns, relative to its largest entry."""
 _COARSE = 0.05
 """Error of displacements and stresses of a body under uniform tension on 48 elements that no method exceeds."""
 

@@ -67,7 +67,7 @@ class DirectBody(DenseBody):
 
     @property
     def conditions(self) -> NodalConditions:
-        """Of the displacement nodes."""
+        """Conditions of the displacement nodes."""
         return self.whole.conditions
 
     @property

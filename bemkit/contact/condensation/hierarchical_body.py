@@ -136,7 +136,7 @@ class HierarchicalBody(LinearBody):
 
     @property
     def accuracy(self) -> float:  # type: ignore[override]
-        """What the linear solver says."""
+        """Message of the linear solver."""
         return self.loaded.map.options.accuracy
 
     @property

@@ -141,7 +141,7 @@ class WholeBody:
 
     @cached_property
     def _given_forces(self) -> FloatArray:
-        """What acts besides contact, in directions that no support holds, and inside [N/m]."""
+        """Forces besides contact, in directions that no support holds, and body forces [N/m]."""
         given, resultant = self.conditions.in_frames(self.force)[~self.conditions.is_fixed], self.condensed.volume_force
         return given if resultant is None else np.append(given, [*resultant[:2], self.condensed.inner_force])
 

@@ -1,4 +1,4 @@
-"""What all half-planes have in common as a `LinearBody`: tractions on elements, and motions of the whole far away.
+"""Base of all half-planes as a `LinearBody`: tractions on elements, and rigid motions far away.
 
 The displacement of the surface is ``u = F t + u_0 + R q``: F t is caused by the unknown tractions t of contact and
 supports, u_0 by the given forces and motions, and R q are the motions that forces far away drive, whose work with all
@@ -148,7 +148,7 @@ class SurfaceBody(LinearBody):
 
     @cached_property
     def _supports(self) -> LinearConditions:
-        """What supports say of the held elements: displacements along some directions, no reactions along others."""
+        """Conditions on held elements: displacements in some directions, zero reactions in others."""
         held, conditions = self._held, self.conditions
         along = as_pairs(self.elastic.to_complex(conditions.frame[held]))
         is_fixed = conditions.is_fixed[held]

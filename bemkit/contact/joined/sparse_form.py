@@ -25,7 +25,7 @@ from bemkit.operators.linear.dense import SingularMatrixError
 _MISSING = "SuperLU (pip install 'bemkit[pardiso]' brings PARDISO, which is faster)"
 _OPTIONS = {1: 1, 2: 2, 8: 0, 10: 13, 11: 0, 13: 0}
 """Nested dissection, tiny pivots enlarged by 1e-13, neither scaling nor matching: these would spoil the order, and the
-rows are scaled before. Refinement is left to the caller, who knows the matrix without its penalty."""
+rows are scaled before. The caller refines the solution, because it knows the matrix without its penalty."""
 
 Solve = Callable[[FloatArray], FloatArray]
 _SMALLEST_RCOND = 1e-15

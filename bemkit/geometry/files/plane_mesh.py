@@ -62,7 +62,7 @@ class PlaneMesh:
     points : (n, 2) array [m]
     blocks : tuple of CellBlock
     names : tuple of str
-        Of groups, as the file lists them, be there cells in them or not.
+        Names of groups in the order of the file, with or without cells.
     """
 
     points: FloatArray

@@ -27,7 +27,7 @@ _DRAWINGS = (".dxf", ".svg")
 
 @dataclass(frozen=True)
 class Drawn:
-    """What a file holds.
+    """Content of a file.
 
     Parameters
     ----------
@@ -66,7 +66,7 @@ class ShapeFile(ABC):
 
     @cached_property
     def shape(self) -> OutlineShape:
-        """What the file holds, in plain numbers.
+        """Content of the file, in plain numbers.
 
         Raises
         ------

@@ -43,7 +43,7 @@ class Stroke:
 
     @property
     def end(self) -> Point:
-        """Where it ends [m]."""
+        """End point [m]."""
         return self.side.to
 
     @property

@@ -7,7 +7,7 @@ the slope i everywhere, and so are held exactly.
 
 The parabola through the three midpoints differs from that in the mean by b_j (l tau)^2 / 3, b_j its leading
 coefficient, and this much is added to the constant part. Without it a bent body seems to be displaced by h^2 / 24 of
-its curvature everywhere but at the midpoint itself, which no thin body forgives.
+its curvature everywhere but at the midpoint itself, which makes thin bodies wrong.
 """
 
 from __future__ import annotations

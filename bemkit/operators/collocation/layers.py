@@ -82,7 +82,7 @@ class Unknowns(NamedTuple):
 
 
 Elements: TypeAlias = tuple[ComplexArray, ComplexArray]
-"""Where (n_elements,) straight elements start and end."""
+"""Start and end points (n_elements,) of straight elements."""
 Layer: TypeAlias = Callable[[Constants, bool, ComplexArray, IntArray, Elements, Unknowns], ComplexArray]
 """The signature of `straight_layer` and of its compiled version."""
 

@@ -26,7 +26,7 @@ from bemkit.operators.integrals.panels import Panels
 from bemkit.operators.material import Material
 
 _POINTS = 16
-"""Of the Gauss rule on an element; round-off where the element is not longer than the hole is wide."""
+"""Points of the Gauss rule on an element; exact to round-off if the element is not longer than the hole is wide."""
 _POINTS_OF_LINES = 2
 """Enough for a dilatation along straight elements; the points of a million of them take memory."""
 _CANDIDATES = 64

@@ -33,7 +33,7 @@ class HalfPlaneElasticity(SurfaceElasticity):
 
     @property
     def work(self) -> OperationCounts:
-        """What the flexibility took."""
+        """Operation counts of the flexibility."""
         return half_plane_work(self.mesh.n_elements)
 
     def displaced(self, traction: ComplexArray) -> ComplexArray:

@@ -13,9 +13,9 @@ _BYTES = 8
 LARGEST_DENSE = 1500
 """Elements up to which the flexibility of a strip is kept as a matrix."""
 _BYTES_OF_TREE = 10_000
-"""Of an element beyond that."""
+"""Bytes for each element of larger strips."""
 _FLOPS_OF_TREE = 6e5
-"""Of an element there: all responses together."""
+"""Flops for each element of larger strips, in all responses."""
 _BASIS = 120
 """Vectors that the iteration for a response keeps, all others included."""
 _RESPONSES, _ITERATIONS, _FLOPS_OF_TRANSFORM = 20, 40, 500.0
@@ -30,7 +30,7 @@ def half_plane_map(mesh: BoundaryMesh, material: Material) -> HalfPlaneElasticit
 
 
 def half_plane_needs(case: BodyCase) -> BodyNeeds:
-    """Return what the map of a half-plane takes."""
+    """Return the costs of a half-plane."""
     if case.mesh.surface is not None and case.mesh.surface.is_periodic:
         return _periodic_needs(case)
     n, n_acting = case.mesh.n_elements, case.n_retained + case.n_fixed

@@ -1,4 +1,4 @@
-"""What the elastic maps of all half-planes have in common.
+"""Base of the elasticity of all half-planes.
 
 Tractions and displacements are complex numbers, along the tangent and, as the imaginary part, along the normal.
 """
@@ -53,11 +53,11 @@ class SurfaceElasticity(ABC):
     @property
     @abstractmethod
     def flexibility(self) -> FloatArray:
-        """What tractions displace, without the motion far away; computed once."""
+        """Displacements by tractions, without the rigid motion far away; computed once."""
 
     @property
     def work(self) -> OperationCounts:
-        """What the flexibility took."""
+        """Operation counts of the flexibility."""
         return OperationCounts()
 
     def driven_by(self, drive: FarDrive) -> Self:

@@ -147,7 +147,7 @@ class Factor:
         self._only_leaf: _Leaf | None = None
 
     def expect(self, given: Iterable[FloatArray]) -> None:
-        """Say, before the first `update`, what laws will give; see `KnownLoads`."""
+        """Announce, before the first `update`, the loads of the laws; see `KnownLoads`."""
         self._loads = KnownLoads(self._stays, given)
 
     def update(self, laws: ElementLaws) -> None:

@@ -1,4 +1,4 @@
-"""What a cluster of elements sees of the others: those near it one by one, all others as one circle around it.
+"""Field of all other elements at a cluster: near elements individually, all others as one circle around it.
 
 Outside of a circle of twice the radius of a cluster every displacement that its elements cause follows from that on the
 circle, and every displacement that comes from outside of it is, within, that of forces on the circle. So the near field

@@ -39,7 +39,7 @@ class NodeConditions:
         )
 
     def beside(self, traction: FloatArray, displacement: FloatArray) -> NodeConditions:
-        """Return what they ask of the rest beside known tractions and displacements, (n, 2) in the frames."""
+        """Return the right-hand sides after known tractions and displacements, (n, 2) in the frames."""
         known = np.einsum("nrk,nk->nr", self.on_traction, traction)
         known += np.einsum("nrk,nk->nr", self.on_displacement, displacement)
         return replace(self, value=self.value - known)
@@ -49,7 +49,7 @@ class NodeConditions:
         return NodeConditions(self.on_traction[elements], self.on_displacement[elements], self.value[elements])
 
     def solved(self, displacement_unit: float) -> SolvedConditions:
-        """Return what they make of tractions and displacements, in the frames of the elements; see `solve_for_two`.
+        """Return tractions and displacements under these conditions, in the frames of elements; see `solve_for_two`.
 
         Raises
         ------
@@ -90,7 +90,7 @@ class HierarchicalSystem:
         return self.factor.n_updates
 
     def expect(self, given: Iterable[FloatArray]) -> None:
-        """Say, before the first `state`, what `laws` will give, (n_elements, 4) each: sums of that cost little then."""
+        """Announce, before the first `state`, the loads of `laws`, (n_elements, 4) each: their sums are then cheap."""
         self.factor.expect(given)
 
     def state(self, known: ElementLaws, elements: IntArray, conditions: NodeConditions) -> FloatArray:

@@ -73,7 +73,7 @@ class Cholesky:
 
     @property
     def factorisation(self) -> Factorisation:
-        """What it took."""
+        """Operation counts."""
         return Factorisation(FactorKind.CHOLESKY, len(self._factor))
 
     @property
@@ -143,7 +143,7 @@ class DenseLU:
 
     @property
     def factorisation(self) -> Factorisation:
-        """What it took."""
+        """Operation counts."""
         return Factorisation(FactorKind.LU, len(self._factor))
 
     def solve(self, right: FloatArray) -> FloatArray:

@@ -99,7 +99,7 @@ def _held_by_a_thread(setting: Callable[[], AbstractContextManager[Any]]) -> Ite
 
 
 _TURNS = _Turns()
-"""One for the process, because the threads of BLAS are: the only mutable state of the package."""
+"""One for the process, because the threads of BLAS belong to the process."""
 
 
 @contextmanager

@@ -1,4 +1,4 @@
-"""What conditions make of the tractions and displacements of all elements, in a few bytes for each.
+"""Tractions and displacements of all elements under their conditions, in a few bytes for each element.
 
 On most elements each condition gives one quantity of its own: which, and its value, is all there is to keep. Only where
 one quantity follows from others, as friction from pressure, its coefficients are kept as well.

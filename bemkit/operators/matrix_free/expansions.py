@@ -94,7 +94,7 @@ class Expansions:
     def of_parents(
         self, series: ComplexArray, arm: ComplexArray, radius: FloatArray, parent: FloatArray
     ) -> ComplexArray:
-        """Return what the sources of clusters add to the series of their parents.
+        """Return the series of the sources of clusters about the centres of their parents.
 
         Parameters
         ----------

@@ -16,7 +16,7 @@ from bemkit.operators.collocation.layers import Constants
 from bemkit.operators.material import Material
 
 _CHUNK = 2048
-"""Elements that are at work at a time, so that nothing large is made on the way."""
+"""Elements that are processed at a time, which bounds the memory."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -173,7 +173,7 @@ class MatrixFreeSystem(HierarchicalSystem):
         return pairs(traction), pairs(displacement)
 
     def residual(self, elements: IntArray, traction: FloatArray, displacement: FloatArray) -> FloatArray:
-        """Return what is left (n, 2) of the equations of some elements; see `HierarchicalSystem.residual`."""
+        """Return the residual (n, 2) of the equations of some elements; see `HierarchicalSystem.residual`."""
         t, u = (each @ np.array([1.0, 1j]) for each in (traction, displacement))
         return self._left(t, u, self._x[2 * self.n_elements :])[0][elements]
 

@@ -1,4 +1,4 @@
-"""What the elements far from points cause there, from series of their clusters.
+"""Fields of elements far from the points, from series of their clusters.
 
 Near the boundary only differences of displacements from that of the nearest boundary point leave small fields. Besides
 the series of the data those of the constant displacements 1 and i are therefore summed, so that these cancel term

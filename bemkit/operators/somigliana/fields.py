@@ -46,12 +46,12 @@ CHUNK_PAIRS = 8192
 """Points and elements near them that are integrated at a time."""
 CHUNK_POINTS = 8192
 _INTEGRALS = 400
-"""Of a point, by the time that it takes."""
+"""Cost of a point, in integrals."""
 MOST_ELEMENTS, FEW_POINTS = 300, 30
 """Elements, and points on more elements, up to which all pairs are integrated: no series are made then."""
 
 Terms: TypeAlias = Callable[[ComplexArray, IntArray, ComplexArray, bool], ComplexArray]
-"""What elements add at points: from points, elements, displacements subtracted, and whether these are curved."""
+"""Contribution of elements at points: a function of points, elements, subtracted displacements, and a curved flag."""
 OfClusters: TypeAlias = Callable[[FarFields, ComplexArray, ComplexArray, list[Pairs]], ComplexArray]
 
 

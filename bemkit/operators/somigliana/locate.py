@@ -33,7 +33,7 @@ class PointNotInsideError(GeometryError):
 
 @dataclass(frozen=True, eq=False)
 class Location:
-    """Where points are.
+    """Positions of points relative to a body.
 
     Parameters
     ----------

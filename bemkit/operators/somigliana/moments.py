@@ -31,7 +31,7 @@ from bemkit.operators.integrals.panels import Panels
 from bemkit.operators.integrals.splitting import SEPARATION, split_until
 
 Integrands = Callable[[ComplexArray, ComplexArray], list[ComplexArray]]
-"""Of rho and tau."""
+"""Integrands as functions of rho and tau."""
 N_POINTS = 14
 """Gauss points of a piece: (3 + sqrt(8))**-28 is far below round-off, which leaves room for the third power of rho."""
 CENTRE, START, END = 0, 1, 2
@@ -41,7 +41,7 @@ AT_END = 0.5
 
 @dataclass(frozen=True, eq=False)
 class DisplacementMoments:
-    """What displacements need; every array is (n_polynomials, n_pairs), `measure` the integral of P_k ds."""
+    """Integrals for displacements; every array is (n_polynomials, n_pairs), `measure` the integral of P_k ds."""
 
     log: FloatArray
     measure: FloatArray
@@ -52,7 +52,7 @@ class DisplacementMoments:
 
 @dataclass(frozen=True, eq=False)
 class GradientMoments:
-    """What displacement gradients and stresses need; every array is (n_polynomials, n_pairs).
+    """Integrals for displacement gradients and stresses; every array is (n_polynomials, n_pairs).
 
     Densities are sums of Legendre polynomials, or of powers of t - e with e = -1, 1, as `origin` (n_pairs,) says
     (`CENTRE`, `START`, `END`): close to an end of an element they are expanded about it, or the two elements that meet

@@ -40,7 +40,7 @@ class ForcesInside:
     volume_force : (3,) array [N/m], [N/m], [N]
         Resultants along x and y of the forces inside, and their moment about the origin.
     inner_force : float [N/m]
-        Sum of the sizes of the forces that what acts inside could exert on the boundary, balanced or not: of those
+        Sum of the magnitudes of the forces that body forces and heat exert on the boundary, balanced or not: of those
         above, and of E' times the strains that heat causes.
     """
 
@@ -229,7 +229,7 @@ class HeavyElasticity:
 
     @cached_property
     def _work_on_particular(self) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """What forces (n_nodes, 2), tractions (n_elements, n_local, 2) and displacements (n_nodes, 2) work on."""
+        """Work conjugates of forces (n_nodes, 2), tractions (n_elements, n_local, 2) and displacements (n_nodes, 2)."""
         inside, space, moved_space = self.inside, self.traction_space, self.displacement_space
         xi, weights = gauss_legendre(space.degree + _MORE_POINTS)
         elements = np.arange(space.mesh.n_elements)

@@ -121,7 +121,7 @@ class GalerkinElasticity:
 
     @cached_property
     def factors(self) -> GalerkinFactors:
-        """What the map is made of, computed on first use."""
+        """Matrices of the operator, computed on first use."""
         layers = assemble_layers(self.displacement_space, self.traction_space, self.material, self._pressures)
         matrix = _symmetric_sum(layers.hypersingular, layers.whitened_trace)
         return GalerkinFactors(matrix, layers.single_layer, layers.whitened_trace, layers.work)

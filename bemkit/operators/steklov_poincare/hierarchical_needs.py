@@ -40,12 +40,12 @@ _LEAST_COMPRESSIBILITY = 1e-8
 _SHARE = 0.5
 """Predicted share of the time of the dense equations below which they are compressed."""
 _FLOPS_OF_LARGE = 0.2
-"""Of the factorisation of a large matrix, flops on small blocks that take as long as one."""
+"""Flops on small blocks that take as long as one flop of the factorisation of a large matrix."""
 
 
 @dataclass(frozen=True)
 class _Costs:
-    """Of an element at the tolerance 1e-10.
+    """Costs of an element at the tolerance 1e-10.
 
     Parameters
     ----------
@@ -75,9 +75,9 @@ _COLLOCATION = _Costs(14e3, 3e3, 0.4e6, 25e3, 8.8e3, 3.5e3, 16e6, 6.5e3)
 _MOST_IN_NUMPY = 38e6
 """Bytes of the integrals that exist at the same time."""
 _FLOPS_OF_STEP = 2e8
-"""Of a contact step on a mesh of any size, besides what grows with it."""
+"""Flops of a contact step on a mesh of any size, besides those that grow with the mesh."""
 _BYTES_OF_STATE, _FLOPS_OF_STATE = 40.0, 2e3
-"""Of a stiffness, for each pair of retained directions: tractions, displacements and the stiffness itself."""
+"""Costs of a stiffness for each pair of retained directions: tractions, displacements and the stiffness itself."""
 _DIGITS = 10.0
 LARGEST_BLOCK = 1000
 """Order that the largest dense block of a tree hardly exceeds."""
@@ -160,7 +160,7 @@ def _options(case: BodyCase) -> Hierarchical:
 
 
 def hierarchical_needs(case: BodyCase, *, takes_slopes: bool) -> BodyNeeds:
-    """Return what the compressed equations take; nothing of them is counted, because ranks are not predicted."""
+    """Return the costs of the compressed equations, without counts, because ranks are not predicted."""
     options = _options(case)
     slopes = "rotations then cause no tractions" if takes_slopes else "the method of the source paper"
     reason = f"compressed over a tree to {options.tolerance:g}: {case.linear_solver.reason}"

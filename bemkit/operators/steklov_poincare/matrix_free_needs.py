@@ -17,7 +17,7 @@ _BYTES, _BYTES_OF_GROUPS = 1.35e3, 5e6
 """Of an element: mesh, directions of the iteration, series, conditions and fields; and once, of which the largest part
 are the equations of groups of elements."""
 _EVALUATIONS, _EVALUATIONS_COMPILED = 4.5e3, 0.3e3
-"""Of a product, for each element."""
+"""Evaluations of a product for each element."""
 _STEPS = 17.0
 """Products of a response from cold, to the tolerance of 1e-10."""
 _RESPONSES = 6.0

@@ -1,4 +1,4 @@
-"""What a Steklov-Poincare map takes, predicted from sizes: items, counts, memory and operations.
+"""Costs of a Steklov-Poincare operator, predicted from sizes: items, counts, memory and operations.
 
 Counts are exact. Memory adds up the matrices that are alive at the same time and the buffers of assembly; those of
 collocation, and the evaluations of integrals, were fitted once to runs of the shipped scenes with 50 to 800 elements.
@@ -26,7 +26,7 @@ _BYTES = 8
 CONTACT_STEPS = 8
 """Steps of Newton's method for a contact problem; they hardly depend on its size."""
 _SECONDS_PER_EVALUATION, _SECONDS_PER_FLOP = 2e-8, 1e-10
-"""Of a common computer: for a closed-form integral, and for a flop of a factorisation."""
+"""Seconds of a common computer for a closed-form integral, and for a flop of a factorisation."""
 _OWN_SOLVER = ChosenLinearSolver(DenseCholesky(), "the map has a linear solver of its own")
 
 
@@ -104,7 +104,7 @@ class BodyCase:
 
 @dataclass(frozen=True)
 class BodyNeeds:
-    """What the map of a body takes until it is condensed, and what of it is kept.
+    """Costs of a body until it is condensed, and its kept arrays.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What is known at the displacement nodes of a body: fixed, free or retained directions, forces and displacements."""
+"""Conditions at the displacement nodes of a body: fixed, free or retained directions, forces and displacements."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What every Steklov-Poincare map can do, and what it becomes when it is condensed."""
+"""Protocol of every Steklov-Poincare operator, and of its condensed form."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class CondensedMap(ABC):
         Resultants along x and y, and moment about the origin, of forces inside the body; none by default. Of a
         half-plane, the loads that drive it from far away.
     inner_force : float [N/m]
-        Sum of the sizes of the forces that what acts inside could exert on the boundary, balanced or not.
+        Sum of the magnitudes of the forces that body forces and heat exert on the boundary, balanced or not.
     weightless : CondensedMap, optional
         Of a body with forces or heat inside: the same body without; see
         `bemkit.operators.steklov_poincare.forces_inside`.
@@ -94,5 +94,5 @@ class SteklovPoincare(Protocol):
         Returns
         -------
         (n_elements, n_local, 2) array [Pa]
-            At the local nodes of the traction space, element by element; the caller's own.
+            At the local nodes of the traction space, element by element; a new array.
         """

@@ -66,7 +66,7 @@ class SchurCondensation:
 
     @property
     def work(self) -> OperationCounts:
-        """What the elimination took."""
+        """Operation counts of the elimination."""
         n_columns = self._retained.size + self._volume.shape[1]
         return OperationCounts(factorisations=self.factor.factorisations, right_hand_sides=n_columns)
 

@@ -31,7 +31,7 @@ _MESHES_TOGETHER = 1.3
 
 @dataclass(frozen=True)
 class StudyOptions:
-    """What is asked of an error study; lists are words and numbers with commas between them.
+    """Options of an error study; lists are names and numbers with commas between them.
 
     The exponent is that of graded meshes, the most elements are those of adaptive ones. The reference is a fine
     solution if its number of elements is given; no run times are measured without a number of repetitions.

@@ -13,7 +13,7 @@ from bemkit.table import Table, column, markdown_table
 
 
 class Verdict(Enum):
-    """What a record shows."""
+    """Verdict on a record."""
 
     RIGHT = "right"
     """Called converged; the independent check and the similar twin agree, and so does the reference where it must."""

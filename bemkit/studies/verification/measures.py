@@ -1,4 +1,4 @@
-"""What is measured of each problem with a known answer: by the name of a row its measure, and what should come out.
+"""Measured quantities of each problem with a known solution: for each row its measure and its expected value.
 
 Zero should come out of measures that are relative errors themselves.
 """
@@ -55,7 +55,7 @@ Rows: TypeAlias = Mapping[str, tuple[Measure, float]]
 """By the names of rows: measure, and what should come out."""
 
 STEEL = Material(0.91, 0.3)
-"""Of half-planes, with E' = 1."""
+"""Material of half-planes, with E' = 1."""
 FRICTION = 0.3
 CYLINDER, ROUNDED = HertzLine(1.0, 1.0, 1.0), RoundedPunch(1.0, 0.5, 1.0, 1.0)
 

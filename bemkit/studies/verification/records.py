@@ -1,4 +1,4 @@
-"""What was measured: a record for each quantity at each resolution, their file, and the rows that they make."""
+"""Records of a verification: one for each quantity at each resolution, their file, and their rows."""
 
 from __future__ import annotations
 

@@ -45,7 +45,7 @@ class AssemblyCheck(Violations):
 
     @property
     def needs_warning(self) -> str:
-        """What a solution must warn of: "reciprocity" or "hidden_overlap" of a coarse mesh."""
+        """Warnings that a solution must have: "reciprocity" or "hidden_overlap" of a coarse mesh."""
         if self.hidden_overlap > max(COARSE_LIMIT, COARSE_SHARE * self.coarseness):
             return "hidden_overlap"
         return "reciprocity" if self.is_coarse else ""

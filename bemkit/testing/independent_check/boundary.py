@@ -1,4 +1,4 @@
-"""What a solution is checked by: its boundary, made anew from points on its elements, and the sizes of its fields."""
+"""The boundary of a solution, rebuilt from points on its elements, and the scales of its fields."""
 
 from __future__ import annotations
 

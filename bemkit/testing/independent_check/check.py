@@ -79,7 +79,7 @@ def measure(
     is_supported: BoolArray,
     units: tuple[FloatArray, FloatArray],
 ) -> Measured:
-    """Return what the laws speak of.
+    """Return the quantities in the friction laws.
 
     Parameters
     ----------

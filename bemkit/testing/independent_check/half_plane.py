@@ -33,7 +33,7 @@ from bemkit.testing.independent_check.nodes import Fields
 _MOST_PAIRS = 250_000
 """Pairs of elements that are looked at: of more than 500 elements some displacements are skipped, but no traction."""
 _STEP, _REACH = 0.14, 3.1
-"""Of the double exponential rule: 1e-10 of a mean logarithm, for any lengths of the elements."""
+"""Step and range of the double exponential rule: 1e-10 of a mean logarithm, for any lengths of the elements."""
 _NEAR, _N_GAUSS = 3.0, 8
 """Distance, in half the sum of lengths, from which on Gauss points do, and how many: 1e-12 of a mean logarithm."""
 _IN_MOTION = 1e-6

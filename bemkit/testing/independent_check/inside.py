@@ -1,4 +1,4 @@
-"""What acts inside the body: resultants of its forces by integrals over the boundary, and the part they explain.
+"""Body forces: their resultants by integrals over the boundary, and their share of the fields.
 
 The area of the body and its first moments are boundary integrals by Gauss's theorem. Symmetry lines, on which no
 elements lie, add nothing: coordinates are taken from the centre, which lies on them.

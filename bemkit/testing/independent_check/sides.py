@@ -23,7 +23,7 @@ _STEP = 1e-4
 _N_SAMPLES = 33
 """Points on an element of a curved side."""
 _N_NEAREST = 3
-"""Of these, from which the place that a point looks at is sought."""
+"""Number of nearest points from which the search for the closest point begins."""
 _BESIDE = 1e-6
 """Share of an element by which that place may lie beside the direction."""
 
@@ -66,7 +66,7 @@ class Side:
 
 @dataclass(frozen=True)
 class Relative:
-    """What is measured of two flat sides.
+    """Measures of two flat sides.
 
     Parameters
     ----------

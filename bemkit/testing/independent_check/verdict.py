@@ -1,4 +1,4 @@
-"""What the entries of a check together say: faults, open questions, or nothing."""
+"""The verdict on the entries of a check: faults, open questions, or nothing."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ class Violations:
 
     @classmethod
     def not_finite(cls) -> Self:
-        """Return what is said of fields that are no numbers."""
+        """Return the verdict on fields that are not finite."""
         return cls(**{**dict.fromkeys((entry.name for entry in fields(cls)), np.nan), "numbers": np.inf})
 
     @property
@@ -97,7 +97,7 @@ class Violations:
 
     @property
     def needs_warning(self) -> str:
-        """What a solution must warn of: "reciprocity" of a coarse mesh, "hidden_overlap"; empty if there is nothing."""
+        """Warnings that a solution must have: "reciprocity" of a coarse mesh, "hidden_overlap"; may be empty."""
         if self.hidden_overlap > OVERLAP_LIMIT:
             return "hidden_overlap"
         return "reciprocity" if self.is_coarse else ""
