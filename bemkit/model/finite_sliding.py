@@ -36,6 +36,8 @@ _LEAST_COSINE = 0.866
 """Cosine of the angle by which a direction of contact may turn: 30 degrees."""
 _LEAST_FACING = 0.5
 """Cosine of 60 degrees between the normal of a body and the direction of contact, below which contact is oblique."""
+_ROUND_OFF = 1e-9
+"""Displacement by contact forces, relative to the largest one, below which these forces are round-off."""
 _SHARE_OF_ZONE = 0.05
 """Part of the length of contact that a motion may take where it is longer than an element."""
 
@@ -51,6 +53,8 @@ def with_sliding_checked(model: Model, result: ContactSolution) -> ContactSoluti
     forces = [rows.weights @ norms(traction) for rows, traction in zip(prepared.rows, tractions, strict=True)]
     softest = min(body.material.plane_modulus for body in prepared.bodies)
     deformation = float(max(forces)) / softest
+    if deformation <= _ROUND_OFF * max(float(np.abs(displacement).max()) for displacement in displacements):
+        return result
     for rows, displacement, traction in zip(prepared.rows, displacements, tractions, strict=True):
         reason = _moved(prepared, rows, displacement, norms(traction) > 0.0, deformation)
         if reason:
