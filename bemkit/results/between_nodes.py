@@ -21,8 +21,6 @@ from bemkit.results.least_clearance import PointsBetween, Sample, deepest, with_
 from bemkit.results.solved_body import SolvedBody
 from bemkit.scene.conditions import Contact
 
-_SAME_POINT = 1e-9
-"""Distance of neighbouring points, relative to the next one, below which they are one point: the end of an element."""
 _POINTS_PER_NODE = 4
 """Points on an element for each of its nodes: a polynomial is larger between them by a few per cent at most."""
 _NOWHERE = (float("nan"), float("nan"))
@@ -59,7 +57,7 @@ class BetweenNodes:
     place : tuple of float, optional
         The point of the boundary where that is.
     missed : float
-        The penetration at points without traction, where contact is missed, beyond the steps of constant elements.
+        The penetration apart from contact zones, where contact is missed, beyond the steps of constant elements.
     missed_place : tuple of float, optional
         The point of the boundary where that is.
     apart : float
@@ -257,11 +255,9 @@ def violations_at(values: PointsBetween, law: FrictionLaw, stress: float, length
     shear = 0.0 if law.acts_across_gap else np.abs(values.sigma_t)
     traction = np.maximum(np.abs(values.sigma_n), shear) / stress
     round_off = _ROUND_OFF * _largest(np.abs(values.points))
-    free = values.take(values.is_free)
-    free = free._replace(clearance=free.clearance + free.step)
     (depth, place), (missed_depth, missed_place) = (
         (0.0 if depth <= round_off else depth, (float(point[0]), float(point[1])))
-        for depth, point in (deepest(values), deepest(free))
+        for depth, point in (deepest(values), deepest(values.beyond_zones()))
     )
     return BetweenNodes(
         penetration=depth / length,

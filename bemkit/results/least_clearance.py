@@ -14,6 +14,8 @@ _LEVELS = 4
 through the last ones finds the least clearance of a smooth gap to round-off."""
 _SAME = 1e-13
 """Distance along a side, relative to its length, up to which two points of an element are the same."""
+_SAME_POINT = 1e-9
+"""Distance of neighbouring points, relative to the next one, below which they are one point: the end of an element."""
 FREE = 1e-6
 """Traction, relative to the largest one, up to which a point carries none."""
 
@@ -51,6 +53,18 @@ class PointsBetween(NamedTuple):
         """(n,) bool array: whether a point carries no traction."""
         size = np.hypot(self.sigma_n, self.sigma_t)
         return np.asarray(size <= FREE * size.max(initial=0.0))
+
+    def beyond_zones(self) -> PointsBetween:
+        """Return the points, infinitely far away but for those that an open point keeps apart from all with traction.
+
+        The clearance is the largest that the step of constant elements allows. An overlap beside a contact zone
+        belongs to the end of that zone.
+        """
+        free, clearance = self.is_free, self.clearance + self.step
+        is_end = (free & (clearance >= 0.0)) | (np.diff(self.s, prepend=-np.inf) < -_SAME * self.s.max(initial=0.0))
+        run = np.cumsum(is_end | np.append(False, (free & (clearance >= 0.0))[:-1]))
+        is_attached = np.bincount(run, weights=~free)[run] > 0.0 if run.size else free
+        return self._replace(clearance=np.where(free & ~is_attached, clearance, np.inf))
 
 
 Sample: TypeAlias = Callable[[IntArray, FloatArray, FloatArray], PointsBetween]
@@ -131,8 +145,9 @@ def deepest(values: PointsBetween) -> tuple[float, FloatArray]:
         return 0.0, np.full(2, np.nan)
     k, clearance = int(np.argmin(values.clearance)), values.clearance
     least = float(clearance[k])
-    if 0 < k < clearance.size - 1 and min(before_after := np.diff(values.s[k - 1 : k + 2])) > 0.0:  # within an element
-        before, after = before_after
+    has_both = 0 < k < clearance.size - 1 and bool(np.isfinite(clearance[k - 1 : k + 2]).all())
+    before, after = np.diff(values.s[k - 1 : k + 2]) if has_both else (0.0, 0.0)
+    if min(before, after) > _SAME_POINT * max(before, after):  # within an element
         fall, rise = -np.diff(clearance[k - 1 : k + 2]) / (before, after)
         curvature, slope = (rise - fall) / (before + after), (fall * after + rise * before) / (before + after)
         if curvature < 0.0 and -before <= -0.5 * slope / curvature <= after:

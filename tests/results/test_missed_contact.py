@@ -164,3 +164,16 @@ def test_sides_with_a_force_that_touch_nowhere_end_by_name(approach: float) -> N
     assert solution.force_normal > 100.0 * abs(approach)
     assert solution.status is bk.Status.MISSED_CONTACT
     assert "Contact 'disc.arc / block.top' has a force, but its sides touch nowhere." in solution.message
+
+
+def test_an_overlap_beside_a_contact_zone_belongs_to_its_end() -> None:
+    s = np.arange(8.0)
+    points, nothing = np.stack([s, s], axis=1), np.zeros(8)
+    clearance = np.array([0.0, 0.0, -1e-2, 1e-3, -2e-3, 1e-3, -3e-3, 0.0])
+    sigma_n = np.array([-1.0, -1.0, 0.0, 0.0, 0.0, 0.0, 0.0, -1.0])
+    values = PointsBetween(points, s, points, clearance, sigma_n, nothing, nothing)
+    assert np.flatnonzero(np.isfinite(values.beyond_zones().clearance)).tolist() == [3, 4, 5]
+    assert deepest(values.beyond_zones())[0] == pytest.approx(2e-3, rel=0.1)
+    free = values._replace(sigma_n=nothing)
+    assert free.beyond_zones().clearance.tolist() == clearance.tolist()
+    assert deepest(values._replace(step=nothing + 5e-3).beyond_zones())[0] == 0.0
