@@ -25,7 +25,7 @@ from bemkit.runs.load_path import Callback, Path, ReachedStep, Standing, reach
 from bemkit.runs.solution_of import solution_of
 from bemkit.scene.load_history import load_steps
 from bemkit.scene.steps import Stated
-from bemkit.solvers.base import ContactSolution, Status, solve
+from bemkit.solvers.base import ContactSolution, Status
 from bemkit.stopwatch import Stage, StageClock, announce, assembly_time
 
 if TYPE_CHECKING:
@@ -259,14 +259,6 @@ def joined(history: History[AnySolution], solutions: Sequence[AnySolution]) -> A
     if whole is None:
         raise InputError("there is no step to join")
     return whole
-
-
-def solved_once(model: Model, start: ContactState | None) -> ContactSolution:
-    """Solve a model under a single load; UnsolvableSceneError if nothing can balance it."""
-    result = solve(model.problem, model.solver, start=start, throw=False)
-    if not result.history:
-        raise UnsolvableSceneError(why_not(model, result))
-    return checked(model, result)
 
 
 def _path(model: Model, before: Model | None, end: Standing, history: History[AnySolution], number: int) -> Path:

@@ -1,0 +1,129 @@
+"""A scene of one body, and the same body as the only one of several: one answer in every feature."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+import bemkit as bk
+from bemkit.arrays import FloatArray
+
+CLOSE = 1e-12
+COARSE = bk.MeshOptions(elements=48)
+PAPER = replace(bk.load_scene("paper-1"), mesh=COARSE)
+STEPS = (
+    bk.Step(1.0, {"parts.top-load.condition.y": -2.0}),
+    bk.Step(2.0, {"parts.top-load.condition.y": -1.0, "law.friction_coefficient": 0.4}),
+)
+HELD = bk.Scene(  # friction acts at the node that the support guides
+    title="a corner on a moving support",
+    shape=bk.Rectangle(2.0, 1.0),
+    material=bk.Material(1.0, 0.3),
+    law=bk.Coulomb(0.3),
+    parts=(
+        bk.Part("floor", bk.Contact(bk.HalfPlane()), sides=("bottom",)),
+        bk.Part("press", bk.Traction(y=-1.0), sides=("top",)),
+        bk.Part("push", bk.PrescribedDisplacement(x=0.05), sides=("left",)),
+    ),
+    mesh=COARSE,
+)
+
+
+def as_bodies(scene: bk.Scene) -> bk.Assembly:
+    """Return the scene with its body as the only one of several, of the same names."""
+    steps = tuple(
+        replace(step, changes={f"bodies.it.{key}" if key.startswith("parts.") else key: value
+                               for key, value in step.changes.items()})
+        for step in scene.steps
+    )  # fmt: skip
+    body = bk.Body(
+        name="it", shape=scene.shape, material=scene.material, parts=scene.parts, body_forces=scene.body_forces
+    )
+    common = ("title", "law", "symmetry", "discretisation", "linear_solver", "mesh", "solver", "load_factors")
+    return bk.Assembly(bodies=(body,), steps=steps, **{name: getattr(scene, name) for name in common})
+
+
+def probed(scene: Any) -> Any:
+    solutions = bk.run_probe(scene)
+    assert len(solutions) == 1
+    return solutions[0]
+
+
+def started(scene: Any) -> Any:
+    coarse = bk.run(replace(scene, mesh=bk.MeshOptions(elements=24)))
+    return bk.run(scene, start=coarse)
+
+
+def elsewhere(scene: Any) -> Any:
+    with ProcessPoolExecutor(1) as executor:
+        return bk.run(scene, executor=executor)
+
+
+def on_a_mesh(scene: Any) -> Any:
+    outline = PAPER.shape.outline()
+    parts = {part.name: part.selection for part in PAPER.parts}
+    mesh = bk.discretise(outline, n_elements=60, parts=parts)
+    return bk.run(scene, mesh=mesh if isinstance(scene, bk.Scene) else {"it": mesh})
+
+
+FEATURES: dict[str, tuple[bk.Scene, Callable[[Any], Any]]] = {
+    "single load": (PAPER, bk.run),
+    "collocation": (replace(PAPER, discretisation=bk.ConstantCollocation()), bk.run),
+    "start values": (PAPER, started),
+    "probe": (PAPER, probed),
+    "cascade": (PAPER, lambda scene: bk.run_cascade(scene, coarsest=12)[-1]),
+    "mesh": (PAPER, on_a_mesh),
+    "executor": (PAPER, elsewhere),
+    "load factors": (replace(PAPER, load_factors=(0.5, 1.0, 0.2)), bk.run),
+    "steps": (replace(PAPER, steps=STEPS), bk.run),
+    "scenes in turn": (PAPER, lambda scene: bk.run_history([scene, scene])[-1]),
+    "friction at held nodes": (HELD, bk.run),
+    "body forces": (bk.load_scene("gravity-column"), bk.run),
+    "symmetry": (
+        replace(HELD, parts=HELD.parts[:2], symmetry=bk.Symmetry(x=1.0)),
+        bk.run,
+    ),
+    "without contact": (bk.load_scene("bending"), bk.run),
+    "accuracy": (replace(PAPER, discretisation=bk.Galerkin(2), mesh=bk.MeshOptions(accuracy=2e-2)), bk.run),
+    "hp": (
+        replace(PAPER, discretisation=bk.Galerkin(2), mesh=bk.MeshOptions(accuracy=2e-3, rising_degrees=True)),
+        bk.run,
+    ),
+}
+
+
+def boundary_of(solution: Any) -> Iterator[FloatArray]:
+    body = solution if isinstance(solution, bk.Solution) else solution.bodies["it"]
+    yield body.boundary.displacement
+    yield body.boundary.traction
+    table = solution.contact
+    yield from (table.u_n, table.u_t, table.sigma_n, table.sigma_t)
+
+
+@pytest.mark.parametrize("feature", FEATURES)
+def test_both_forms_have_one_answer(feature: str) -> None:
+    scene, solve = FEATURES[feature]
+    one, several = solve(scene), solve(as_bodies(scene))
+    assert one.status is several.status is bk.Status.CONVERGED
+    assert several.linear_solves == one.linear_solves
+    assert several.energy == pytest.approx(one.energy, rel=CLOSE)
+    np.testing.assert_array_equal(one.contact.status, several.contact.status)
+    for ours, theirs in zip(boundary_of(one), boundary_of(several), strict=True):
+        np.testing.assert_allclose(ours, theirs, rtol=0.0, atol=CLOSE * np.abs(ours).max(initial=1e-300))
+    if one.estimated_error is not None:
+        assert several.estimated_error == pytest.approx(one.estimated_error, rel=1e-9)
+
+
+def test_sweeps_of_both_forms_have_one_answer() -> None:
+    vary = {"law.friction_coefficient": [0.2, 0.5]}
+    one, several = bk.sweep(PAPER, vary), bk.sweep(as_bodies(PAPER), vary)
+    for ours, theirs in zip(one.rows, several.rows, strict=True):
+        assert ours.energy == pytest.approx(theirs.energy, rel=CLOSE)
+    assert bk.critical_friction(PAPER).smallest == pytest.approx(
+        bk.critical_friction(as_bodies(PAPER)).smallest, rel=1e-10
+    )
