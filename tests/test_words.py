@@ -51,6 +51,12 @@ def test_household_words_are_not_used(directory: str) -> None:
     assert {name: words for name, words in found.items() if words} == {}
 
 
+def test_docstrings_begin_with_a_noun_or_a_verb() -> None:
+    begins = re.compile(r'^\s*r?"""(Of|What|Where)\b.*', re.MULTILINE)
+    texts = {path.relative_to(TOP).as_posix(): path.read_text("utf-8") for path in (TOP / "bemkit").rglob("*.py")}
+    assert [(name, match[0]) for name, text in texts.items() for match in begins.finditer(text)] == []
+
+
 def test_the_documentation_has_at_most_48000_words() -> None:
     pages = [path for path in TOP.glob("docs/**/*.md") if not {"_build", "generated"} & set(path.parts)]
     assert 40000 < sum(len(path.read_text("utf-8").split()) for path in pages) <= 48000

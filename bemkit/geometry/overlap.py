@@ -1,4 +1,4 @@
-"""Where one plane body lies inside another: the deepest point of a boundary inside an outline."""
+"""Overlap of two plane bodies: the deepest point of a boundary inside an outline."""
 
 from __future__ import annotations
 

@@ -21,7 +21,7 @@ _REMEDY = ": change the load or hold the body"
 _STRAIGHT = 1e-6
 """Turning by less than this, relative to the shift at the size of the body, counts as none."""
 _ROUND_OFF = 1e-9
-"""What is smaller than this share of a mode or of the size of the body is zero but for round-off."""
+"""Round-off of a mode, and of coordinates relative to the size of the body."""
 
 
 class FreeBodyError(InputError):

@@ -1,4 +1,4 @@
-"""What the user gives of a body in dimensionless form: supports, loads, motion far away; and its linear solver."""
+"""Dimensionless data of a body: supports, loads, motion far away; and its linear solver."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What acts inside the bodies of a scene."""
+"""Body forces and heat of the bodies of a scene."""
 
 from __future__ import annotations
 

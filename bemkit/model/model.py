@@ -67,7 +67,7 @@ class Model:
 
     @property
     def solver(self) -> ContactSolver:
-        """The driver."""
+        """The solver."""
         return self.prepared.scene.solver
 
     @property

@@ -28,7 +28,7 @@ from bemkit.scene.body_forces import BodyForce, Gravity, Heating, Rotation
 from bemkit.scene.scene import Scene
 
 HIGHEST_DEGREE = 16
-"""Of the polynomials that are tried."""
+"""Degrees of the trial polynomials."""
 ACCURACY = 1e-10
 """Largest difference between a field and its approximation, relative to the field."""
 _GOOD_ENOUGH = 1e-14
@@ -37,7 +37,7 @@ _MOST_ELEMENTS = 200
 _BENEATH = 1e-3
 """Depth of the points beneath the boundary, relative to the size of the body."""
 _RADIUS = 1e-2
-"""Of circles whose mean value is compared with that at their centre, relative to the size of the body."""
+"""Radius of circles whose mean value is compared with that at their centre, relative to the size of the body."""
 _PLACES = np.array([-0.9, -0.5, 0.0, 0.5, 0.9])
 _ROUND_OFF = 64.0 * float(np.finfo(float).eps)
 """Share of coordinates by which fields of them may be wrong."""

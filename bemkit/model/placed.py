@@ -74,7 +74,7 @@ class PlacedBody:
 
     @property
     def title(self) -> str:
-        """What messages call the body."""
+        """Name of the body in messages."""
         return f"body {self.name!r}" if self.name else "the body"
 
     @property

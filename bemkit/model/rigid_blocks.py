@@ -31,7 +31,7 @@ from bemkit.scene.conditions import Contact
 
 _ENDS = np.array([-1.0, 1.0])
 _SAMPLES = np.linspace(-1.0, 1.0, 9)
-"""Where on an element it is asked whether the obstacle is met."""
+"""Local points of an element at which the obstacle is tested."""
 _N_HALVINGS = 50
 """To the end of a joint between two samples."""
 

@@ -1,4 +1,4 @@
-"""What copies of a body have in common: assembled and factored once, here or on any executor."""
+"""Shared data of copies of a body: assembled and factored once, here or on any executor."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class NotSentError(InputError):
 
 @dataclass(frozen=True, eq=False)
 class Shape:
-    """What all copies of a body have in common, to be assembled and factored here or elsewhere."""
+    """Shared data of all copies of a body, to be assembled and factored here or elsewhere."""
 
     name: str
     discretisation: Discretisation

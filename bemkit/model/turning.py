@@ -25,7 +25,7 @@ from bemkit.solvers.base import ContactSolution, Status
 
 _N_POINTS = 12
 _ROUND_OFF = 1e-9
-"""Of the diameter, by which normals of arcs miss their centre."""
+"""Distance, relative to the diameter, by which normals of arcs may miss their centre."""
 _BALANCED = 1e-6
 """Share of the moment of all loads, each taken by its size, that counts as none."""
 

@@ -21,7 +21,7 @@ from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions
 from bemkit.solvers.base import ContactSolution, Status, StepRecord
 
 _TOLERANCE = 1e-9
-"""Of the certificate, as for contact."""
+"""Tolerance of the certificate, as for contact."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,7 +50,7 @@ class UntouchedBody(LinearBody):
 
     @property
     def work(self) -> OperationCounts:
-        """What it took to come here, from the operators on."""
+        """Operation counts, from the operators on."""
         return self.condensed.work
 
     def respond(self, conditions: LinearConditions) -> ContactState:
@@ -110,7 +110,7 @@ def certified(body: LinearBody, callback: Callable[[StepRecord], None] | None = 
     if np.isnan(certificate.worst):
         status, message = Status.NOT_FINITE, Status.NOT_FINITE.value
     elif certificate.is_below(_TOLERANCE):
-        status, message = Status.CONVERGED, "All forces are in equilibrium to the tolerance asked for."
+        status, message = Status.CONVERGED, "All forces are in equilibrium to the tolerance."
     else:
         status = Status.STALLED
         message = "Round-off leaves the forces out of equilibrium; use fewer or less unequal elements."

@@ -1,4 +1,4 @@
-"""What a plan lists: what a scene needs and skips, and why, with the numbers of its elements and unknowns."""
+"""Items of a plan: needed and skipped parts of a scene, with reasons, and the numbers of elements and unknowns."""
 
 from __future__ import annotations
 

@@ -36,7 +36,7 @@ _BYTES = 8
 _FLOPS_PER_NUMBER = 30.0
 """A number that is only moved through memory takes as long as so many flops of a factorisation."""
 LEAST_SECONDS = 0.1
-"""Of a common computer, for a scene of any size."""
+"""Seconds of a common computer for a scene of any size."""
 _MANY = 10_000
 """Elements that are divided and planned in a moment, whether they fit or not."""
 _FEW = 4_000
@@ -53,7 +53,7 @@ class TooLargeError(InputError):
 
 @dataclass(frozen=True)
 class Plan(ShownInNotebooks):
-    """What a scene takes on a mesh.
+    """Costs of a scene on a mesh.
 
     Parameters
     ----------

@@ -171,7 +171,7 @@ class AssemblySolution(SolvedProblem):
 
     @cached_property
     def singular_corners(self) -> dict[str, tuple[SingularCorner, ...]]:
-        """Where tractions before rigid obstacles grow without bound, by the name of the body.
+        """Singular corners at rigid obstacles, by the name of the body.
 
         See `bemkit.results.singular_corners`; of laws that depend on slip or time none are known.
         """
@@ -200,7 +200,7 @@ class AssemblySolution(SolvedProblem):
 
     @cached_property
     def zone_ends(self) -> tuple[ZoneEnd, ...]:
-        """Where zones of one status end, on all sides, and where contact is missed or a single node.
+        """Ends of zones of one status on all sides, missed contact and single nodes.
 
         See `resolved_transitions`, `missed_contacts` and `single_contacts`.
         """
@@ -218,7 +218,7 @@ class AssemblySolution(SolvedProblem):
 
     @cached_property
     def reversal_ends(self) -> tuple[ZoneEnd, ...]:
-        """Where the direction of slip changes without a resolved stick zone, on all sides; see `slip_reversals`."""
+        """Reversals of slip without a resolved stick zone, on all sides; see `slip_reversals`."""
         from bemkit.results.slip_reversals import slip_reversals
 
         places = [reversal.place for reversal in slip_reversals(self.contact)]
@@ -226,7 +226,7 @@ class AssemblySolution(SolvedProblem):
 
     @property
     def facing_ends(self) -> tuple[ZoneEnd, ...]:
-        """Where the end of a side lies inside the side that it faces, so that its edge presses into that."""
+        """Edges: ends of a side that lie inside the side that they face."""
         return tuple(place for _, _, _, place in self._edges)
 
     @cached_property

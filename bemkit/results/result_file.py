@@ -262,7 +262,7 @@ def _read_history(
         else cast("Sequence[Scene | Assembly]", load_steps(cast(Any, asked)))
     )
     if not 0 < len(groups) <= min(n_steps, len(problems)):
-        raise InputError(f"{len(groups)} of {n_steps} steps, where {len(problems)} were asked")
+        raise InputError(f"{len(groups)} of {n_steps} steps, where {len(problems)} were requested")
     steps: list[LoadStep] = []
     whole: Any = None
     for number, (group, problem) in enumerate(zip(groups, problems, strict=False), start=1):

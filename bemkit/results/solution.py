@@ -133,7 +133,7 @@ class Solution(SolvedProblem, SolvedBody):
 
     @cached_property
     def singular_corners(self) -> tuple[SingularCorner, ...]:
-        """Where contact tractions grow without bound; see `bemkit.results.singular_corners`."""
+        """Corners with singular contact tractions; see `bemkit.results.singular_corners`."""
         from bemkit.results.singular_corners import singular_corners
 
         return singular_corners(self, self.contact, motion=None if self.loading is None else self.loading.motion)
@@ -154,7 +154,7 @@ class Solution(SolvedProblem, SolvedBody):
 
     @cached_property
     def zone_ends(self) -> tuple[ZoneEnd, ...]:
-        """Where zones of one status end, as far as they are resolved, and where contact is missed or a single node.
+        """Resolved ends of zones of one status, missed contact and single nodes.
 
         See `resolved_transitions`, `missed_contacts` and `single_contacts`.
         """
@@ -167,7 +167,7 @@ class Solution(SolvedProblem, SolvedBody):
 
     @cached_property
     def reversal_ends(self) -> tuple[ZoneEnd, ...]:
-        """Where the direction of slip changes without a resolved stick zone; see `slip_reversals`."""
+        """Reversals of slip without a resolved stick zone; see `slip_reversals`."""
         from bemkit.results.slip_reversals import slip_reversals
         from bemkit.results.zone_ends import zone_end
 

@@ -149,7 +149,7 @@ class SolvedProblem(ShownInNotebooks):
             raise InputError("the result has no load history: give [[steps]] or load_factors")
         if not 1 <= number <= len(loading.steps):
             most = len(loading.steps)
-            raise InputError(f"step {number} is none of the finished ones: give a number from 1 to {most}")
+            raise InputError(f"step {number} does not exist: give a number from 1 to {most}")
         end = cast(Any, loading.steps[number - 1].end)
         return cast("Self", replace(end, loading=replace(loading, steps=loading.steps[:number])))
 

@@ -45,7 +45,7 @@ _FORCES = ("force_normal", "force_tangential", "energy")
 
 @dataclass(frozen=True)
 class BodyLayout:
-    """What all steps have in common on one body.
+    """Data that all steps of one body share.
 
     Parameters
     ----------
@@ -66,7 +66,7 @@ class BodyLayout:
 
 @dataclass(frozen=True)
 class StepLayout:
-    """What all steps of a file have in common.
+    """Data that all steps of a file share.
 
     Parameters
     ----------

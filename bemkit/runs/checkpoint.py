@@ -15,7 +15,7 @@ from bemkit.solvers.base import Status, StepRecord
 
 
 def run_to_file(scene: Stated, path: str | Path, *, callback: Callable[[StepRecord], None] | None = None) -> Any:
-    """Solve a load history into a result file that holds the steps so far as soon as each of them is finished.
+    """Solve a load history and write each finished step to a result file.
 
     A file that holds the beginning of the same history, because a run was killed, is continued; the numbers are those
     of a run without interruption, to the last bit, but for times. With an accuracy the file holds the steps so far on

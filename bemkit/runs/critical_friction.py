@@ -30,7 +30,7 @@ class NoSlidingStateError(NoResultError):
 
 @dataclass(frozen=True)
 class CriticalFriction:
-    """Smallest friction coefficients at which states of sliding lose uniqueness; infinite where there is none.
+    """Smallest friction coefficients above which sliding states may not be unique; infinite if there are none.
 
     Parameters
     ----------
@@ -60,7 +60,7 @@ class CriticalFriction:
 
 
 def critical_friction(scene: Stated) -> CriticalFriction:
-    """Return the friction coefficients at which sliding states of a scene lose uniqueness.
+    """Return the friction coefficients above which sliding states of a scene may not be unique.
 
     Parameters
     ----------

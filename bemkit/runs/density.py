@@ -31,9 +31,9 @@ LEAST_LOCAL = 1e-3
 LOCAL_SAFETY = 0.6
 """The same of errors that are to hold element by element: lengths turn out longer here and there."""
 HALF_PLANE_SPREAD = 0.15
-"""What `SPREAD` is on half-planes, whose errors are known element by element."""
+"""`SPREAD` of half-planes, whose errors are known element by element."""
 LENGTH_GROWTH = 0.2
-"""Of elements with the distance, at most: jumps of lengths are errors of tractions there."""
+"""Largest growth of elements with the distance: jumps of lengths cause errors of tractions."""
 MEAN_RATE = 2
 """Power of element lengths in the mean error of the tractions at the centres of elements on a half-plane."""
 

@@ -21,7 +21,7 @@ _SAME = 1e-9
 
 @dataclass(frozen=True)
 class EarlierSteps(Generic[AnySolution]):
-    """What was solved before, and who hears of what is solved now.
+    """Solutions of earlier steps, and the callback for new ones.
 
     Parameters
     ----------
@@ -35,7 +35,7 @@ class EarlierSteps(Generic[AnySolution]):
     finished: Callable[[AnySolution], None] | None = None
 
     def on(self, level: SizedLevel) -> tuple[AnySolution | None, Callable[[AnySolution], None] | None]:
-        """Return the steps that are done on the meshes of a level, and who hears of others there."""
+        """Return the finished steps on the meshes of a level, and the callback for further ones."""
         if self.done is None:
             return None, self.finished
         if _has_meshes(self.done, level.meshes):

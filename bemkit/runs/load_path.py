@@ -34,7 +34,7 @@ _FAST, _SLOW = 10, 20
 _HOPELESS = (Status.UNSOLVABLE_LOAD, Status.TOO_FAR, Status.TOO_COSTLY)
 """Failures that smaller increments do not change."""
 _UNDECIDED = (Status.MAX_STEPS, Status.STALLED, Status.CYCLING, Status.SINGULAR)
-"""Failures that may be the driver's, or a collapse."""
+"""Failures that may be the solver's, or a collapse."""
 
 Callback = Callable[[StepRecord], None] | None
 
@@ -52,7 +52,7 @@ class StepModel(Protocol):
 
     @property
     def solver(self) -> ContactSolver:
-        """The driver."""
+        """The solver."""
 
     @property
     def has_body_forces(self) -> bool:
@@ -223,7 +223,7 @@ def reach(path: Path, guess: ContactState | None = None, callback: Callback = No
     Notes
     -----
     An increment that fails is halved. After one that converges the next is twice as large if the solver took few steps,
-    and half as large if it took many. Only the jump to the whole load may follow the whole path of solutions; drivers
+    and half as large if it took many. Only the jump to the whole load may follow the whole path of solutions; solvers
     that begin anew, instead of where the last increment has ended, take part in the smallest increment only.
 
     Loads that nothing can balance are found by a linear programme before any step, see `bemkit.contact.solvability`,
@@ -335,7 +335,7 @@ class _Increments:
 
 
 def _for_increments(solver: ContactSolver, *, is_last: bool) -> ContactSolver:
-    """Return the drivers of an increment that follows a jump: those that go on from its start, at last springs, too."""
+    """Return the solvers of an increment that follows a jump: those that go on from its start, at last springs, too."""
     if not isinstance(solver, Fallbacks):
         return solver
     return solver.without_whole_path() if is_last else solver.without_new_starts()

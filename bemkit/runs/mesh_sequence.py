@@ -1,4 +1,4 @@
-"""What leads from the meshes of one body or of several to better ones: the levels, and the protocol of their rules."""
+"""Sequences of meshes of one body or of several: the levels, and the protocol of their rules."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ AnySolution = TypeVar("AnySolution", Solution, AssemblySolution)
 
 
 class Member(NamedTuple):
-    """What was found on a partition, by one body or by several copies of it.
+    """Results on a partition, of one body or of several copies of it.
 
     Zones of one status end at `ends`, and sides of other bodies at `facing_ends`; the direction of slip changes at
     `reversals` without a resolved stick zone.
@@ -42,7 +42,7 @@ class Member(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Level(Generic[AnyScene]):
-    """What is solved next.
+    """The next level to solve.
 
     Parameters
     ----------
@@ -85,7 +85,7 @@ class Level(Generic[AnyScene]):
 
     @cached_property
     def scene(self) -> AnyScene:
-        """What is solved, with the discretisations of this level."""
+        """The scene with the discretisations of this level."""
         if not self.is_layered:
             return self.asked
         scene = replace(self.asked, discretisation=self._discretisation(self.asked.discretisation))

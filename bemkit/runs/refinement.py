@@ -18,7 +18,7 @@ _MOST_MISSED = 12
 
 
 class SizedLevel(Protocol):
-    """What is solved next, in the form that a `Refinement` keeps."""
+    """The next level, in the form that a `Refinement` keeps."""
 
     @property
     def n_elements(self) -> int:

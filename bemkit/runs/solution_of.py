@@ -1,4 +1,4 @@
-"""From what the driver found to a solution: physical fields, contact table, forces, transitions and warnings."""
+"""From what the solver found to a solution: physical fields, contact table, forces, transitions and warnings."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 def solution_of(
     model: Model, result: ContactSolution, plan: Plan, clock: StageClock, motion: SlipHistory | None = None
 ) -> Any:
-    """Turn what the driver found into the physical fields of all bodies; the slip is for laws that depend on it."""
+    """Turn what the solver found into the physical fields of all bodies; the slip is for laws that depend on it."""
     prepared = model.prepared
     state, node_status = result.state, result.node_status
     solved, reactions = model.boundary_fields(state), model.reactions(state)

@@ -41,7 +41,7 @@ class StepErrors(Generic[AnySolution]):
 
     @cached_property
     def unit(self) -> float:
-        """What squared errors in the energy norm are measured by [J/m]."""
+        """Scale of the squared energy-norm error [J/m]."""
         return max(step.error_unit for step in self.steps)
 
     @cached_property

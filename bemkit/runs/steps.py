@@ -75,7 +75,7 @@ def checked(model: Model, result: ContactSolution) -> ContactSolution:
 
 
 def why_not(model: Model, result: ContactSolution) -> str:
-    """Say why a load cannot be balanced, or what the driver says of another failure."""
+    """Say why a load cannot be balanced, or what the solver says of another failure."""
     load = find_unsolvable_load(model.problem) if result.status is Status.UNSOLVABLE_LOAD else None
     return result.message if load is None else explained(model, load)
 
@@ -89,7 +89,7 @@ def explained(model: Model, load: UnsolvableLoad) -> str:
 
 @dataclass(frozen=True, eq=False)
 class History(Generic[AnySolution]):
-    """What is asked of a load history, and what is known of it.
+    """Options of a load history, and its known data.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What the user states of several elastic bodies: their places, their contacts with each other, and how to solve."""
+"""Scenes of several elastic bodies: positions, contacts between bodies, and options of the solve."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What acts on a piece of the boundary: supports, loads and contact; frozen values in one consistent set of units."""
+"""Conditions on pieces of the boundary: supports, loads and contact; frozen values in one consistent set of units."""
 
 from __future__ import annotations
 
@@ -128,7 +128,7 @@ class Pressure:
 
 @dataclass(frozen=True)
 class Free:
-    """Nothing acts on the part but what contacts with other bodies do: a name for a piece of the boundary."""
+    """A named piece of the boundary without load, which other bodies may touch."""
 
 
 @dataclass(frozen=True)

@@ -89,7 +89,7 @@ class CircleCopies:
 
 @dataclass(frozen=True)
 class ListedCopies:
-    """Copies in given places.
+    """Copies at given positions.
 
     Parameters
     ----------

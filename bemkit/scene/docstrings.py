@@ -1,4 +1,4 @@
-"""What docstrings say of a class and of its parameters, for the schema of scene files and for numbers with units."""
+"""Descriptions of classes and parameters from docstrings, for the schema of scene files and for numbers with units."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What scenes are made of in Python: objects, where scene files have words, and tuples, where they have lists."""
+"""Checks of scenes made in Python: objects where scene files have words, tuples where they have lists."""
 
 from __future__ import annotations
 

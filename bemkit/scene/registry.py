@@ -327,4 +327,4 @@ SYNONYMS: Mapping[str, tuple[str, ...]] = MappingProxyType(
         **dict.fromkeys(("dense", "cholesky", "lu"), ("direct",)),
     }
 )
-"""What people write by habit, and the words and keys that it may mean."""
+"""Common synonyms of names and keys."""

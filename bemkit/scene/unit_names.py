@@ -50,7 +50,7 @@ class UnitNames:
 
     @property
     def energy(self) -> str:
-        """Of energies and moments per thickness."""
+        """Unit of energies and moments per thickness."""
         per_length = f"/{self.length}"
         force = self.force or ""
         if force.endswith(per_length):

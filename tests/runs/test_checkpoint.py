@@ -191,7 +191,7 @@ def test_files_hold_all_fields_of_all_steps(scene: bk.Scene | bk.Assembly, tmp_p
     bk.write_result(tmp_path / "first.h5", first)
     assert bk.read_result(tmp_path / "first.h5").energy == first.energy
     for number in (0, scene.n_steps + 1):
-        with pytest.raises(bk.InputError, match=f"step {number} is none of the finished ones: give a number from 1 to"):
+        with pytest.raises(bk.InputError, match=f"step {number} does not exist: give a number from 1 to"):
             read.at_step(number)
 
 
@@ -260,7 +260,7 @@ def test_the_command_line_shows_steps(tmp_path: Path, capsys: pytest.CaptureFixt
     with pytest.raises(SystemExit) as ended:
         main(["show", str(file), "--step", "11"])
     assert ended.value.code == 2
-    assert "step 11 is none of the finished ones: give a number from 1 to 10" in capsys.readouterr().err
+    assert "step 11 does not exist: give a number from 1 to 10" in capsys.readouterr().err
     assert {path.name for path in (tmp_path / "figures").iterdir()} == {"friction-loop.png", "work.png"}
 
 

@@ -20,7 +20,7 @@ UNKNOWN = np.array([sorted(set(range(4)) - set(pair), key=lambda k: k % 2) for p
 
 @dataclass(frozen=True, eq=False)
 class ElementLaws:
-    """What is known on each element: (t_x, t_y, u_x, u_y) = factors @ z + given.
+    """Local conditions of each element: (t_x, t_y, u_x, u_y) = factors @ z + given.
 
     Parameters
     ----------

@@ -11,7 +11,7 @@ from bemkit.arrays import BoolArray, FloatArray
 _MOST = 8
 """Loads that are solved for one by one."""
 _SAME = 1e-14
-"""What of a load is round-off, by its largest value."""
+"""Round-off of a load, relative to its largest value."""
 
 
 class KnownLoads:

@@ -14,8 +14,8 @@ _FEWEST_ELEMENTS = 200
 _MOST_LOOPS = 20
 """Each closed curve of the boundary has an equation of its own, which is evaluated for each product."""
 _BYTES, _BYTES_OF_GROUPS = 1.35e3, 5e6
-"""Of an element: mesh, directions of the iteration, series, conditions and fields; and once, of which the largest part
-are the equations of groups of elements."""
+"""Bytes of an element: mesh, directions of the iteration, series, conditions and fields; and once, mostly
+for the equations of groups of elements."""
 _EVALUATIONS, _EVALUATIONS_COMPILED = 4.5e3, 0.3e3
 """Evaluations of a product for each element."""
 _STEPS = 17.0
