@@ -1,13 +1,14 @@
-"""Both boundary matrices of collocation as a whole; bodies are solved without them, column by column."""
+"""Both boundary matrices of collocation as a whole, every pair exactly: slow, and without the code that bodies take."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from bemkit.arrays import FloatArray
+from bemkit.arrays import ComplexArray, FloatArray
 from bemkit.geometry.mesh import BoundaryMesh
-from bemkit.operators.collocation.assembly import sweep_rows, write_columns
-from bemkit.operators.collocation.collocation_points import Coefficients
+from bemkit.operators.collocation.collocation_points import CollocationPoints
+from bemkit.operators.collocation.gradient_reconstruction import GradientReconstruction
+from bemkit.operators.integrals.panels import Panels
 from bemkit.operators.material import Material
 
 
@@ -22,7 +23,7 @@ def collocation_matrices(
         x is the point in the middle of the arc of each element.
     material : Material
     takes_slopes : bool
-        As in `sweep_rows`.
+        Whether the double layer takes the slopes of displacements.
 
     Returns
     -------
@@ -31,12 +32,22 @@ def collocation_matrices(
         is log(|r| / r0) with r0 the diameter of the mesh. double maps displacements to displacements, without the
         free term 1/2.
     """
-    n = mesh.n_elements
-    single, double = np.empty((n, 2, n, 2)), np.empty((n, 2, n, 2))
+    n, whole = mesh.n_elements, mesh.whole
+    panels = Panels(whole)
+    row, column = np.divmod(np.arange(n * whole.n_elements), whole.n_elements)
+    exact = CollocationPoints(panels, material, mesh.diameter).at(panels.centre[row], column, row == column)
+    p, conj_p, v, conj_v, s, conj_s = exact.reshape(6, n, whole.n_elements)
+    if takes_slopes:
+        reconstruction = GradientReconstruction.of(whole, panels)
+        reconstruction.add_to(v, s, is_conjugate=False)
+        reconstruction.add_to(conj_v, conj_s, is_conjugate=True)
+    return _real(mesh, p, conj_p), _real(mesh, v, conj_v)
 
-    def store(rows: slice, block: Coefficients) -> None:
-        write_columns(block.on_traction, block.on_conjugate_traction, single[rows, 0], single[rows, 1])
-        write_columns(block.on_displacement, block.on_conjugate_displacement, double[rows, 0], double[rows, 1])
 
-    sweep_rows(mesh, material, store, needs_single=np.ones(n, bool), needs_double=True, takes_slopes=takes_slopes)
-    return single.reshape(2 * n, 2 * n), double.reshape(2 * n, 2 * n)
+def _real(mesh: BoundaryMesh, on: ComplexArray, on_conjugate: ComplexArray) -> FloatArray:
+    """Return the matrix of v -> on v + on_conjugate conj(v), images added to what they are images of."""
+    images = np.ones((1, 2)) if mesh.symmetry is None else mesh.symmetry.images
+    x, y = on + on_conjugate, 1j * (on - on_conjugate)
+    columns = np.stack([x, y], axis=-1).reshape(mesh.n_elements, len(images), mesh.n_elements, 2)
+    total = np.einsum("rgnc,gc->rnc", columns, images)
+    return np.stack([total.real, total.imag], axis=1).reshape(2 * mesh.n_elements, -1)

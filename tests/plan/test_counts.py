@@ -114,7 +114,7 @@ LEFT_OUT = {
         "operators.integrals.curved_panels.fit",
     ),
     "linear": (
-        "operators.collocation.assembly.sweep_rows",
+        "operators.steklov_poincare.collocation.MixedSystem._sweep",
         "operators.linear.dense.DenseLU.__init__",
         "operators.integrals.inner.far_inner",
         "operators.integrals.curved_panels.fit",

@@ -92,7 +92,7 @@ class CurvedElements:
                 result[some] = _gauss_layer(self.constants, is_double, x, arcs)
         element, point = np.nonzero(distance < self.near[elements][:, None])
         if element.size:
-            exact = self.points.at(x[point], numbers[element], places[point] == elements[element]).stacked
+            exact = self.points.at(x[point], numbers[element], places[point] == elements[element])
             result[element, :, point] = (exact[[2, 4, 3, 5]] if is_double else exact[:2]).T
         return result
 

@@ -75,6 +75,7 @@ class CollocationEquations:
         border: Border,
         *,
         takes_slopes: bool,
+        layer: Layer | None = None,
         log_length: float | None = None,
     ) -> CollocationEquations:
         """Return the equations of a mesh without symmetry.
@@ -87,6 +88,8 @@ class CollocationEquations:
             The element of the mesh at each position; everything else is by position.
         border : Border
         takes_slopes : bool
+        layer : Layer, optional
+            By default the compiled one for many elements.
         log_length : float, optional [m]
             Unit of length of the logarithm; by default the diameter of the mesh.
         """
@@ -100,7 +103,7 @@ class CollocationEquations:
             2.0 * panels.half[order],
             *_reconstruction(mesh, panels, order, takes_slopes=takes_slopes),
             border,
-            layer_for(mesh.n_elements),
+            layer or layer_for(mesh.n_elements),
             None if panels.curved is None else CurvedElements.of(panels, material, order, log_length),
         )
 

@@ -9,6 +9,7 @@ import numpy as np
 from bemkit.arrays import ComplexArray, FloatArray, IntArray
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.operators.collocation.equations import CollocationEquations, collocation_border
+from bemkit.operators.collocation.layers import Layer
 from bemkit.operators.hierarchy.equations import Border, BoundaryEquations
 from bemkit.operators.material import Material
 
@@ -75,8 +76,39 @@ class FoldedEquations:
         return self.whole.residual(nodes, *whole)
 
 
+def displacement_rows(equations: BoundaryEquations, nodes: IntArray, value_of_one: float) -> FloatArray:
+    """Return all displacement columns (2 n_rows, 2 n) at some nodes, such that translations keep their values exactly.
+
+    An element of length h at coordinates of size one has its midpoint to eps / h only, and the tractions there feel
+    that divided by h again unless a translation causes none. So the own block of a node sets the sums of its rows.
+
+    Parameters
+    ----------
+    equations : BoundaryEquations
+    nodes : (n_rows,) array
+        Ascending.
+    value_of_one : float
+        What a displacement of one everywhere gives: 0 for a body, 1 for an exterior.
+    """
+    n, rows = equations.points.size, (2 * nodes[:, None] + np.arange(2)).ravel()
+    columns = (4 * np.arange(n)[:, None] + np.array([2, 3])).ravel()
+    # by columns, as blocks are stored: (2 n, 2 n_rows)
+    if isinstance(equations, FoldedEquations):
+        parts = [equations.whole.block(rows, columns + 4 * k * n).T for k in range(len(equations.images))]
+        by_column = np.sum(
+            [part * signs[columns % 2, None] for part, signs in zip(parts, equations.images, strict=True)], axis=0
+        )
+    else:
+        parts = [equations.block(rows, columns).T]
+        by_column = parts[0]
+    sums = np.sum([part.reshape(n, 2, -1).sum(axis=0) for part in parts], axis=0).reshape(2, -1, 2)
+    own = by_column.reshape(n, 2, nodes.size, 2)
+    own[nodes, :, np.arange(nodes.size)] += value_of_one * np.eye(2) - sums.transpose(1, 0, 2)
+    return np.asarray(by_column.T)
+
+
 def collocation_equations(
-    mesh: BoundaryMesh, material: Material, order: IntArray, *, takes_slopes: bool
+    mesh: BoundaryMesh, material: Material, order: IntArray, *, takes_slopes: bool, layer: Layer | None = None
 ) -> BoundaryEquations:
     """Return the equations of collocation of a body, with or without lines of symmetry.
 
@@ -87,13 +119,15 @@ def collocation_equations(
     order : (n_elements,) array
         The element at each position of a tree.
     takes_slopes : bool
+    layer : Layer, optional
+        What evaluates the layers of straight elements; by default the compiled one for many elements.
     """
     border = collocation_border(mesh, material, order, takes_slopes=takes_slopes)
     if mesh.symmetry is None:
-        return CollocationEquations.of(mesh, material, order, border, takes_slopes=takes_slopes)
+        return CollocationEquations.of(mesh, material, order, border, takes_slopes=takes_slopes, layer=layer)
     images = mesh.symmetry.images
     with_images = (np.arange(len(images))[:, None] * mesh.n_elements + order).ravel()
     whole = CollocationEquations.of(
-        mesh.whole, material, with_images, border, takes_slopes=takes_slopes, log_length=mesh.diameter
+        mesh.whole, material, with_images, border, takes_slopes=takes_slopes, layer=layer, log_length=mesh.diameter
     )
     return FoldedEquations(whole, border, images)

@@ -123,14 +123,20 @@ def combined(factors: Callable[[slice], ComplexArray], shape: tuple[int, int], u
     starts, size = np.arange(0, n * k * n_densities + 1, k * n_densities), 2 * n_densities * n_elements
     on = csr_array((unknowns.weights.ravel(), indices.ravel(), starts), (n, size))
     on_conjugate = csr_array((unknowns.weights.conj().ravel(), indices.ravel() + n_densities, starts), (n, size))
-    of_column, is_x = unknowns.columns // 2, unknowns.columns[:, None] % 2 == 0
+    of_column, component = unknowns.columns // 2, unknowns.columns % 2
+    along_x, along_y = np.flatnonzero(component == 0), np.flatnonzero(component)
+    is_complete = of_column.size == 2 * n and bool(np.all(unknowns.columns == np.arange(2 * n)))
+    x_columns, y_columns = (slice(0, None, 2), slice(1, None, 2)) if is_complete else (along_x, along_y)
+    x_unknowns, y_unknowns = (slice(None), slice(None)) if is_complete else (of_column[along_x], of_column[along_y])
     result = np.empty((of_column.size, n_points), complex)
     step = max(1, _PAIRS // max(n_elements, 1))
     for some in (slice(begin, begin + step) for begin in range(0, n_points, step)):
         values = factors(some).reshape(size, -1)
-        one, conjugate = (np.asarray(each @ values)[of_column] for each in (on, on_conjugate))
+        one, conjugate = (np.asarray(each @ values) for each in (on, on_conjugate))
+        result[x_columns, some] = one[x_unknowns] + conjugate[x_unknowns]
         # a unit along y is the number i
-        result[:, some] = np.where(is_x, one + conjugate, 1j * (one - conjugate))
+        turned = one[y_unknowns] - conjugate[y_unknowns]
+        result.real[y_columns, some], result.imag[y_columns, some] = -turned.imag, turned.real
     return result
 
 
@@ -177,10 +183,10 @@ def straight_factors(
         result[:, 1].real, result[:, 1].imag = 1.0 + eta * log.imag, eta * log.real
         result[:, 1] *= a * tangent**2
         return result
-    rest: ComplexArray = _power_series(REST, square)
+    geometric: ComplexArray = square / (1.0 - square)  # its difference from the series is that of `REST`
     moment = near.put(2.0 * series, near.moment)
-    quotient: ComplexArray = near.put(2.0 * (series + rest), near.quotient)
-    of_moment = near.put(2.0 * inverse * rest, near.of_moment)
+    quotient: ComplexArray = near.put(2.0 * geometric, near.quotient)
+    of_moment = near.put(2.0 * inverse * (geometric - series), near.of_moment)
     result = np.empty((start.size, 4, x.size), complex)
     rates = -constants.double * (2.0 - 2.0 * nu), -constants.double * (1.0 - 2.0 * nu)
     result[:, 0].real, result[:, 0].imag = -rates[0] * log.imag, rates[1] * log.real

@@ -6,19 +6,22 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bemkit.arrays import ComplexArray, FloatArray, IntArray, consecutive_runs
+from bemkit.arrays import FloatArray, IntArray
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.spaces import BoundarySpace, ConstantSpace
-from bemkit.operators.collocation.assembly import sweep_rows, write_columns
-from bemkit.operators.collocation.collocation_points import Coefficients
-from bemkit.operators.collocation.reciprocity import Reciprocity
+from bemkit.operators.collocation.images import collocation_equations, displacement_rows
+from bemkit.operators.collocation.layers import straight_layer
 from bemkit.operators.counts import Entries, OperationCounts
 from bemkit.operators.linear.dense import DenseLU
+from bemkit.operators.linear.threads import for_each_chunk
 from bemkit.operators.material import Material
 from bemkit.operators.pair_form import Tag
-from bemkit.operators.rigid_modes import traction_free_modes
 from bemkit.operators.steklov_poincare.nodal_conditions import GivenData, NodalConditions, rotate_columns
 from bemkit.operators.steklov_poincare.protocol import CondensedMap
+from bemkit.stopwatch import assembling
+
+CHUNK_PAIRS = 32768
+"""Pairs of a midpoint and an element that are evaluated at a time on each thread."""
 
 
 class CollocationElasticity:
@@ -118,8 +121,8 @@ class MixedSystem:
     directions that are held at rest. Columns of given data are multiplied by them at once and not stored either; loads
     that are no multiple of the one before take another sweep over the pairs.
 
-    The equations along x come first, then those along y, then the resultants of the tractions and the reciprocities;
-    for each of these there is one more unknown, an error of the displacement equations.
+    Resultants of the tractions and reciprocities come after the displacement equations, which have one more unknown for
+    each of these: an error.
     """
 
     def __init__(
@@ -137,19 +140,20 @@ class MixedSystem:
         self._free, self._fixed, self._retained = (
             np.flatnonzero(x) for x in (conditions.is_free, conditions.is_fixed, conditions.is_retained)
         )
-        motions = traction_free_modes(mesh, mesh.centres)
-        reciprocity = Reciprocity.of(mesh, material, takes_slopes=slopes)
-        self._find_balances(motions, reciprocity)
+        every = np.arange(mesh.n_elements)
+        self._equations = collocation_equations(mesh, material, every, takes_slopes=slopes, layer=straight_layer)
+        border, frame = self._equations.border, conditions.frame
+        balances = border.balances.reshape(-1, mesh.n_elements, 2, 2)
+        self._on_traction, self._on_displacement = (
+            rotate_columns(each.reshape(len(balances), -1), frame) for each in (balances[:, :, 0], -balances[:, :, 1])
+        )
 
         # the displacement equations with the columns of their errors, and the balances below them
-        errors = np.column_stack([motions, reciprocity.fields])
-        n_rows, order = self._weights.size, self._weights.size + errors.shape[1]
-        matrix, right = np.zeros((order, order)), np.zeros((order, self._retained.size), order="F")
+        n_rows, order = self._weights.size, self._weights.size + len(balances)
+        matrix, right = np.zeros((order, order), order="F"), np.zeros((order, self._retained.size), order="F")
         data = GivenData.of(conditions, force, conditions.displacement)
-        n_elements = mesh.n_elements
-        equations = matrix[:n_rows, :n_rows].reshape(2, n_elements, n_rows)
-        known, work = self._sweep(data, equations, right[:n_rows].reshape(2, n_elements, self._retained.size))
-        matrix[:n_rows, n_rows:] = np.concatenate([errors[0::2], errors[1::2]])
+        known, work = self._sweep(data, matrix[:n_rows, :n_rows], right[:n_rows])
+        matrix[:n_rows, n_rows:] = border.errors
         matrix[n_rows:, :n_rows] = np.where(conditions.is_free.ravel(), self._on_displacement, -self._on_traction)
         right[n_rows:] = self._on_displacement[:, self._retained]
 
@@ -167,75 +171,48 @@ class MixedSystem:
         """Return the condensed map under the first load."""
         return self._condensed(self._force, self._base.data, self._base, 1.0, self._work)
 
-    def _find_balances(self, motions: FloatArray, reciprocity: Reciprocity) -> None:
-        """Find on_traction @ t == on_displacement @ u for resultants and reciprocities, (n_balances, n_dofs) each.
-
-        Resultants are of the size of the displacements that they cause: equations of one size are all solved to
-        round-off; larger ones would gather that of their pivots.
-        """
-        material, frame = self._material, self._conditions.frame
-        compliance = 1.0 / (8.0 * np.pi * material.shear_modulus * (1.0 - material.effective_poisson_ratio))
-        resultants = motions.T * (compliance * self._weights)
-        on_traction = np.concatenate([resultants, reciprocity.on_traction])
-        on_displacement = np.concatenate([np.zeros(resultants.shape), reciprocity.on_displacement])
-        self._on_traction, self._on_displacement = (rotate_columns(x, frame) for x in (on_traction, on_displacement))
-
+    @assembling()
     def _sweep(
         self, data: GivenData, matrix: FloatArray | None = None, right: FloatArray | None = None
     ) -> tuple[FloatArray, OperationCounts]:
         """Return what data contribute to the equations (n_rows,), and fill the columns of what is not given.
 
-        The matrix (2, n_elements, n_dofs) takes the columns of unknowns, `right` (2, n_elements, n_retained) those of
-        the retained displacements.
+        The matrix (n_rows, n_rows) takes the columns of unknowns, `right` (n_rows, n_retained) those of the retained
+        displacements.
         """
-        n, n_rows, frame = self._mesh.n_elements, self._weights.size, self._conditions.frame
+        n, n_rows, conditions = self._mesh.n_elements, self._weights.size, self._conditions
         loaded, moved = (np.flatnonzero(x) for x in (data.force, data.displacement))
         traction, displacement = data.force.ravel()[loaded] / self._weights[loaded], data.displacement.ravel()[moved]
-        unknown = np.zeros(0, np.intp) if matrix is None else np.flatnonzero(~self._conditions.is_free)
-        # elements with tractions, and the numbers of their dofs among those of all of them
-        loaded_elements = np.unique(np.concatenate([unknown, loaded]) // 2)
-        number = np.zeros(n_rows, np.intp)
-        number[_dofs(loaded_elements)] = np.arange(2 * loaded_elements.size)
-        retained_runs = consecutive_runs(self._retained)
-        # the columns of consecutive unknowns are consecutive among those of the single layer, too
-        unknown_runs = [
-            (dofs, number[dofs])
-            if isinstance(dofs, np.ndarray) or dofs.step
-            else (dofs, slice(number[dofs.start], number[dofs.stop - 1] + 1))
-            for _, dofs in consecutive_runs(unknown)
-        ]
-        known = np.zeros((2, n))
+        unknown = np.zeros(0, np.intp) if matrix is None else np.flatnonzero(~conditions.is_free)
+        # elements with tractions, and the indices of their dofs among those of all of them
+        elements = np.unique(np.concatenate([unknown, loaded]) // 2)
+        of_traction = (4 * elements[:, None] + np.arange(2)).ravel()
+        index = np.zeros(n_rows, np.intp)
+        index[(2 * elements[:, None] + np.arange(2)).ravel()] = np.arange(2 * elements.size)
+        known, value_of_one = np.zeros(n_rows), 1.0 if self._mesh.is_exterior else 0.0
+        needs_double = matrix is not None or moved.size > 0
 
-        def store(rows: slice, block: Coefficients) -> None:
-            n_chunk = rows.stop - rows.start
-            single = np.empty((2, n_chunk, 2 * loaded_elements.size))
-            on, on_conjugate = block.on_traction[:, loaded_elements], block.on_conjugate_traction[:, loaded_elements]
-            _write(on, on_conjugate, frame[loaded_elements], single)
-            known[:, rows] += _product(single[:, :, number[loaded]], traction)
+        def fill(nodes: slice) -> None:
+            rows, own = slice(2 * nodes.start, 2 * nodes.stop), np.arange(nodes.start, nodes.stop)
+            single = self._equations.block(np.arange(rows.start, rows.stop), of_traction)  # minus the single layer
+            _rotate(single, conditions.frame[elements])
+            known[rows] -= _product(single[:, index[loaded]], traction)
             if not needs_double:
                 return
-            block.on_displacement[np.arange(n_chunk), np.arange(rows.start, rows.stop)] += 0.5
-            double = np.empty((2, n_chunk, n_rows)) if matrix is None else matrix[:, rows]
-            _write(block.on_displacement, block.on_conjugate_displacement, frame, double)
-            known[:, rows] -= _product(double[:, :, moved], displacement)
-            if right is not None:
-                for positions, dofs in retained_runs:
-                    right[:, rows, positions] = double[:, :, dofs]
-                for dofs, in_single in unknown_runs:
-                    double[:, :, dofs] = -single[:, :, in_single]
+            double = displacement_rows(self._equations, own, value_of_one)
+            _rotate(double, conditions.frame)
+            known[rows] -= _product(double[:, moved], displacement)
+            if matrix is not None and right is not None:
+                matrix[rows], right[rows] = double, double[:, self._retained]
+                matrix[rows, unknown] = single[:, index[unknown]]
 
-        needs_double, needs_single = matrix is not None or moved.size > 0, np.zeros(n, bool)
-        needs_single[loaded_elements] = True
-        n_pairs = sweep_rows(
-            self._mesh,
-            self._material,
-            store,
-            needs_single=needs_single,
-            needs_double=needs_double,
-            takes_slopes=self._slopes,
-        )
+        n_sources = self._mesh.whole.n_elements
+        step = max(1, CHUNK_PAIRS // n_sources)
+        chunks = (slice(first, min(first + step, n)) for first in range(0, n, step))
+        for_each_chunk(fill, chunks, n_integrals=n * n_sources)
         of_loads, of_motions = Entries(n_rows * loaded.size), Entries(n_rows * moved.size)
-        return known.ravel(), OperationCounts(element_pairs=n_pairs, single_layer=of_loads, double_layer=of_motions)
+        n_pairs = n * n_sources * (n if needs_double else elements.size) // n
+        return known, OperationCounts(element_pairs=n_pairs, single_layer=of_loads, double_layer=of_motions)
 
     def _solution(self, data: GivenData, known: FloatArray) -> FloatArray:
         """Return the unknowns (n_dofs,), the retained displacements at rest."""
@@ -319,22 +296,15 @@ class _MixedMap(CondensedMap):
         return self.system.followed(self, directions)
 
 
-def _dofs(elements: IntArray) -> IntArray:
-    return (2 * elements[:, None] + np.arange(2)).ravel()
-
-
-def _write(on: FloatArray | ComplexArray, on_conjugate: ComplexArray, frame: FloatArray, columns: FloatArray) -> None:
-    """Write v -> on v + on_conjugate conj(v) into columns (2, n_rows, n_dofs), v in the frames of the elements."""
-    x, y = columns.reshape(2, len(on), -1, 2)
-    write_columns(on, on_conjugate, x, y)
+def _rotate(matrix: FloatArray, frame: FloatArray) -> None:
+    """Overwrite the columns (2 * node + component) of a matrix by those in the frames (n_nodes, 2, 2) of the nodes."""
     turned = np.flatnonzero(np.any(frame != np.eye(2), axis=(1, 2)))
-    for component in (x, y) if turned.size else ():
-        along_x, along_y = component[:, turned, 0], component[:, turned, 1]
-        for k in range(2):
-            component[:, turned, k] = along_x * frame[turned, k, 0] + along_y * frame[turned, k, 1]
+    x, y = matrix.T[2 * turned], matrix.T[2 * turned + 1]
+    for k in range(2):
+        matrix.T[2 * turned + k] = frame[turned, k, 0, None] * x + frame[turned, k, 1, None] * y
 
 
 def _product(columns: FloatArray, values: FloatArray) -> FloatArray:
     """Return columns (2, n_rows, n) times values, without BLAS, whose threads would wait for those of the sweep."""
-    product: FloatArray = np.einsum("crn,n->cr", columns, values)
+    product: FloatArray = np.einsum("rn,n->r", columns, values)
     return product

@@ -284,7 +284,7 @@ def _zero_columns(name: str, reason: str, n_columns: int, n_all: int) -> PlanIte
 
 def _pairs_in_chunks(mesh: BoundaryMesh) -> int:
     """Return how many element pairs are evaluated at the same time."""
-    from bemkit.operators.collocation.assembly import CHUNK_PAIRS
+    from bemkit.operators.steklov_poincare.collocation import CHUNK_PAIRS
 
     n_pairs = mesh.n_elements * mesh.whole.n_elements
     return min(n_pairs, n_threads(n_pairs) * CHUNK_PAIRS)
