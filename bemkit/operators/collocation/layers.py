@@ -20,11 +20,11 @@ from typing import NamedTuple, TypeAlias, TypeVar
 
 import numpy as np
 
-from bemkit.arrays import ComplexArray, FloatArray, IntArray
+from bemkit.arrays import ComplexArray, FloatArray, IntArray, Run, consecutive_runs
 from bemkit.operators.material import Material
 
 Values = TypeVar("Values", FloatArray, ComplexArray)
-_PAIRS = 16384
+_PAIRS = 8192
 """Pairs of points and elements that are evaluated at a time, so that they stay in the cache."""
 FAR = 16.0
 """Half lengths of the element from which on the series is taken."""
@@ -115,14 +115,8 @@ def combined(factors: Callable[[slice], ComplexArray], shape: tuple[int, int], u
     shape : (n_elements, n_points)
     unknowns : Unknowns
     """
-    from scipy.sparse import csr_array
-
     n_elements, n_points = shape
-    n, k, n_densities = unknowns.weights.shape
-    indices = 2 * n_densities * unknowns.elements[:, :, None] + np.arange(n_densities)
-    starts, size = np.arange(0, n * k * n_densities + 1, k * n_densities), 2 * n_densities * n_elements
-    on = csr_array((unknowns.weights.ravel(), indices.ravel(), starts), (n, size))
-    on_conjugate = csr_array((unknowns.weights.conj().ravel(), indices.ravel() + n_densities, starts), (n, size))
+    n, k, _ = unknowns.weights.shape
     of_column, component = unknowns.columns // 2, unknowns.columns % 2
     along_x, along_y = np.flatnonzero(component == 0), np.flatnonzero(component)
     is_complete = of_column.size == 2 * n and bool(np.all(unknowns.columns == np.arange(2 * n)))
@@ -130,14 +124,41 @@ def combined(factors: Callable[[slice], ComplexArray], shape: tuple[int, int], u
     x_unknowns, y_unknowns = (slice(None), slice(None)) if is_complete else (of_column[along_x], of_column[along_y])
     result = np.empty((of_column.size, n_points), complex)
     step = max(1, _PAIRS // max(n_elements, 1))
+    runs = [consecutive_runs(elements) for elements in unknowns.elements.T] if k <= n else []
     for some in (slice(begin, begin + step) for begin in range(0, n_points, step)):
-        values = factors(some).reshape(size, -1)
-        one, conjugate = (np.asarray(each @ values) for each in (on, on_conjugate))
+        one, conjugate = _summed(factors(some), unknowns, runs)
         result[x_columns, some] = one[x_unknowns] + conjugate[x_unknowns]
         # a unit along y is the number i
         turned = one[y_unknowns] - conjugate[y_unknowns]
         result.real[y_columns, some], result.imag[y_columns, some] = -turned.imag, turned.real
     return result
+
+
+def _summed(values: ComplexArray, unknowns: Unknowns, runs: list[list[Run]]) -> tuple[ComplexArray, ComplexArray]:
+    """Return the factors of unknowns and of their conjugates, (n, n_points) each, from those of the elements.
+
+    Parameters
+    ----------
+    values : (n_elements, 2 or 4, n_points) complex array
+    unknowns : Unknowns
+    runs : list
+        For each of the elements on which the unknowns act: which unknowns, and which elements. Empty if unknowns are
+        few that act on many elements.
+    """
+    weights, n_densities = unknowns.weights, unknowns.weights.shape[2]
+    one, conjugate = np.zeros((2, len(weights), values.shape[2]), complex)
+    if not runs:
+        for number, elements in enumerate(unknowns.elements):
+            own, factors = weights[number].ravel(), values[elements]
+            one[number] = own @ factors[:, :n_densities].reshape(own.size, -1)
+            conjugate[number] = own.conj() @ factors[:, n_densities:].reshape(own.size, -1)
+    for number, pairs in enumerate(runs):
+        for own, elements in pairs:
+            for density in range(n_densities):
+                weight = weights[own, number, density, None]
+                one[own] += weight * values[elements, density]
+                conjugate[own] += weight.conj() * values[elements, n_densities + density]
+    return one, conjugate
 
 
 def straight_factors(
