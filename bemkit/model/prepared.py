@@ -29,6 +29,7 @@ from bemkit.model.given import (
     nodal_forces,
     supports_on,
 )
+from bemkit.model.overlaps import check_apart
 from bemkit.model.placed import Meshes, PlacedBody, place
 from bemkit.model.same_bodies import bodies_under, check_rigid, find_units, listed_contacts, with_found_contacts
 from bemkit.model.units import Units
@@ -344,6 +345,7 @@ def prepare_steps(scenes: Sequence[Stated], meshes: Meshes = None) -> tuple[Prep
     for step in steps[1:]:
         check_rigid(steps[0], step)
     first = _prepared(steps[0], bodies, find_units(steps, bodies))
+    check_apart(scenes[0], bodies)
     later = tuple(first.under(step) for step in steps[1:])
     if later:  # what later steps give decides how much of the compressed equations is kept
         pairs = [(body, tuple(step.bodies[k].map_data for step in later)) for k, body in enumerate(first.bodies)]

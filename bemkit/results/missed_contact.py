@@ -13,7 +13,7 @@ from bemkit.solvers.base import Status
 if TYPE_CHECKING:
     from bemkit.results.solved_problem import SolvedProblem
 
-LARGEST_APART = 0.2
+LARGEST_APART = 1.0
 """Least distance of sides with a contact force, relative to the displacement that contact forces cause, up to which
 they touch: mortar conditions hold in the mean, which curved sides of long elements meet apart."""
 _FEW = 3

@@ -58,6 +58,7 @@ def outcome_of(name: str) -> tuple[Outcome, str]:
         pytest.param("missed-contact-hp", RIGHT, marks=SLOW),
         ("missed-contact-tilted-plane", RIGHT),
         ("punch-drawn-inside", [Outcome.WARNED]),  # polygon edges had no distance
+        ("overlapping-blocks", [Outcome.NAMED]),  # beside the contact between them
         ("part-without-rows", [Outcome.WARNED]),  # without any load
         pytest.param("ring-that-spins", [Outcome.WARNED], marks=SLOW),  # by more than its size
     ],

@@ -1,0 +1,59 @@
+"""Bodies that overlap before anything is solved."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from bemkit.arrays import FloatArray
+from bemkit.model.contacts import OverlapError
+from bemkit.model.placed import PlacedBody
+from bemkit.scene.steps import Stated
+
+
+def check_apart(scene: Stated, bodies: Sequence[PlacedBody]) -> None:
+    """Refuse bodies that overlap anywhere by more than the interference of the contacts between them.
+
+    Elastic bodies are compared with each other but for half-planes, and with rigid bodies of finite size.
+
+    Raises
+    ------
+    OverlapError
+        With the names of both bodies, the depth and the place.
+    """
+    if len(bodies) == 1 and not scene.rigid:
+        return
+    from bemkit.contact.obstacle import Circle
+    from bemkit.contact.polygon import PolygonalObstacle
+    from bemkit.geometry.overlap import ROUND_OFF, Polyline, deepest_overlap, near_pairs
+
+    finite = [body for body in bodies if body.mesh.surface is None]
+    outlines = [Polyline.of(body.mesh) for body in finite]
+    for k, m in near_pairs(outlines):
+        names = finite[k].name, finite[m].name
+        size = min(finite[k].mesh.diameter, finite[m].mesh.diameter)
+        least = outlines[k].tolerance + outlines[m].tolerance + ROUND_OFF * size
+        depth, place = deepest_overlap(outlines[k], outlines[m], least + _interference(scene, names))
+        if depth > 0.0:
+            raise _overlap(names, depth, place)
+    for rigid in scene.rigid:
+        if isinstance(rigid.obstacle, Circle | PolygonalObstacle):
+            for body, outline in zip(finite, outlines, strict=True):
+                points = outline.points.reshape(-1, 2)
+                gap = rigid.obstacle.gap(points, points)
+                k, names = int(gap.argmin()), (body.name, rigid.name)
+                if -gap[k] > ROUND_OFF * body.mesh.diameter + _interference(scene, names):
+                    raise _overlap(names, -float(gap[k]), points[k])
+
+
+def _interference(scene: Stated, names: tuple[str, str]) -> float:
+    """Return the largest interference of the contacts between two bodies."""
+    bodies = {pair.name: {side.partition(".")[0] for side in pair.sides} for pair in scene.contacts}
+    return max((pair.interference for pair in scene.contacts if bodies[pair.name] == set(names)), default=0.0)
+
+
+def _overlap(names: tuple[str, str], depth: float, place: FloatArray) -> OverlapError:
+    one, two = names
+    return OverlapError(
+        f"bodies {one!r} and {two!r} overlap by {depth:.4g} at ({place[0]:.6g}, {place[1]:.6g}): move them apart, or "
+        "state a contact with an interference between them"
+    )
