@@ -40,7 +40,7 @@ Callback = Callable[[StepRecord], None] | None
 
 
 class StepModel(Protocol):
-    """The members of a model that a load history needs; `Model` and `Model` have them."""
+    """The members of a model that a load history needs; `Model` has them."""
 
     @property
     def problem(self) -> ContactProblem:
@@ -75,12 +75,20 @@ class Standing:
         Dimensionless.
     loads : tuple of (float, StepModel)
         The models whose loads act there, each with its share; none at rest.
+    dragged : (n_contact,) array
+        How far obstacles have travelled along the tangents in this increment, dimensionless.
     """
 
     state: ContactState
     motion: SlipHistory
     gap: FloatArray
     loads: tuple[tuple[float, StepModel], ...] = ()
+    dragged: FloatArray | float = 0.0
+
+    @property
+    def share(self) -> float:
+        """The share of the way of its step; zero at rest."""
+        return self.loads[-1][0] if self.loads else 0.0
 
     @cached_property
     def acting(self) -> tuple[FloatArray, FloatArray]:
@@ -114,13 +122,14 @@ class Standing:
             approached = np.where(np.isfinite(self.gap), self.gap - before.gap, 0.0)
         # at a node that opens or closes the traction is not that of the trapezoidal rule: not counted as dissipation
         is_held = (before.state.traction != 0.0).any(axis=1) & (self.state.traction != 0.0).any(axis=1)
-        of_friction = -sigma[:, 1] * moved[:, 1]
+        slip = moved[:, 1] - self.dragged
+        of_friction = -sigma[:, 1] * slip
         dissipation = max(float(of_friction[is_held].sum()), 0.0)
-        along_slip = 2.0 * weights * self.state.traction[:, 1] * moved[:, 1]
+        along_slip = 2.0 * weights * self.state.traction[:, 1] * slip
         (forces_before, displacements_before), (forces, displacements) = before.acting, self.acting
         of_forces = 0.5 * float((forces_before + forces) @ (displacements - displacements_before))
         return StepWork(
-            external_work=of_forces + float(sigma[:, 0] @ approached),
+            external_work=of_forces + float(sigma[:, 0] @ approached + np.sum(sigma[:, 1] * self.dragged)),
             dissipation=dissipation,
             increment_work=float(sigma[:, 0] @ (approached - moved[:, 0])) + float(of_friction.sum()) - dissipation,
             friction_gain=float(np.maximum(along_slip, 0.0).sum()),
@@ -175,6 +184,8 @@ class Path:
         Of the step before; without one there is a single increment.
     between : callable
         Share of the way -> the problem there.
+    drag : (n_contact,) array
+        How far obstacles travel along the tangents on the whole way, dimensionless.
     factors : (float, float), optional
         Load factors before and at the end of the step [-], where the scene states some.
     """
@@ -184,6 +195,7 @@ class Path:
     time: float
     before: StepModel | None
     between: Callable[[float], ContactProblem]
+    drag: FloatArray | float = 0.0
     factors: tuple[float, float] | None = None
 
     def time_at(self, share: float) -> float:
@@ -198,11 +210,17 @@ class Path:
         first, last = self.factors
         return f"load factor {first + share * (last - first):.6g}"
 
-    def standing(self, problem: ContactProblem, share: float, state: ContactState, motion: SlipHistory) -> Standing:
-        """Return the end of an increment."""
+    def dragged(self, start: Standing, share: float) -> FloatArray | float:
+        """Return how far obstacles travel from the end of an increment to a share of the way."""
+        return self.drag * (share if start is self.start else share - start.share)
+
+    def standing(self, attempt: _Attempt, share: float, start: Standing) -> Standing:
+        """Return the end of an increment that has begun at another end."""
+        state, motion, gap = attempt.result.state, attempt.motion, attempt.problem.gap
+        dragged = self.dragged(start, share)
         if self.before is None or share == 1.0:
-            return Standing(state, motion, problem.gap, ((1.0, self.model),))
-        return Standing(state, motion, problem.gap, ((1.0 - share, self.before), (share, self.model)))
+            return Standing(state, motion, gap, ((1.0, self.model),), dragged)
+        return Standing(state, motion, gap, ((1.0 - share, self.before), (share, self.model)), dragged)
 
 
 def reach(path: Path, guess: ContactState | None = None, callback: Callback = None) -> ReachedStep:
@@ -243,7 +261,7 @@ def reach(path: Path, guess: ContactState | None = None, callback: Callback = No
         )
         result = attempt.result
         if result.is_converged:
-            end = path.standing(attempt.problem, target, result.state, attempt.motion)
+            end = path.standing(attempt, target, end)
             reached, ends = target, (*ends, end)
             if reached == 1.0:
                 break
@@ -294,7 +312,7 @@ class _Increments:
         path, n_before = self.path, len(self.records)
         problem, time = path.between(target), path.time_at(target)
         if path.before is not None:
-            problem = replace(problem, reference_slip=end.state.u_t)
+            problem = replace(problem, reference_slip=end.state.u_t + path.dragged(end, target))
         words = "" if target == 1.0 and not n_before else f"increment to {path.name_of(target)}"
         law, unit = problem.law, path.model.units.displacement
         motion = end.motion.followed(time, np.zeros(problem.n_contact), np.zeros(problem.n_contact, bool))

@@ -13,6 +13,7 @@ from bemkit.contact.problem import ContactProblem
 from bemkit.contact.solvability import UnsolvableLoad, find_unsolvable_load
 from bemkit.errors import InputError
 from bemkit.model.model import Model, build_model
+from bemkit.model.obstacle_travel import obstacle_travel
 from bemkit.model.placed import Meshes
 from bemkit.model.prepared import Prepared, prepare_steps
 from bemkit.model.solved_contact import with_energies_checked
@@ -268,7 +269,8 @@ def _path(model: Model, before: Model | None, end: Standing, history: History[An
 
     factors = history.asked.load_factors
     ends = (factors[number - 1], factors[number]) if number and len(factors) == len(history.times) else None
-    return Path(model, end, history.times[number], before, between, ends)
+    drag = obstacle_travel(before.prepared, model.prepared) / model.units.displacement if before else 0.0
+    return Path(model, end, history.times[number], before, between, drag, ends)
 
 
 def _loading(
