@@ -9,6 +9,7 @@ from scipy import sparse
 
 from bemkit.arrays import BoolArray
 from bemkit.contact.condensation.nodes import nodes_on
+from bemkit.contact.laws import FrictionLaw
 from bemkit.contact.mortar.congruent import CongruentCouplings, PlacedSide
 from bemkit.contact.mortar.facing import find_facing, is_non_mortar
 from bemkit.contact.mortar.sides import ContactSide
@@ -46,7 +47,8 @@ def touching_pairs(scene: Stated, bodies: Sequence[PlacedBody]) -> tuple[Contact
     if scene.symmetry is not None:
         _check_images(sides, names, scene.symmetry, touching.within)
     known = {frozenset(pair.sides) for pair in scene.contacts}
-    facing = find_facing(sides, touching.within, owners=owners)
+    law = scene.law if touching.law is None else touching.law
+    facing = find_facing(sides, touching.within, owners=owners, has_friction=not law.is_frictionless)
     found = [ContactPair((names[one], names[two]), multipliers_on=names[one]) for one, two in facing]
     return tuple(pair for pair in found if frozenset(pair.sides) not in known)
 
@@ -82,7 +84,7 @@ def body_rows(
     numbers = {body.name: number for number, body in enumerate(bodies)}
     pairs = scene.elastic_contacts
     laws = [scene.law if pair.law is None else pair.law for pair in pairs]
-    ordered = [_ordered(pair, bodies, numbers) for pair in pairs]
+    ordered = [_ordered(pair, law, bodies, numbers) for pair, law in zip(pairs, laws, strict=True)]
     lengths = [min(float(side.space.mesh.lengths[side.elements].sum()) for _, _, side in one) for one in ordered]
     taken: list[dict[int, str]] = [{} for _ in bodies]  # node -> the part that has its multiplier
     for rows in with_obstacles:
@@ -148,14 +150,19 @@ def nodes_on_lines(space: BoundarySpace) -> BoolArray:
 _NamedSide = tuple[int, str, ContactSide]
 
 
-def _ordered(pair: ContactPair, bodies: Sequence[PlacedBody], numbers: dict[str, int]) -> tuple[_NamedSide, _NamedSide]:
+def _ordered(
+    pair: ContactPair, law: FrictionLaw, bodies: Sequence[PlacedBody], numbers: dict[str, int]
+) -> tuple[_NamedSide, _NamedSide]:
     """Return the sides of a contact, the one with the multipliers first."""
     sides = []
     for body, part in pair.elastic_parts:
         number = numbers[body]
         sides.append((number, part, ContactSide(bodies[number].space, bodies[number].mesh.part(part))))
     one, two = sides
-    is_first = is_non_mortar(one[2], two[2]) if pair.multipliers_on is None else pair.multipliers_on == pair.sides[0]
+    if pair.multipliers_on is None:
+        is_first = is_non_mortar(one[2], two[2], has_friction=not law.is_frictionless)
+    else:
+        is_first = pair.multipliers_on == pair.sides[0]
     return (one, two) if is_first else (two, one)
 
 

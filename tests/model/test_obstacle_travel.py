@@ -17,7 +17,8 @@ def pressed(*obstacles: bk.Obstacle, law: bk.FrictionLaw | None = None) -> bk.Sc
     """Return a block under an obstacle that takes these places one after the other."""
     contact = bk.Contact(obstacles[0], law or bk.Coulomb(FRICTION))
     steps = tuple(
-        bk.Step(float(time), {"parts.top.condition.obstacle": obstacle}) for time, obstacle in enumerate(obstacles, start=1)
+        bk.Step(float(time), {"parts.top.condition.obstacle": obstacle})
+        for time, obstacle in enumerate(obstacles, start=1)
     )
     return bk.Scene(
         title="Dragged",

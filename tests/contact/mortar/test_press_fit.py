@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 import bemkit as bk
+from bemkit.contact.mortar.facing import is_non_mortar
+from bemkit.contact.mortar.sides import ContactSide
+from bemkit.model.placed import place
 
 DISC, RING = (tuple(f"{side}-{k}" for k in range(1, 5)) for side in ("arc", "inner"))
 
@@ -17,9 +22,7 @@ def press_fit(n_elements: int, symmetry: bk.Symmetry | None) -> bk.Assembly:
         bk.Body(name=name, shape=shape, material=material, parts=(bk.Part("fit", bk.Free(), sides=sides),))
         for name, shape, sides in (("disc", bk.Disk(1.0005), DISC), ("ring", bk.Ring(0.9995, 2.0), RING))
     )
-    fit = bk.ContactPair(
-        ("disc.fit", "ring.fit"), law=bk.Coulomb(0.3), interference=1.5e-3, multipliers_on="ring.fit", reach=0.1
-    )
+    fit = bk.ContactPair(("disc.fit", "ring.fit"), law=bk.Coulomb(0.3), interference=1.5e-3, reach=0.1)
     return bk.Assembly(
         title="press fit",
         bodies=(disc, ring),
@@ -52,3 +55,19 @@ def test_nodes_on_symmetry_lines_stick_like_their_neighbours() -> None:
     ends = [0, -1]
     assert not solution.contact.sigma_t[ends].any()
     assert not solution.contact.u_t[ends].any()
+
+
+@pytest.mark.parametrize("numbers", [(80, 80), (40, 111), (97, 33)])
+def test_curved_linear_sides_with_friction_have_multipliers_on_the_coarser_one(numbers: tuple[int, int]) -> None:
+    """In either order; without friction, on straight sides and for other degrees on the finer one."""
+    meshes = [bk.MeshOptions(elements=n) for n in numbers]
+    fit = press_fit(80, None)
+    bodies = tuple(replace(body, mesh=mesh) for body, mesh in zip(fit.bodies, meshes, strict=True))
+    sides = [ContactSide(body.space, body.mesh.part("fit")) for body in place(replace(fit, bodies=bodies))]
+    is_first = bool(sides[0].lengths.mean() > sides[1].lengths.mean())
+    assert is_non_mortar(*sides, has_friction=True) == is_first
+    assert is_non_mortar(*sides[::-1], has_friction=True) != is_first
+    assert is_non_mortar(*sides) != is_first
+    quadratic = place(replace(fit, bodies=bodies, discretisation=bk.Galerkin(2)))
+    sides = [ContactSide(body.space, body.mesh.part("fit")) for body in quadratic]
+    assert is_non_mortar(*sides, has_friction=True) != is_first
