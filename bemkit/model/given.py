@@ -24,17 +24,34 @@ from bemkit.operators.steklov_poincare.forces_inside import ForcesInside
 from bemkit.operators.steklov_poincare.hierarchical_needs import choose_collocation_solver
 from bemkit.operators.steklov_poincare.needs import BodyCase, physical_memory
 from bemkit.operators.steklov_poincare.nodal_conditions import (
+    ConflictingSupportsError,
     GivenData,
     NodalConditions,
     Support,
     integrate_traction,
+    supported,
 )
 from bemkit.scene.conditions import Clamped, Part, PrescribedDisplacement, Pressure, Roller, Traction
 from bemkit.scene.discretisation import Discretisation
 from bemkit.scene.scene import Scene
 
 
-def supports_on(scene: Scene, mesh: BoundaryMesh, units: Units, space: BoundarySpace) -> list[Support]:
+def held_nodes(scene: Scene, mesh: BoundaryMesh, units: Units, space: BoundarySpace) -> NodalConditions:
+    """Return the nodal conditions of the parts that hold the body, their displacements in the units given.
+
+    Raises
+    ------
+    ConflictingSupportsError
+        If parts contradict each other at a node; the message names its point in metres.
+    """
+    try:
+        return supported(space, _supports_on(scene, mesh, units, space))
+    except ConflictingSupportsError as error:
+        x, y = units.to_physical(np.array(error.point)).tolist()
+        raise ConflictingSupportsError(error.part, (x, y)) from None
+
+
+def _supports_on(scene: Scene, mesh: BoundaryMesh, units: Units, space: BoundarySpace) -> list[Support]:
     """Return the supports of the parts that hold the body, their displacements in the units given."""
     result = []
     for part, elements in scene.parts_on(mesh):

@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -25,9 +24,9 @@ from bemkit.model.contacts import ContactRows, candidates_of, obstacle_rows, ret
 from bemkit.model.given import (
     far_drive,
     given_data,
+    held_nodes,
     linear_solver_of,
     nodal_forces,
-    supports_on,
 )
 from bemkit.model.overlaps import check_apart
 from bemkit.model.placed import Meshes, PlacedBody, place
@@ -43,13 +42,9 @@ from bemkit.operators.steklov_poincare.nodal_conditions import (
     GivenData,
     NodalConditions,
     free_modes,
-    supported,
     turning,
 )
 from bemkit.scene.steps import Stated
-
-if TYPE_CHECKING:
-    pass
 
 
 @dataclass(frozen=True, eq=False)
@@ -365,7 +360,7 @@ def _prepared(scene: Stated, bodies: Sequence[PlacedBody], units: Units, before:
             forces.append(before.bodies[number].force)
             continue
         own_units = body.units(units.modulus, force_unit)
-        held = supported(body.own_space, supports_on(body.scene, body.own_mesh, own_units, body.own_space))
+        held = held_nodes(body.scene, body.own_mesh, own_units, body.own_space)
         supports.append(replace(held, driven=far_drive(body.scene, own_units).driven))
         in_place = body.units(units.modulus, force_unit, body.mesh)
         forces.append(body.turn.turned_back(nodal_forces(body.scene, body.mesh, body.space_in_place, in_place)))

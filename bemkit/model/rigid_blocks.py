@@ -19,13 +19,13 @@ from bemkit.geometry.spaces import dof_points
 from bemkit.geometry.vectors import norms, turned_left
 from bemkit.model.body_contacts import reach_of
 from bemkit.model.contacts import check_overlap
-from bemkit.model.given import nodal_forces, supports_on
+from bemkit.model.given import held_nodes, nodal_forces
 from bemkit.model.particular import particular_solution
 from bemkit.model.placed import PlacedBody
 from bemkit.model.same_bodies import listed_contacts, with_found_contacts
 from bemkit.operators.rigid_modes import rigid_motions
 from bemkit.operators.steklov_poincare.forces_inside import ForcesInside
-from bemkit.operators.steklov_poincare.nodal_conditions import free_modes, supported
+from bemkit.operators.steklov_poincare.nodal_conditions import free_modes
 from bemkit.scene.assembly import Assembly, ContactPair
 from bemkit.scene.conditions import Contact
 
@@ -148,7 +148,7 @@ def _elastic_block(body: PlacedBody) -> Block:
     if body.scene.body_forces:
         solution = particular_solution(body.scene, mesh, units.modulus, units.stress)
         force = force - ForcesInside.of(solution, space).force
-    modes = free_modes(space, supported(space, supports_on(body.scene, mesh, units, space)))
+    modes = free_modes(space, held_nodes(body.scene, mesh, units, space))
     basis = rigid_motions(dof_points(space), np.zeros(2), 1.0).reshape(-1, 3)
     motions: FloatArray = np.linalg.pinv(basis) @ modes.reshape(len(modes), len(basis)).T
     return Block(mesh.centre, mesh.diameter, motions, np.asarray(np.einsum("mnc,nc->m", modes, force)))

@@ -15,7 +15,7 @@ from bemkit.model.prepared import prepare, prepare_steps
 from bemkit.operators.steklov_poincare.collocation import CollocationElasticity
 from bemkit.scene.load_history import load_steps
 
-ONCE = ("candidates_of", "obstacle_rows", "supports_on", "nodal_forces")
+ONCE = ("candidates_of", "obstacle_rows", "held_nodes", "nodal_forces")
 
 
 @pytest.mark.parametrize("factors", [(1.0,), (0.5, 1.0)])
@@ -56,3 +56,19 @@ def test_a_node_that_loses_its_friction_keeps_the_condensed_body(monkeypatch: py
     assert not again.problem.law.is_frictionless
     assert again.body.stiffness.shape == without.body.stiffness.shape
     assert without.problem.law.is_frictionless
+
+
+def test_supports_that_contradict_each_other_are_named_in_the_coordinates_of_the_shape() -> None:
+    corners = ((0.0, 0.0), (2.0, 0.0), (1.7, 1.0), (0.3, 1.0))
+    scene = bk.Scene(
+        title="supports that contradict each other",
+        shape=bk.Polygon(corners, side_names=("bottom", "right", "top", "left")),
+        material=bk.Material(1.0, 0.3),
+        parts=(
+            bk.Part("load", bk.PrescribedDisplacement(0.0, -1e-3), sides=("top",)),
+            bk.Part("wall", bk.Roller(), sides=("left",)),
+        ),
+        mesh=bk.MeshOptions(elements=40),
+    )
+    with pytest.raises(bk.BemkitError, match=r"common point \(0.3, 1\): make them agree there"):
+        bk.run(scene)

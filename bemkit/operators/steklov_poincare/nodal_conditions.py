@@ -34,7 +34,25 @@ TractionField = Callable[[FloatArray, FloatArray], FloatArray]
 
 
 class ConflictingSupportsError(InputError):
-    """Two boundary parts prescribe different displacements at their common node."""
+    """Two boundary parts prescribe different displacements at their common node.
+
+    Parameters
+    ----------
+    part : str
+        One of the parts.
+    point : (float, float) [m]
+    """
+
+    def __init__(self, part: str, point: tuple[float, float]) -> None:
+        self.part, self.point = part, point
+        x, y = point
+        super().__init__(
+            f"part {part!r} and a neighbour prescribe different displacements at their common point "
+            f"({x:.6g}, {y:.6g}): make them agree there, or leave a free element between them"
+        )
+
+    def __reduce__(self) -> tuple[type[ConflictingSupportsError], tuple[str, tuple[float, float]]]:
+        return ConflictingSupportsError, (self.part, self.point)
 
 
 @dataclass(frozen=True, eq=False)
@@ -290,11 +308,8 @@ def _check_agreement(
     miss = np.abs(np.einsum("nij,nj->ni", directions, values - displacement)).max(axis=1)
     worst = int(np.argmax(miss))
     if miss[worst] > CONFLICT_TOLERANCE * max(float(np.abs(values).max()), float(np.abs(displacement).max())):
-        x, y = points[worst]
-        raise ConflictingSupportsError(
-            f"part {support.name!r} and a neighbour prescribe different displacements at their common point "
-            f"({x:.6g}, {y:.6g}): make them agree there, or leave a free element between them"
-        )
+        x, y = points[worst].tolist()
+        raise ConflictingSupportsError(support.name, (x, y))
 
 
 def free_modes(space: BoundarySpace, conditions: NodalConditions) -> FloatArray:
