@@ -124,12 +124,7 @@ def _solve(
 
         solution: Solution | AssemblySolution = run_cascade(scene, callback=callback)[-1]
         return solution
-    if history_file is not None:
-        from bemkit.runs.checkpoint import run_to_file
-
-        solution = run_to_file(scene, history_file, callback=callback)
-        return solution
-    solution = solve_scene(scene, callback=callback)
+    solution = solve_scene(scene, file=history_file, callback=callback)
     return solution
 
 

@@ -204,7 +204,7 @@ def read_result(path: str | Path) -> Solution | AssemblySolution:
     Parameters
     ----------
     path : str or Path
-        Of a file written by `write_result`, `run_to_file` or ``bemkit run -o``.
+        Of a file written by `write_result`, `bemkit.run` or ``bemkit run -o``.
 
     Returns
     -------

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from bemkit.results.result_file import ResultWriter, check_result_target, read_result
 from bemkit.runs.adaptive import run_adaptive
@@ -13,8 +13,16 @@ from bemkit.scene.steps import Stated
 from bemkit.scene.toml import scene_to_toml
 from bemkit.solvers.base import Status, StepRecord
 
+if TYPE_CHECKING:
+    from concurrent.futures import Executor
 
-def run_to_file(scene: Stated, path: str | Path, *, callback: Callable[[StepRecord], None] | None = None) -> Any:
+
+def run_to_file(
+    scene: Stated,
+    path: str | Path,
+    callback: Callable[[StepRecord], None] | None = None,
+    executor: Executor | None = None,
+) -> Any:
     """Solve a load history and write each finished step to a result file.
 
     A file that holds the beginning of the same history, because a run was killed, is continued; the numbers are those
@@ -29,6 +37,8 @@ def run_to_file(scene: Stated, path: str | Path, *, callback: Callable[[StepReco
         The result file, ``.h5``. Until the last step is there its status is UNFINISHED.
     callback : callable, optional
         Receives a record of every step of the solver.
+    executor : Executor, optional
+        As for `bemkit.run`.
 
     Returns
     -------
@@ -52,8 +62,8 @@ def run_to_file(scene: Stated, path: str | Path, *, callback: Callable[[StepReco
 
     with ResultWriter(target) as writer:
         if scene.mesh.accuracy is not None:
-            solution = run_adaptive(scene, callback=callback, done=done, finished=writer.append)[-1]
+            solution = run_adaptive(scene, callback=callback, done=done, finished=writer.append, executor=executor)[-1]
         else:
-            solution = joined(*solved_history([scene], None, callback, done, writer.append))
+            solution = joined(*solved_history([scene], None, callback, done, writer.append, None, executor))
         writer.finish(solution)
     return solution

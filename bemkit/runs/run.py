@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from bemkit.contact.solvability import find_unsolvable_load
@@ -41,6 +42,7 @@ def run(
     *,
     mesh: Meshes = None,
     start: Any = None,
+    file: str | Path | None = None,
     callback: Callable[[StepRecord], None] | None = None,
     executor: Executor | None = None,
 ) -> Any:
@@ -56,6 +58,10 @@ def run(
         A solution to start from, on any mesh; see `bemkit.runs.nested.run_cascade`. By default every node sticks; large
         scenes on compressed equations start from a solution on a coarser mesh. Where a scene has several solutions the
         start chooses among them. An error without contact, where there is only one solution.
+    file : str or Path, optional
+        A result file, ``.h5``, that receives each load step as soon as it is finished. Its status is UNFINISHED until
+        the last one. If it holds the beginning of the same history, because a run was killed, the run resumes there,
+        with the numbers of a run without interruption. An error with a mesh or a start.
     callback : callable, optional
         Receives a record of every step as soon as it exists.
     executor : Executor, optional
@@ -74,10 +80,20 @@ def run(
         If no contact tractions can balance the load, or the body can move freely.
     FreeBodyError
         If no part is in contact and the supports leave a rigid motion free.
+    OutputFileError
+        If the file cannot be written.
+    SceneError
+        If a file is given, and the scene holds a Python function.
     ValueError
         If the scene is not well posed; the message names the part and the remedy.
     """
     check_stated(scene)
+    if file is not None:
+        if mesh is not None or start is not None:
+            raise InputError("file is given with a mesh or a start, which a run that resumes does not have: remove one")
+        from bemkit.runs.checkpoint import run_to_file
+
+        return run_to_file(scene, file, callback, executor)
     if scene.mesh.accuracy is not None and mesh is None:
         from bemkit.runs.adaptive import run_adaptive  # only where it is asked for
 

@@ -58,16 +58,16 @@ def loading_of(solution: bk.Solution | bk.AssemblySolution) -> LoadHistory:
 
 @pytest.mark.parametrize("scene", slow_except((LOOP, PUNCH), LOOP), ids=["one body", "punch"])
 def test_a_killed_run_is_continued_to_the_same_bits(scene: bk.Scene | bk.Assembly, tmp_path: Path) -> None:
-    whole = bk.run_to_file(scene, tmp_path / "whole.h5")
+    whole = bk.run(scene, file=tmp_path / "whole.h5")
     file = tmp_path / "killed.h5"
     with pytest.raises(Killed):
-        bk.run_to_file(scene, file, callback=kill_after(file, 4))
+        bk.run(scene, file=file, callback=kill_after(file, 4))
     part = bk.read_result(file)
     assert part.status is Status.UNFINISHED
     assert not part.is_certified
     assert len(loading_of(part).steps) == 4
     solved: list[int] = []
-    resumed = bk.run_to_file(scene, file, callback=lambda record: solved.append(record.step))
+    resumed = bk.run(scene, file=file, callback=lambda record: solved.append(record.step))
     assert len(solved) < len(whole.history)  # what was there is not solved again
     for other in (resumed, bk.read_result(file)):
         for name, column in whole.contact.columns().items():
@@ -86,8 +86,8 @@ def test_compressed_equations_solve_the_steps_that_are_left_to_the_same_bits(tmp
     whole = bk.run(COMPRESSED)
     file = tmp_path / "killed.h5"
     with pytest.raises(Killed):
-        bk.run_to_file(COMPRESSED, file, callback=kill_after(file, 3))
-    resumed = bk.run_to_file(COMPRESSED, file)
+        bk.run(COMPRESSED, file=file, callback=kill_after(file, 3))
+    resumed = bk.run(COMPRESSED, file=file)
     assert resumed.plan.is_compressed
     for name, column in whole.contact.columns().items():
         np.testing.assert_array_equal(resumed.contact.columns()[name], column)
@@ -114,7 +114,7 @@ def test_a_killed_run_with_an_accuracy_goes_on_on_its_mesh(scene: bk.Scene | bk.
                 raise Killed
 
     stop_at = (0, 0)
-    whole = bk.run_to_file(scene, file, callback=look)
+    whole = bk.run(scene, file=file, callback=look)
     n_last = scene.n_steps - 1
     assert len(in_file) >= 2
     assert in_file == dict.fromkeys(sorted(in_file), n_last)  # each step but the last on each mesh
@@ -122,11 +122,11 @@ def test_a_killed_run_with_an_accuracy_goes_on_on_its_mesh(scene: bk.Scene | bk.
     stop_at = (whole.n_elements, n_last)
     file.unlink()
     with pytest.raises(Killed):
-        bk.run_to_file(scene, file, callback=look)
+        bk.run(scene, file=file, callback=look)
     assert len(loading_of(bk.read_result(file)).steps) == n_last
     in_file.clear()
     stop_at, records = (0, 0), []
-    resumed = bk.run_to_file(scene, file, callback=lambda record: (look(record), records.append(record))[0])
+    resumed = bk.run(scene, file=file, callback=lambda record: (look(record), records.append(record))[0])
     # coarser meshes are solved again but do not replace what is in the file, and of the last mesh one step is missing
     assert in_file == {whole.n_elements: n_last}
     assert len(records) < len(whole.history)
@@ -142,7 +142,7 @@ def growing(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return a file of a run that was killed after four steps."""
     file = tmp_path_factory.mktemp("growing") / "killed.h5"
     with pytest.raises(Killed):
-        bk.run_to_file(LOOP, file, callback=kill_after(file, 4))
+        bk.run(LOOP, file=file, callback=kill_after(file, 4))
     return file
 
 
@@ -157,7 +157,7 @@ def test_a_write_that_was_cut_off_loses_no_earlier_step(growing: Path, tmp_path:
     assert len(steps) == 1 + int(3 * share)  # each of the last three steps takes about as many bytes
     for one, two in zip(steps, loading_of(bk.read_result(growing)).steps, strict=False):
         np.testing.assert_array_equal(one.contact.sigma_n, two.contact.sigma_n)
-    assert bk.run_to_file(LOOP, file).history == bk.run(LOOP).history
+    assert bk.run(LOOP, file=file).history == bk.run(LOOP).history
 
 
 def test_a_damaged_step_and_those_after_it_are_not_read(growing: Path, tmp_path: Path) -> None:
@@ -173,14 +173,14 @@ def test_any_program_reads_the_first_step_of_a_file_that_grows(growing: Path) ->
 
 
 def test_writing_is_a_stage_of_its_own(tmp_path: Path) -> None:
-    written, plain = bk.run_to_file(SHORTER, tmp_path / "a.h5"), bk.run(SHORTER)
+    written, plain = bk.run(SHORTER, file=tmp_path / "a.h5"), bk.run(SHORTER)
     assert written.timings["write"] > 0.0
     assert plain.timings["write"] == 0.0
 
 
 @pytest.mark.parametrize("scene", slow_except((LOOP, PUNCH), PUNCH), ids=["one body", "punch"])
 def test_files_hold_all_fields_of_all_steps(scene: bk.Scene | bk.Assembly, tmp_path: Path) -> None:
-    whole = bk.run_to_file(scene, tmp_path / "a.h5")
+    whole = bk.run(scene, file=tmp_path / "a.h5")
     read = bk.read_result(tmp_path / "a.h5")
     for number in range(1, scene.n_steps + 1):
         assert whole.at_step(number).summary() == read.at_step(number).summary()
@@ -199,9 +199,9 @@ def test_another_scene_begins_anew(tmp_path: Path) -> None:
     file = tmp_path / "loop.h5"
     short = replace(LOOP, steps=(LOOP.steps[0], replace(LOOP.steps[1], increments=2)))
     with pytest.raises(Killed):
-        bk.run_to_file(short, file, callback=kill_after(file, 2))
+        bk.run(short, file=file, callback=kill_after(file, 2))
     rough = replace(short, law=bk.Coulomb(0.35))
-    assert bk.run_to_file(rough, file).history == bk.run(rough).history
+    assert bk.run(rough, file=file).history == bk.run(rough).history
 
 
 def test_a_failed_step_leaves_the_finished_ones_in_the_file(
@@ -272,3 +272,8 @@ def test_results_without_steps_say_so() -> None:
 
     with pytest.raises(bk.InputError, match=r"the result has no load history: give \[\[steps\]\]"):
         to_csv(solution, "steps")
+
+
+def test_a_file_goes_with_no_mesh_of_its_own(tmp_path: Path) -> None:
+    with pytest.raises(bk.InputError, match="file is given with a mesh or a start"):
+        bk.run(SHORTER, file=tmp_path / "a.h5", start=bk.run(SHORTER))
