@@ -120,8 +120,10 @@ def _transform(spectrum: FloatArray, x: FloatArray) -> FloatArray:
     furthest = float(np.abs(x).max())
     at = furthest**2 * (0.5 + 0.5 * np.cos(np.pi * (np.arange(_N_PLACES) + 0.5) / _N_PLACES))
     k, phase = _FREQUENCIES, np.sqrt(at)[:, None] * _FREQUENCIES
+    # split off the singular part at k = 0, whose first terms are constants and multiples of x^2
     singular = np.where(k < 1.0, 6.0 / k**3 + 1.2 / k, 0.0)
     fall = -2.0 * np.sin(0.5 * phase) ** 2
+    # cos(phase) - 1 + phase^2 / 2 without cancellation: its series where the phase is small
     z = phase**2
     fourth = z**2 / 24.0 * (1.0 - z / 30.0 * (1.0 - z / 56.0 * (1.0 - z / 90.0 * (1.0 - z / 132.0))))
     fourth = np.where(z < 0.5, fourth, fall + 0.5 * z)

@@ -108,23 +108,30 @@ class _Zones:
         return float(excess * np.sqrt(end - t[last_stick]) / state[0])
 
     def _system(self, cuts: FloatArray) -> tuple[FloatArray, FloatArray, int]:
-        """Return the places t, the system for P at all and Q at sticking places, and the last of the latter."""
+        """Return the points t, the equations for P at all and Q at sticking points, and the index of the last of these.
+
+        P and Q are the normal and the tangential traction in the variable t of the contact, as in the docstring of the
+        class; Q = s P where the surface slips, so that only sticking points have an unknown Q.
+        """
         xi, weights = gauss_legendre(_N_POINTS)
         half = 0.5 * np.diff(cuts)[:, None]
         t, weight = (cuts[:-1, None] + half * (1.0 + xi)).ravel(), (half * weights).ravel()
         n, n_stick = t.size, _N_LEVELS * _N_POINTS
+        # log|t - t'|, log|pi - t - t'| and log|t + t'| exactly, with constant densities on each panel
         direct, edge, middle = (_log_integrals(cuts, places) for places in (t, np.pi - t, -t))
         apart, total = t[:, None] - t, t[:, None] + t
+        # the remaining smooth factors of the kernels of P and of Q by the Gauss rule
         ratio = np.sinc(apart / np.pi)
         smooth = np.log(ratio * np.sin(total) / (total * (np.pi - total)))
         of_p = -(direct + edge + middle + smooth * weight) / np.pi
         smooth = np.log(np.sinc(0.5 * apart / np.pi) / np.cos(0.5 * apart) * total / np.tan(0.5 * total))
         smooth += -np.log(2.0 * (np.pi - total))
         of_q = -(direct + edge - middle + smooth * weight) / np.pi
+        # integrals of the density from the start to each point, and from there to the end
         before = _running_integrals(half.ravel())
         after = weight - before
         stick = np.arange(n) < n_stick
-        # Q = s P where it slips
+        # first rows: normal displacement at all points; last rows: tangential displacement at sticking ones
         upper = of_p - self.coupling * self.friction * np.where(stick, 0.0, after)
         lower = np.where(stick, 0.0, self.friction * of_q) - self.coupling * before
         rows = [

@@ -262,9 +262,11 @@ def _integrate(
     """Return the coupling with multipliers at some nodes (m, n_local), and dofs (k,) whose share is a sliver."""
     from scipy.sparse import csr_matrix
 
+    # integrals of the multipliers on the pieces that both sides cover
     segments = segments.cut(modified_rows(segments, may_carry), side.space.local_nodes)
     quadrature = quadrature_on(segments, side, mortar, directions)
     psi, rows, integrals = multiplier_functions(side, segments, quadrature, may_carry)
+    # weight of each node; one with a tiny part of its full weight is a sliver
     dofs, first, number = np.unique(side.dofs, return_index=True, return_inverse=True)
     number_of = number.reshape(side.dofs.shape)
     full = np.bincount(number_of.ravel(), _basis_integrals(side).ravel())
@@ -273,6 +275,7 @@ def _integrate(
     has_weight = weights > 0.0
     slivers = dofs[has_weight & (weights < _LEAST_SHARE * full)]
 
+    # rows of the coupling: nodes with a weight, in order of the arc length
     arc_length = side.arc_length.ravel()[first]
     order = np.argsort(np.where(has_weight, arc_length, np.inf), kind="stable")[: np.count_nonzero(has_weight)]
     position = np.full(dofs.size, -1)
@@ -289,6 +292,7 @@ def _integrate(
         starts = np.searchsorted(row, np.arange(order.size + 1))
         return csr_matrix((sums, column, starts), shape=(order.size, n_columns))
 
+    # mean gap of each node along its direction, and the deepest point of the pieces
     weighted = psi * quadrature.weights[:, None]
     on_mortar = mortar.space.basis(quadrature.eta.ravel()).reshape(-1, *quadrature.eta.shape).transpose(1, 2, 0)
     gap = np.zeros((dofs.size, 2))

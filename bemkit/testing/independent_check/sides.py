@@ -96,6 +96,7 @@ def measure_flat(one: Side, two: Side, gap: float) -> Relative | None:
     """
     if not (one.is_flat and two.is_flat) or one.normal @ two.normal > -1.0 + _PARALLEL:
         return None
+    # coordinates along and across the first side
     normal = one.normal / np.hypot(*one.normal)
     tangent = np.array([-normal[1], normal[0]])
     meshes = one.body.result.mesh, two.body.result.mesh
@@ -106,6 +107,7 @@ def measure_flat(one: Side, two: Side, gap: float) -> Relative | None:
     ]
     places = [(start @ tangent, end @ tangent) for start, end in ends]
     distance = float((ends[1][0] @ normal).mean())
+    # the common interval, and the nodes of both sides in it
     low = max(float(np.min(place)) for place in places)
     high = min(float(np.max(place)) for place in places)
     knots = np.unique(np.concatenate([np.concatenate(p) for p in places]))
@@ -116,6 +118,7 @@ def measure_flat(one: Side, two: Side, gap: float) -> Relative | None:
     knots = knots[(knots > low + beside) & (knots < high - beside)]
     knots = knots[np.diff(knots, prepend=low) > beside]
     knots = np.concatenate([[low], knots, [high]])
+    # a Gauss rule between these nodes, where both displacements are polynomials
     xi, weights = np.polynomial.legendre.leggauss(12)
     half = 0.5 * np.diff(knots)[:, None]
     at = (knots[:-1, None] + half * (1.0 + xi)).ravel()
@@ -137,7 +140,10 @@ def measure_flat(one: Side, two: Side, gap: float) -> Relative | None:
 
 
 def sampled_overlap(one: Side, two: Side, gap: float, reach: float) -> float:
-    """Return how deep [m] points of one side are in the other one, by the place there that they look at.
+    """Return the largest depth [m] of points of one side in the other one, measured at their closest points there.
+
+    A point x of one side faces the point y of the other side where the sum of both directions, n(x) - n(y), passes
+    through x and y. The depth is the relative displacement along this direction, less the distance of x and y.
 
     Parameters
     ----------
@@ -152,7 +158,7 @@ def sampled_overlap(one: Side, two: Side, gap: float, reach: float) -> float:
     rows = np.repeat(np.arange(two.elements.size), _N_SAMPLES)
     samples = mesh.points(two.elements, xi).reshape(-1, 2)
     every = boundary.points[one.elements].reshape(-1, 2)
-    # an end belongs to two elements, and either may be the one
+    # candidates: the nearest samples of each point, several because an end belongs to two elements
     distance, nearest = (np.ravel(found) for found in cKDTree(samples).query(every, k=_N_NEAREST))
     points = np.repeat(every, _N_NEAREST, axis=0)
     normals = np.repeat(boundary.normals[one.elements].reshape(-1, 2), _N_NEAREST, axis=0)
@@ -168,7 +174,9 @@ def sampled_overlap(one: Side, two: Side, gap: float, reach: float) -> float:
         offset = mesh.points(element, at[:, None])[:, 0] - points
         return np.asarray(along[:, 0] * offset[:, 1] - along[:, 1] * offset[:, 0])
 
-    faces = (np.hypot(*facing(place).T) > 1.7) & (distance < reach)  # at most 60 degrees off
+    # only sides whose normals are opposite to 60 degrees face each other
+    faces = (np.hypot(*facing(place).T) > 1.7) & (distance < reach)
+    # Newton's method for the local coordinate at which the distance across the direction vanishes
     for _ in range(8):
         direction = facing(place)
         direction /= np.maximum(np.hypot(*direction.T), 0.1)[:, None]
@@ -176,6 +184,7 @@ def sampled_overlap(one: Side, two: Side, gap: float, reach: float) -> float:
         place = np.clip(place - beside(place, direction) / np.where(slope == 0.0, 1.0, slope), -1.0, 1.0)
     direction = facing(place)
     direction /= np.maximum(np.hypot(*direction.T), 0.1)[:, None]
+    # exclude points whose closest point lies beyond the end of the element
     offset = mesh.points(element, place[:, None])[:, 0] - points
     faces &= np.abs(beside(place, direction)) < _BESIDE * np.maximum(mesh.lengths[element], distance)
     overlap = np.sum((motion - two.displacement(row, place) - offset) * direction, axis=1) - gap
