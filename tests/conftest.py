@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import sys
+from collections.abc import Callable
 
 import pytest
 from hypothesis import HealthCheck, settings
@@ -35,3 +37,34 @@ def pytest_cmdline_main(config: pytest.Config) -> None:
         config.option.numprocesses, config.option.dist = "auto", "loadfile"
         for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
             os.environ.setdefault(name, "1")  # one process for each processor, not two
+
+
+@pytest.fixture
+def without(monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
+    """Return a function that makes packages, by their names, look as if they were not installed."""
+
+    def hide(*packages: str) -> None:
+        for package in packages:
+            monkeypatch.setitem(sys.modules, package, None)
+
+    return hide
+
+
+@pytest.fixture
+def memory(monkeypatch: pytest.MonkeyPatch) -> Callable[[float], None]:
+    """Return a function that gives the computer another amount of memory [bytes]."""
+    of_system = os.sysconf
+
+    def change(amount: float) -> None:
+        page = of_system("SC_PAGE_SIZE")
+        values = {"SC_PHYS_PAGES": amount / page}
+        monkeypatch.setattr(os, "sysconf", lambda name: values.get(name) or of_system(name))
+
+    return change
+
+
+@pytest.fixture
+def compiled_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Compile the layer of collocation for bodies of any size, if numba is installed."""
+    pytest.importorskip("numba")
+    monkeypatch.setattr("bemkit.operators.collocation.compiled.MANY_ELEMENTS", 0)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import builtins
 import json
 from dataclasses import dataclass
 
@@ -40,14 +39,7 @@ def test_values_of_a_column() -> None:
     assert [head.unit for head in TABLE.columns] == ["", "N/m", ""]
 
 
-def test_a_data_frame_without_pandas_names_the_extra(monkeypatch) -> None:
-    original = builtins.__import__
-
-    def without_pandas(name, *arguments):
-        if name == "pandas":
-            raise ImportError(name)
-        return original(name, *arguments)
-
-    monkeypatch.setattr(builtins, "__import__", without_pandas)
+def test_a_data_frame_without_pandas_names_the_extra(without) -> None:
+    without("pandas")
     with pytest.raises(InputError, match=r'data frames need pandas: pip install "bemkit\[pandas\]"'):
         TABLE.to_pandas()

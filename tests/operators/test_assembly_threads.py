@@ -10,17 +10,22 @@ from bemkit.operators.boundary import hypersingular
 from bemkit.operators.linear import threads
 
 
-def test_large_work_takes_all_processors(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.fixture
+def three_processors(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(threads.os, "sched_getaffinity", lambda _: {0, 1, 2}, raising=False)
+
+
+@pytest.mark.usefixtures("three_processors")
+def test_large_work_takes_all_processors() -> None:
     assert threads.n_threads(threads.MANY_INTEGRALS - 1) == 1
     assert threads.n_threads(threads.MANY_INTEGRALS) == 3
 
 
+@pytest.mark.usefixtures("three_processors")
 def test_matrices_do_not_depend_on_the_number_of_threads(monkeypatch: pytest.MonkeyPatch) -> None:
     # two chunks share the rows of one node, whose two contributions add up to the same in either order
     mesh = bk.discretise(bk.Rectangle(1.0, 1.0).outline(), n_elements=40)
     space = bk.LagrangeSpace(mesh, degree=6)
-    monkeypatch.setattr(threads.os, "sched_getaffinity", lambda _: {0, 1, 2}, raising=False)
     matrices = []
     for many in (10**9, 0):
         monkeypatch.setattr(threads, "MANY_INTEGRALS", many)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import matplotlib.image
@@ -108,10 +108,8 @@ def test_places_that_take_no_pictures_are_refused(solution: Solution, tmp_path: 
         save_pictures(solution, tmp_path / "a.gif", ["traction"])
 
 
-def test_matplotlib_that_is_missing_is_told(
-    solution: Solution, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setitem(sys.modules, "matplotlib", None)
+def test_matplotlib_that_is_missing_is_told(solution: Solution, tmp_path: Path, without: Callable[..., None]) -> None:
+    without("matplotlib")
     with pytest.raises(OutputFileError, match='figures need matplotlib: pip install "bemkit'):
         save_pictures(solution, tmp_path)
 

@@ -6,13 +6,13 @@ import importlib
 import re
 import subprocess
 import sys
+from collections.abc import Callable
 from dataclasses import replace
 
 import pytest
 
 import bemkit as bk
 from bemkit.model.prepared import prepare
-from bemkit.operators.collocation import compiled
 from bemkit.operators.linear.solvers import ChosenLinearSolver, DenseCholesky
 from bemkit.plan import check_elements
 from bemkit.plan import plan as plan_module
@@ -90,11 +90,13 @@ def test_half_planes_have_equations_of_their_own() -> None:
     assert chosen(scene).hierarchical is None
 
 
-def test_only_what_does_not_fit_otherwise_is_compressed_for_want_of_memory(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(compiled, "is_installed", lambda: False)  # with numba 1000 elements are compressed anyhow
+def test_only_what_does_not_fit_otherwise_is_compressed_for_want_of_memory(
+    without: Callable[..., None], memory: Callable[[float], None]
+) -> None:
+    without("numba")  # with numba 1000 elements are compressed anyhow
     scene = scene_of(1000)
     assert chosen(scene).hierarchical is None
-    monkeypatch.setattr("bemkit.model.given.physical_memory", lambda: 5e7)
+    memory(5e7)
     assert chosen(scene).hierarchical is not None
     assert "dense ones need about" in chosen(scene).reason
 
@@ -112,12 +114,12 @@ def test_the_plan_says_what_is_compressed_and_which_kernels_run() -> None:
     assert prepare(scene, scene.build_mesh()).largest_matrix < plan.sizes.n_displacements
 
 
-def test_memory_of_compressed_equations_grows_like_the_elements(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_memory_of_compressed_equations_grows_like_the_elements(memory: Callable[[float], None]) -> None:
     small, large, larger = (bk.make_plan(scene_of(n), scene_of(n).build_mesh()).memory for n in (6000, 16000, 26000))
     assert larger - large == pytest.approx(large - small, rel=1e-2)
     # the working memory is the same, and less with numba: not quite in proportion to the elements
     assert 1.5 * small < large < 16 / 6 * small
-    monkeypatch.setattr(plan_module, "physical_memory", lambda: 80.0 * small)
+    memory(80.0 * small)
     check_elements(scene_of(300_000))
     with pytest.raises(bk.errors.InputError, match="use at most"):
         check_elements(scene_of(1_000_000))

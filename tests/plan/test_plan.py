@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import re
 import tracemalloc
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import pytest
 
@@ -210,10 +210,10 @@ def test_the_largest_memory_of_equations_that_are_not_stored_is_foreseen(n_eleme
     assert max(solution.memory.values()) == pytest.approx(solution.plan.memory, rel=0.2)
 
 
-def test_what_does_not_fit_is_refused_before_it_is_tried(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_does_not_fit_is_refused_before_it_is_tried(memory: Callable[[float], None]) -> None:
     plan = plan_of(load_scene("paper-1"))
     check_memory(plan)
-    monkeypatch.setattr(bemkit.plan.plan, "physical_memory", lambda: 0.25 * plan.memory)
+    memory(0.25 * plan.memory)
     message = f"320 elements need about {plan.memory / 1e9:.3g} GB, there are .* GB: use at most 160 elements"
     with pytest.raises(TooLargeError, match=message):
         check_memory(plan)
@@ -252,14 +252,14 @@ def test_a_million_elements_are_refused_before_the_mesh_is_made(
     assert max(filter(None, built)) <= 5000  # small ones, by which the large one is judged
 
 
-def test_the_memory_of_large_meshes_is_told_from_a_small_one(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_memory_of_large_meshes_is_told_from_a_small_one(memory: Callable[[float], None]) -> None:
     scene = bk.load_scene("paper-1")
     # collocation compares the distances of all elements, which takes seconds
     large = with_overrides(scene, elements=12_000, degree=3)
     needed = make_plan(large, large.build_mesh()).memory
     # the parts that grow more slowly than the square are a few thousandths
-    monkeypatch.setattr(bemkit.plan.plan, "physical_memory", lambda: 1.01 * needed)
+    memory(1.01 * needed)
     check_elements(large)
-    monkeypatch.setattr(bemkit.plan.plan, "physical_memory", lambda: 0.99 * needed)
+    memory(0.99 * needed)
     with pytest.raises(TooLargeError, match=r"use at most 119.. elements"):
         check_elements(large)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import os
+from collections.abc import Callable
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -39,7 +40,7 @@ def test_results_scenes_and_plans_show_a_table_and_a_picture() -> None:
     assert not plan.of("img")
 
 
-def test_load_steps_show_a_table_of_the_first_and_last_and_the_friction_loop(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_load_steps_show_a_table_of_the_first_and_last_and_the_friction_loop(without: Callable[..., None]) -> None:
     scene = dataclasses.replace(with_overrides(bk.load_scene("paper-1"), elements=24), load_factors=(0.5, 1.0))
     steps = bk.run_history([scene])
     few = Page(steps._repr_html_())
@@ -47,7 +48,7 @@ def test_load_steps_show_a_table_of_the_first_and_last_and_the_friction_loop(mon
     assert len(few.of("tr")) == 1 + 2
     assert len(few.of("img")) == 2
     assert len(Page(steps[-1]._repr_html_()).of("img")) == 2
-    monkeypatch.setattr("bemkit.report.notebook.has_pictures", lambda: False)
+    without("matplotlib")
     many = Page(type(steps)(steps * 10)._repr_html_())
     assert "The first and the last of 20 load steps" in many.texts
     assert len(many.of("tr")) == 1 + 12
@@ -59,13 +60,13 @@ def test_doubts_are_shown() -> None:
     assert "Something is doubtful." in Page(doubted._repr_html_()).texts
 
 
-def test_a_scene_that_cannot_be_divided_says_why_it_has_no_picture(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_scene_that_cannot_be_divided_says_why_it_has_no_picture(without: Callable[..., None]) -> None:
     scene = bk.load_scene("paper-1")
     far = bk.Part("far", bk.Clamped(), where=bk.Expression("x > 5"))
     texts = " ".join(Page(dataclasses.replace(scene, parts=(*scene.parts, far))._repr_html_()).texts)
     assert "No picture: " in texts
     assert "far" in texts
-    monkeypatch.setattr("bemkit.report.notebook.has_pictures", lambda: False)
+    without("matplotlib")
     assert not Page(scene._repr_html_()).of("img")
 
 

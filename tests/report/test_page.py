@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import shutil
 import subprocess
+from collections.abc import Callable
 from html.parser import HTMLParser
 from pathlib import Path
 
@@ -113,8 +114,8 @@ def test_everyone_can_read_it(page: Page) -> None:
     assert [tag for tag, _ in page.elements if tag in ("h1", "h2")] == ["h1"] + ["h2"] * len(SECTIONS)
 
 
-def test_doubts_and_failures_are_told(solution: bk.Solution, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("bemkit.report.page.has_pictures", lambda: False)
+def test_doubts_and_failures_are_told(solution: bk.Solution, without: Callable[..., None]) -> None:
+    without("matplotlib")
     doubted = Page(
         report(solution.with_warnings((ResultWarning("test", "", "The estimated error is 7 %: use more elements."),)))
     )
@@ -133,22 +134,26 @@ def test_scenes_with_functions_and_without_contact_have_reports() -> None:
     assert "Tractions along the whole boundary" in texts
 
 
-def test_histories_and_several_bodies_have_reports(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_histories_and_several_bodies_have_reports(without: Callable[..., None]) -> None:
     scene = dataclasses.replace(with_overrides(bk.load_scene("paper-1"), elements=24), load_factors=(0.5, 1.0))
     texts = " ".join(Page(report(bk.run(scene))).texts)
     assert "Status over the time of a load history" in texts
     cylinders = bk.run(with_overrides(bk.load_scene("two-cylinders"), elements=40))
-    monkeypatch.setattr("bemkit.report.page.has_pictures", lambda: False)
+    without("matplotlib")
     page = Page(report(cylinders))
     assert "Pictures need matplotlib" in " ".join(page.texts)
     assert any("lower" in text for text in page.texts)
 
 
 def test_the_command_writes_it(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], solution: bk.Solution
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    solution: bk.Solution,
+    without: Callable[..., None],
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("bemkit.report.page.has_pictures", lambda: False)
+    without("matplotlib")
     bk.write_result("r.h5", solution)
     for _ in range(2):  # the second replaces the first
         with pytest.raises(SystemExit, match="0"):

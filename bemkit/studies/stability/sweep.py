@@ -82,13 +82,15 @@ def _tasks(axis: Axis[Baseline], baseline: Baseline) -> list[Task[StabilityRecor
     return [Task((axis.name, value), f"{axis.name} {value:.6g}", partial(record, value)) for value in axis.values]
 
 
-def solve_and_judge(axis: str, case: Case, reference: AnySolution | None) -> StabilityRecord:
+def solve_and_judge(
+    axis: str, case: Case, reference: AnySolution | None, solve: Callable[..., Any] = run
+) -> StabilityRecord:
     """Solve a case of an axis and its twin, and judge them.
 
     The drift is measured against the reference, which is None if it has no solution itself.
     """
     factors, twin_scene = _twin(case.scene)
-    first, second = _attempt(case.scene, case), _attempt(twin_scene, case)
+    first, second = _attempt(case.scene, case, solve), _attempt(twin_scene, case, solve)
     solution = first.solution
     drift = twin = math.nan
     check = None
@@ -128,11 +130,11 @@ def _checked(solution: AnySolution) -> Violations:
     return violations_of(solution, solution.at_step(n_steps - 1) if n_steps > 1 else None)
 
 
-def _attempt(scene: Scene | Assembly, case: Case) -> Attempt[Any]:
+def _attempt(scene: Scene | Assembly, case: Case, solve: Callable[..., Any] = run) -> Attempt[Any]:
     if isinstance(scene, Assembly):
-        return attempt(lambda: run(scene))
+        return attempt(lambda: solve(scene))
     # the mesh is made inside: an error there is an answer too
-    return attempt(lambda: run(scene, mesh=case.mesh(scene)))
+    return attempt(lambda: solve(scene, mesh=case.mesh(scene)))
 
 
 def difference(

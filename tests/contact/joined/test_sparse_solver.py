@@ -1,4 +1,3 @@
-import importlib.util
 import sys
 from types import SimpleNamespace
 
@@ -31,14 +30,14 @@ def test_factors_solve_for_several_right_sides():
     np.testing.assert_allclose(MATRIX @ found, right_sides, atol=1e-6)  # the small pivot may cost eight digits
 
 
-def test_a_singular_matrix_is_refused(asked_anew, monkeypatch):
-    monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
+def test_a_singular_matrix_is_refused(asked_anew, without):
+    without("pypardiso")
     with pytest.raises(SingularMatrixError, match="singular"), factored(sparse.csr_array(np.ones((2, 2)))):
         pass
 
 
-def test_without_pardiso_the_name_says_what_to_install(asked_anew, monkeypatch):
-    monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
+def test_without_pardiso_the_name_says_what_to_install(asked_anew, without):
+    without("pypardiso")
     assert not uses_pardiso()
     assert "SuperLU (pip install 'bemkit[pardiso]'" in sparse_solver_name()
 
@@ -48,14 +47,13 @@ def test_a_pardiso_that_does_not_work_is_left_alone(asked_anew, monkeypatch):
         def __init__(self):
             raise ImportError("Shared library mkl_rt not found")
 
-    fake = SimpleNamespace(PyPardisoSolver=Broken)
+    fake = SimpleNamespace(PyPardisoSolver=Broken, __spec__="found")
     monkeypatch.setitem(sys.modules, "pypardiso", fake)
-    monkeypatch.setattr(importlib.util, "find_spec", lambda name: fake)
     assert "PARDISO does not work here: ImportError: Shared library mkl_rt not found" in sparse_solver_name()
     test_factors_solve_for_several_right_sides()
 
 
-def test_pardiso_gives_what_superlu_gives(asked_anew, monkeypatch):
+def test_pardiso_gives_what_superlu_gives(asked_anew, without):
     pytest.importorskip("pypardiso")
     random = np.random.default_rng(0)
     matrix = sparse.csr_array(sparse.random_array((300, 300), density=0.02, rng=random) + 2.0 * sparse.eye_array(300))
@@ -64,7 +62,7 @@ def test_pardiso_gives_what_superlu_gives(asked_anew, monkeypatch):
     with factored(matrix) as solve:
         by_pardiso = solve(right_sides)
     sparse_form._pardiso.cache_clear()
-    monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
+    without("pypardiso")
     with factored(matrix) as solve:
         by_superlu = solve(right_sides)
     np.testing.assert_allclose(by_pardiso, by_superlu, rtol=1e-11)  # condition about 1e2

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 import math
 from pathlib import Path
 
@@ -220,8 +219,8 @@ def test_other_drawings(tmp_path) -> None:
         read(tmp_path, "part.dwg", "")
 
 
-def test_missing_packages_say_what_to_install(monkeypatch, tmp_path) -> None:
-    monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
+def test_missing_packages_say_what_to_install(without, tmp_path) -> None:
+    without("ezdxf", "svgpathtools")
     for name, package in (("part.dxf", "ezdxf"), ("part.svg", "svgpathtools")):
         with pytest.raises(GeometryError, match=rf'{name}: {package} is not installed: pip install "bemkit\[cad\]"'):
             read(tmp_path, name, "")

@@ -15,7 +15,6 @@ import pytest
 
 from bemkit.geometry.drawn import ArcTo, LineTo, SplineTo
 from bemkit.geometry.errors import GeometryError
-from bemkit.geometry.files import gmsh_files
 from bemkit.geometry.files.gmsh_files import why_no_gmsh
 from bemkit.geometry.files.shape_file import DrawingFile, MeshFile
 from bemkit.geometry.meshing.discretise import discretise
@@ -29,9 +28,9 @@ UNNAMED = ("untagged.msh", "quadratic.msh")
 
 
 @pytest.fixture(params=["gmsh", "meshio"])
-def reader(request, monkeypatch) -> str:
+def reader(request, without) -> str:
     if request.param == "meshio":
-        monkeypatch.setattr(gmsh_files, "why_no_gmsh", lambda: "gmsh is left out")
+        without("gmsh")
     elif why_no_gmsh():
         pytest.skip(why_no_gmsh())
     return request.param
@@ -181,8 +180,8 @@ def test_refused(case: str, tmp_path) -> None:
         _ = MeshFile(stored(mesh, tmp_path)).shape
 
 
-def test_cells_of_other_types_are_named(tmp_path, monkeypatch) -> None:
-    monkeypatch.setattr(gmsh_files, "why_no_gmsh", lambda: "gmsh is left out")
+def test_cells_of_other_types_are_named(tmp_path, without) -> None:
+    without("gmsh")
     mesh = meshio.Mesh(np.random.default_rng(0).random((25, 2)), [("quad25", np.arange(25)[None])])
     mesh.write(tmp_path / "body.msh", file_format="gmsh22")
     with pytest.raises(GeometryError, match=r"it has cells of type 'quad25': give lines, triangles and quadrilaterals"):
@@ -213,8 +212,8 @@ def test_numbers_out_of_range() -> None:
         DrawingFile("part.dxf", tolerance=-1.0)
 
 
-def test_missing_packages_say_what_to_install(monkeypatch) -> None:
-    monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
+def test_missing_packages_say_what_to_install(without) -> None:
+    without("gmsh", "meshio")
     with pytest.raises(
         GeometryError, match=r'meshio is not installed: .*"bemkit\[mesh\]"; .*gmsh is not installed: .*"bemkit\[mesh\]"'
     ):

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from bemkit.geometry import BoundaryMesh, Polygon, Rectangle, discretise
-from bemkit.operators.collocation import compiled
 from bemkit.operators.collocation.images import collocation_equations
 from bemkit.operators.hierarchy.clusters import Discs
 from bemkit.operators.hierarchy.compression import Compression
@@ -45,10 +44,9 @@ def test_blocks_between_leaves_follow_from_their_skeletons(
 
 
 @pytest.mark.parametrize("is_compiled", [False, True], ids=["numpy", "numba"])
-def test_columns_of_one_kind_are_compressed_alone(monkeypatch: pytest.MonkeyPatch, is_compiled: bool) -> None:
+def test_columns_of_one_kind_are_compressed_alone(request: pytest.FixtureRequest, is_compiled: bool) -> None:
     if is_compiled:
-        pytest.importorskip("numba")
-        monkeypatch.setattr(compiled, "MANY_ELEMENTS", 0)
+        request.getfixturevalue("compiled_at_once")
     mesh = discretise(L_SHAPE.outline(), n_elements=240).unit
     tree = ClusterTree.of(mesh.centres, 24)
     equations = collocation_equations(mesh, Material(1.0, 0.3), tree.order, takes_slopes=True)

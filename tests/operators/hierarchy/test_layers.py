@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 import types
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 import numpy as np
 import pytest
@@ -24,10 +24,9 @@ MATERIAL = Material(2.0, 0.3)
 
 
 @pytest.fixture(params=["numpy", "numba"])
-def backend(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> str:
+def backend(request: pytest.FixtureRequest) -> str:
     if request.param == "numba":
-        pytest.importorskip("numba")
-        monkeypatch.setattr(compiled, "MANY_ELEMENTS", 0)
+        request.getfixturevalue("compiled_at_once")
         assert compiled.layer_for(1) is not straight_layer
     return str(request.param)
 
@@ -183,8 +182,8 @@ def test_points_of_no_element_see_no_jump() -> None:
 
 
 @pytest.mark.usefixtures("unloaded")
-def test_without_numba_the_plan_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(compiled, "is_installed", lambda: False)
+def test_without_numba_the_plan_says_what_to_install(without: Callable[..., None]) -> None:
+    without("numba")
     assert compiled.loaded()[0] is straight_layer
     assert "pip install 'bemkit[fast]'" in compiled.loaded()[1]
     assert compiled.expected(2000) == (False, compiled.loaded()[1])

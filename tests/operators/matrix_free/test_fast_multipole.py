@@ -8,7 +8,6 @@ from scipy.sparse.linalg import LinearOperator
 
 from bemkit.arrays import FloatArray
 from bemkit.geometry import BoundaryMesh
-from bemkit.operators.collocation import compiled
 from bemkit.operators.collocation.images import collocation_equations
 from bemkit.operators.material import Material
 from bemkit.operators.matrix_free.fast_multipole import FastMultipole
@@ -71,9 +70,8 @@ def test_errors_follow_the_tolerance() -> None:
     assert errors[0] > 10.0 * errors[1] > 100.0 * errors[2]
 
 
-def test_numpy_and_numba_give_the_same_products(monkeypatch: pytest.MonkeyPatch) -> None:
-    pytest.importorskip("numba")
-    monkeypatch.setattr(compiled, "MANY_ELEMENTS", 0)
+@pytest.mark.usefixtures("compiled_at_once")
+def test_numpy_and_numba_give_the_same_products() -> None:
     assert error_of(multipole_of(mesh_of("rectangle", 400))) < TINY
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import dataclasses
 import io
+from collections.abc import Callable
 from pathlib import Path
 
 import matplotlib.image
@@ -17,7 +18,6 @@ from bemkit.cli.main import commands
 from bemkit.cli.printed_errors import WIDE, print_study
 from bemkit.cli.progress import compute_with_progress
 from bemkit.errors import BemkitError, one_line
-from bemkit.pictures import figure_files
 from bemkit.reference import MEASURES, find_reference
 from bemkit.studies.accuracy import runs as runs_module
 from bemkit.studies.accuracy.figures import draw_errors
@@ -174,8 +174,8 @@ def test_bad_input_is_one_line(arguments: tuple[str, ...], message: str) -> None
     assert len(str(error).splitlines()) == 1
 
 
-def test_without_matplotlib_there_is_no_figure(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setattr(figure_files, "find_spec", lambda name: None)
+def test_without_matplotlib_there_is_no_figure(without: Callable[..., None], tmp_path: Path) -> None:
+    without("matplotlib")
     assert 'figures need matplotlib: pip install "bemkit[plot]"' in str(call(*FAST, "--plot", tmp_path).exception)
 
 

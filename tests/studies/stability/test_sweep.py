@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from collections.abc import Callable
 from functools import partial
 
 import numpy as np
@@ -12,7 +13,6 @@ import pytest
 import bemkit as bk
 from bemkit.scene.toml import load_scene, with_overrides
 from bemkit.studies.engine import Task, compute
-from bemkit.studies.stability import sweep as sweep_module
 from bemkit.studies.stability.axes import AXES, Axis, UnknownAxisError, find_axes
 from bemkit.studies.stability.case import Case
 from bemkit.studies.stability.records import StabilityRecord, Verdict
@@ -111,21 +111,20 @@ def altered(solution: bk.Solution) -> bk.Solution:
     return dataclasses.replace(solution, contact=dataclasses.replace(table, sigma_t=0.99 * table.sigma_t))
 
 
-def row_of(case: Case, reference: bk.Solution) -> StabilityRecord:
-    return solve_and_judge("axis", case, reference)
+def row_of(case: Case, reference: bk.Solution, solve: Callable[..., bk.Solution] = bk.run) -> StabilityRecord:
+    return solve_and_judge("axis", case, reference, solve)
 
 
-def test_a_driver_that_lies_is_found_out(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_driver_that_lies_is_found_out() -> None:
     scene = small_paper_scene(1)
     reference = bk.run(scene)
     assert row_of(Case(1.0, scene), reference).verdict == "right"
-    monkeypatch.setattr(sweep_module, "run", lambda scene, mesh=None: altered(bk.run(scene, mesh=mesh)))
-    lying = row_of(Case(1.0, scene), reference)
+    lying = row_of(Case(1.0, scene), reference, lambda scene, mesh: altered(bk.run(scene, mesh=mesh)))
     assert lying.verdict == "wrong"
     assert "independent check finds" in lying.message
 
 
-def test_an_answer_that_depends_on_the_units_is_found_out(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_answer_that_depends_on_the_units_is_found_out() -> None:
     scene = small_paper_scene(1)
     reference = bk.run(scene)
 
@@ -133,14 +132,13 @@ def test_an_answer_that_depends_on_the_units_is_found_out(monkeypatch: pytest.Mo
         stiff = scene.material.youngs_modulus > 1e6
         return bk.run(dataclasses.replace(scene, law=bk.Coulomb(0.4)) if stiff else scene)
 
-    monkeypatch.setattr(sweep_module, "run", unit_bound)
-    assert row_of(Case(1.0, scene), reference).verdict == "ambiguous"
-    held_to_it = row_of(Case(1.0, scene, drift_limit=1e-6), reference)
+    assert row_of(Case(1.0, scene), reference, unit_bound).verdict == "ambiguous"
+    held_to_it = row_of(Case(1.0, scene, drift_limit=1e-6), reference, unit_bound)
     assert held_to_it.verdict == "wrong"
     assert "similar twin differs" in held_to_it.message
 
 
-def test_drift_unsolvable_claims_and_other_statuses_are_found_out(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_drift_unsolvable_claims_and_other_statuses_are_found_out() -> None:
     scene = small_paper_scene(1)
     reference = bk.run(scene)
     other = dataclasses.replace(scene, law=bk.Coulomb(0.4))
@@ -152,18 +150,16 @@ def test_drift_unsolvable_claims_and_other_statuses_are_found_out(monkeypatch: p
     assert (named.verdict, named.status) == ("named", "max_steps")
     assert row_of(Case(1.0, few, is_solvable=True), reference).verdict == "wrong"
     stiff_fails = lambda scene, mesh=None: bk.run(few if scene.material.youngs_modulus > 1e6 else scene)  # noqa: E731
-    monkeypatch.setattr(sweep_module, "run", stiff_fails)
-    assert "but its similar twin: max_steps" in row_of(Case(1.0, scene), reference).message
+    assert "but its similar twin: max_steps" in row_of(Case(1.0, scene), reference, stiff_fails).message
 
 
-def test_an_error_without_a_name_is_not_hidden(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_error_without_a_name_is_not_hidden() -> None:
     def broken(scene: bk.Scene, mesh: object = None) -> bk.Solution:
         raise ValueError("operands could not be broadcast together")
 
     reference = bk.run(small_paper_scene(1))
-    monkeypatch.setattr(sweep_module, "run", broken)
     with pytest.raises(ValueError, match="broadcast"):
-        row_of(Case(1.0, small_paper_scene(1)), reference)
+        row_of(Case(1.0, small_paper_scene(1)), reference, broken)
 
 
 def test_a_scene_without_a_solution_is_no_baseline() -> None:

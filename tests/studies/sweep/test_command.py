@@ -9,6 +9,7 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -140,8 +141,8 @@ def test_files_of_others_stay(tmp_path: Path) -> None:
     assert path.read_text() == "my thesis"
 
 
-def test_a_cluster_that_is_not_there_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, "distributed", None)
+def test_a_cluster_that_is_not_there_is_named(without: Callable[..., None]) -> None:
+    without("distributed")
     result = call(*FAST, "--vary", f"{FRICTION}=0.1,0.2", "--on", "tcp://127.0.0.1:1", "-q")
     assert 'a cluster needs distributed: pip install "bemkit[cluster]"' in str(result.exception)
 
@@ -161,10 +162,10 @@ def test_a_cluster_is_reached_by_its_address_or_named(tmp_path: Path, monkeypatc
     assert len(Sweep.read(tmp_path / "table.jsonl").solved) == 2
 
 
-def test_data_frames_need_their_packages(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_data_frames_need_their_packages(without: Callable[..., None]) -> None:
     table = bk.sweep(SCENE, {FRICTION: [0.2]})
     for package, kind in (("pandas", "data frames"), ("xarray", "data sets")):
-        monkeypatch.setitem(sys.modules, package, None)
+        without(package)
         with pytest.raises(BemkitError, match=rf'{kind} need {package}: pip install "bemkit\[pandas\]"'):
             getattr(table, f"as_{package}")()
 
