@@ -202,7 +202,7 @@ def check_elements(scene: Stated) -> None:
     """Refuse a number of elements whose matrices cannot fit into this computer, before the mesh is made.
 
     Memory grows with the square of that number, or linearly where the equations are compressed: the plans for small
-    meshes predict the cost of a large one. A periodic half-plane has no matrices.
+    meshes predict the cost of a large one. Half-planes of many elements have no matrices.
 
     Raises
     ------
@@ -213,8 +213,7 @@ def check_elements(scene: Stated) -> None:
         return
     n_elements, outline = scene.mesh.elements, scene.shape.outline()
     few = max(_FEW, few_on(outline))
-    is_periodic = outline.surface is not None and outline.surface.is_periodic
-    if n_elements is None or n_elements <= max(_MANY, few) or is_periodic:
+    if n_elements is None or n_elements <= max(_MANY, few) or outline.surface is not None:
         return
     plan, growth = _plan_of(scene, few), n_elements / few
     if plan.is_compressed:  # on meshes where what does not grow is all there

@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass, field
 from typing import Any
 
-from bemkit.errors import InputError
+from bemkit.contact.body import ContactState
+from bemkit.errors import BemkitError, InputError
+from bemkit.model.model import Model
 from bemkit.plan import check_elements
+from bemkit.results.solved_problem import SolvedProblem
 from bemkit.runs.adaptive import run_adaptive
-from bemkit.runs.history import run_on_mesh
+from bemkit.runs.steps import joined, solved_history
+from bemkit.runs.warm_start import state_on, take_sticking_state
 from bemkit.scene.scene import Scene
 from bemkit.scene.steps import Stated
 from bemkit.scene.toml import with_overrides
@@ -41,7 +46,8 @@ def run_cascade(
     Returns
     -------
     tuple of Solution
-        From the coarsest mesh to the scene's own, which comes last. A mesh that fails starts the next one cold.
+        From the coarsest mesh to the scene's own, which comes last. A mesh that fails starts the next one cold, and a
+        coarse one on which the scene is refused is skipped.
 
     Raises
     ------
@@ -64,9 +70,33 @@ def run_cascade(
     counts = [scene.mesh.n_elements]
     while counts[-1] // ratio >= coarsest:
         counts.append(counts[-1] // ratio)
-    solutions: list[Any] = []
+    levels, solutions = _Levels(), []
     for count in reversed(counts):
-        level = scene if count == counts[0] else with_overrides(scene, elements=count)
-        start = solutions[-1] if solutions and solutions[-1].is_converged else None
-        solutions.append(run_on_mesh(level, start=start, callback=callback))
+        is_last = count == counts[0]
+        level = scene if is_last else with_overrides(scene, elements=count)
+        try:
+            solutions.append(joined(*solved_history([level], callback=callback, guess=levels.start)))
+        except BemkitError:
+            if is_last:  # a coarse mesh may be too coarse for the scene
+                raise
+            levels.models.clear()
+        else:
+            levels.solution = solutions[-1]
     return tuple(solutions)
+
+
+@dataclass
+class _Levels:
+    """What a mesh takes from the one before it."""
+
+    models: list[Model] = field(default_factory=list)
+    solution: SolvedProblem | None = None
+
+    def start(self, model: Model) -> ContactState | None:
+        """Return where a model starts; the load is measured by the sticking state of the model before."""
+        start = None
+        if self.models and self.solution is not None and self.solution.is_converged:
+            take_sticking_state(model, self.models[0])
+            start = state_on(model, self.solution)
+        self.models[:] = [model]
+        return start

@@ -29,6 +29,8 @@ if TYPE_CHECKING:
 
 _COARSEST, _RATIO = 1024, 16
 """Elements of the coarsest mesh of a large body, and the ratio of their numbers from one mesh to the next."""
+_COARSEST_STRIP = 50
+"""Elements of the coarsest mesh of a strip of a half-plane."""
 _LARGE = 5000
 """Elements of the mesh whose plan decides whether the equations of such a body are compressed."""
 
@@ -98,32 +100,35 @@ def run(
         from bemkit.runs.adaptive import run_adaptive  # only where it is asked for
 
         return run_adaptive(scene, callback=callback, executor=executor)[-1]
-    if mesh is None and start is None and (ratio := _gain_by_cascade(scene)):
+    if mesh is None and start is None and (cascade := _cascade(scene)):
         from bemkit.runs.nested import run_cascade
 
-        meshes = run_cascade(scene, coarsest=_COARSEST, ratio=ratio, callback=callback)
+        meshes = run_cascade(scene, coarsest=cascade[0], ratio=cascade[1], callback=callback)
         return with_times(meshes[-1], meshes)
     return run_on_mesh(scene, mesh, start, callback, executor)
 
 
-def _gain_by_cascade(scene: Stated) -> int:
-    """Return the ratio of elements of a cascade of meshes, zero if the scene is solved on its mesh at once.
+def _cascade(scene: Stated) -> tuple[int, int] | None:
+    """Return elements of the coarsest mesh and the ratio of a cascade, None if a scene is solved on its mesh at once.
 
-    A cascade pays where a contact step costs about as much as the assembly: for periodic half-planes, which have no
-    matrices, and for large bodies on compressed equations.
+    A cascade pays where a contact step costs about as much as the assembly: for half-planes, of which only closed nodes
+    are solved for or which have no matrices, and for large bodies on compressed equations.
     """
-    if not isinstance(scene, Scene):
-        return 0
-    outline = scene.shape.outline()
-    if outline.surface is not None and not outline.surface.is_periodic:
-        return 0
-    ratio, least = (_RATIO, few_on(outline)) if outline.surface is None else (2, 0)
-    if scene.mesh.n_elements < ratio * max(_COARSEST, least) or scene.n_steps > 1 or not scene.contact_parts:
-        return 0
+    if not isinstance(scene, Scene) or scene.n_steps > 1 or not scene.contact_parts:
+        return None
+    outline, n_elements = scene.shape.outline(), scene.mesh.n_elements
+    if outline.surface is None:
+        coarsest, ratio = max(_COARSEST, few_on(outline)), _RATIO
+    elif outline.surface.is_periodic:
+        coarsest, ratio = _COARSEST, 2
+    else:
+        coarsest, ratio = _COARSEST_STRIP, _RATIO if n_elements > _LARGE else 4
+    if n_elements < ratio * coarsest:
+        return None
     if outline.surface is not None:
-        return ratio
-    smaller = replace(scene, mesh=replace(scene.mesh, elements=max(_LARGE, least)))
-    return ratio if make_plan(smaller).is_compressed else 0
+        return coarsest, ratio
+    smaller = replace(scene, mesh=replace(scene.mesh, elements=max(_LARGE, few_on(outline))))
+    return (_COARSEST, ratio) if make_plan(smaller).is_compressed else None
 
 
 def run_probe(scene: Stated, *, n_starts: int = 8, mesh: Meshes = None) -> tuple[Any, ...]:

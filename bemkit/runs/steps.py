@@ -141,7 +141,7 @@ def solved_history(
     callback: Callback = None,
     done: AnySolution | None = None,
     finished: Callable[[AnySolution], None] | None = None,
-    guess: Callable[[Model], ContactState] | None = None,
+    guess: Callable[[Model], ContactState | None] | None = None,
     executor: Executor | None = None,
 ) -> tuple[History[AnySolution], tuple[AnySolution, ...]]:
     """Solve scenes that follow each other in time on one mesh of each body.

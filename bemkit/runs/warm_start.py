@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
+from bemkit.arrays import FloatArray
 from bemkit.contact.body import ContactState
 from bemkit.errors import InputError
 from bemkit.model.model import Model
@@ -29,23 +32,44 @@ def state_on(model: Model, solution: SolvedProblem) -> ContactState:
     ValueError
         If the solution lacks one of the contact parts or is not finite.
     """
-    table, units = solution.contact, model.units
-    scales = {
-        "u_n": units.displacement,
-        "u_t": units.displacement,
-        "sigma_n": units.stress,
-        "sigma_t": units.stress,
-    }
-    parts, arc_length = model.prepared.names, model.prepared.column("arc_length")
-    values = {name: np.zeros(len(parts)) for name in scales}
-    for part in dict.fromkeys(parts):
-        known = np.flatnonzero(table.rows(part))
-        if not known.size:
-            raise InputError(f"the start has no contact {part!r}: it has {', '.join(table.parts)}")
-        own = np.flatnonzero(np.equal(parts, part))
-        known = known[np.argsort(table.s[known])]
-        for name, scale in scales.items():
-            values[name][own] = np.interp(arc_length[own], table.s[known], getattr(table, name)[known]) / scale
-    return ContactState(
-        np.stack([values["u_n"], values["u_t"]], axis=1), np.stack([values["sigma_n"], values["sigma_t"]], axis=1)
+    table = solution.contact
+    displacement, traction = (
+        np.stack([getattr(table, name) for name in names], axis=1) for names in (("u_n", "u_t"), ("sigma_n", "sigma_t"))
     )
+    return _carried(model, table.part, table.s, displacement, traction)
+
+
+def take_sticking_state(model: Model, coarse: Model) -> None:
+    """Measure the load of a model by the sticking state of a coarser mesh: its own costs more than a few steps."""
+    state, units = coarse.problem.sticking_state, coarse.units
+    displacement, traction = state.displacement * units.displacement, state.traction * units.stress
+    names, arc_length = coarse.prepared.names, coarse.prepared.column("arc_length")
+    carried = _carried(model, names, arc_length, displacement, traction)
+    model.problem.for_all_laws("sticking_state", lambda: carried)
+
+
+def _carried(
+    model: Model, names: Sequence[str], arc_length: FloatArray, displacement: FloatArray, traction: FloatArray
+) -> ContactState:
+    """Interpolate physical values (n, 2) at contacts onto the contact nodes of a model, dimensionless.
+
+    Parameters
+    ----------
+    model : Model
+    names : sequence of str
+        The contact of each value.
+    arc_length : (n,) array [m]
+    displacement, traction : (n, 2) arrays [m], [Pa]
+    """
+    values = np.hstack([displacement / model.units.displacement, traction / model.units.stress])
+    parts, places = np.array(model.prepared.names), model.prepared.column("arc_length")
+    result = np.zeros((len(parts), 4))
+    for part in dict.fromkeys(parts.tolist()):
+        known = np.flatnonzero(np.equal(names, part))
+        if not known.size:
+            raise InputError(f"the start has no contact {part!r}: it has {', '.join(dict.fromkeys(names))}")
+        known = known[np.argsort(arc_length[known])]
+        own = np.flatnonzero(parts == part)
+        for column in range(4):
+            result[own, column] = np.interp(places[own], arc_length[known], values[known, column])
+    return ContactState(result[:, :2], result[:, 2:])

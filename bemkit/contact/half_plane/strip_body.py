@@ -62,7 +62,8 @@ class StripBody(SurfaceBody):
         core *= self.elastic.flexibility[np.ix_(element, element)]
         if self.elastic.material.plane_compressibility:
             signs = _real_products(seen, -1j * along)
-            signs *= np.sign(element[:, None] - element)
+            order = element.astype(float)
+            signs *= np.sign(order[:, None] - order)
             signs *= 0.5 * self.elastic.material.plane_compressibility
             core += signs
         # tractions are forces by lengths; the unknowns of a node follow each other

@@ -36,8 +36,7 @@ class HalfPlaneElasticity(SurfaceElasticity):
         """Operation counts of the flexibility."""
         return half_plane_work(self.mesh.n_elements)
 
-    def displaced(self, traction: ComplexArray) -> ComplexArray:
-        """Return the displacements (n_elements,) [m] that tractions (n_elements,) [Pa] cause; see `flexibility`."""
+    def _displaced(self, traction: ComplexArray) -> ComplexArray:
         force = self.mesh.lengths * traction
         along = self.flexibility @ np.stack([force.real, force.imag], axis=1)
         # forces before each element less those behind it

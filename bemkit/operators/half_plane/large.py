@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Self
 
@@ -28,12 +28,9 @@ class LargeHalfPlane(HalfPlaneElasticity):
     ----------
     tolerance : float
         Of the compression.
-    last : list
-        The last tractions and what they displace: a response, its certificate and its fields ask for the same.
     """
 
     tolerance: float = 1e-10
-    last: list[tuple[ComplexArray, ComplexArray]] = field(default_factory=list, repr=False)
 
     @property
     def work(self) -> OperationCounts:
@@ -57,17 +54,10 @@ class LargeHalfPlane(HalfPlaneElasticity):
             other.__dict__["factor"] = self.factor
         return other
 
-    def displaced(self, traction: ComplexArray) -> ComplexArray:
-        """Return the displacements (n_elements,) [m] that tractions (n_elements,) [Pa] cause."""
-        if not traction.any():
-            return np.zeros_like(traction)
-        if self.last and np.array_equal(self.last[0][0], traction):
-            return self.last[0][1]
+    def _displaced(self, traction: ComplexArray) -> ComplexArray:
         equations, force = self.factor.equations, self.mesh.lengths * traction
         along = potential_of(self.factor.compression, np.stack([force.real, force.imag], axis=1))
         sums = np.cumsum(force)
         across = 2.0 * sums - force - sums[-1]
         assert isinstance(equations, HalfPlaneEquations)
-        displacement = np.asarray(equations.along * (along[:, 0] + 1j * along[:, 1]) - 1j * equations.across * across)
-        self.last[:] = [(traction, displacement)]
-        return displacement
+        return np.asarray(equations.along * (along[:, 0] + 1j * along[:, 1]) - 1j * equations.across * across)

@@ -70,8 +70,7 @@ class PeriodicElasticity(SurfaceElasticity):
         """(n_elements,) array [m/Pa], that of each wave; see `wave_flexibility`."""
         return wave_flexibility(self.mesh.n_elements, float(self.mesh.lengths.sum()), self.material)
 
-    def displaced(self, traction: ComplexArray) -> ComplexArray:
-        """Return the displacements (n_elements,) [m] that tractions (n_elements,) [Pa] cause."""
+    def _displaced(self, traction: ComplexArray) -> ComplexArray:
         from scipy.fft import fft, ifft
 
         return np.asarray(ifft(self.flexibility * fft(traction)))

@@ -34,11 +34,14 @@ class SurfaceElasticity(ABC):
     material : Material
     drive : FarDrive
         How the half-plane moves far away; it rests unless given.
+    last : list
+        The last tractions and what they displace: a response, its certificate and its fields ask for the same.
     """
 
     mesh: BoundaryMesh
     material: Material
     drive: FarDrive = field(default_factory=FarDrive)
+    last: list[tuple[ComplexArray, ComplexArray]] = field(default_factory=list, repr=False)
 
     @cached_property
     def displacement_space(self) -> ConstantSpace:
@@ -67,9 +70,17 @@ class SurfaceElasticity(ABC):
             other.__dict__["flexibility"] = self.flexibility
         return other
 
-    @abstractmethod
     def displaced(self, traction: ComplexArray) -> ComplexArray:
         """Return the displacements (n_elements,) [m] that tractions (n_elements,) [Pa] cause."""
+        if not traction.any():
+            return np.zeros(traction.shape, complex)
+        if not self.last or not np.array_equal(self.last[0][0], traction):
+            self.last[:] = [(traction, self._displaced(traction))]
+        return self.last[0][1]
+
+    @abstractmethod
+    def _displaced(self, traction: ComplexArray) -> ComplexArray:
+        """Return the same of tractions that are not zero."""
 
     @cached_property
     def axes(self) -> ComplexArray:
