@@ -103,9 +103,11 @@ def far_drive(scene: Scene, units: Units) -> FarDrive:
         return FarDrive()
     motion = far.motion / (units.displacement, units.displacement, units.displacement / units.length)
     load = far.load / (units.stress * units.length * np.array([1.0, 1.0, units.length]))
-    centre = (np.array(far.centre) - units.centre) / units.length
+    centre = ((np.array(far.centre) - units.centre) / units.length).tolist()
     driven = tuple(np.flatnonzero(far.is_driven).tolist())
-    return FarDrive(driven, *(tuple(array.tolist()) for array in (motion, load, centre)))
+    strain = far.strain * units.length / units.displacement
+    (x, y, turn), (force_x, force_y, moment) = motion.tolist(), load.tolist()
+    return FarDrive(driven, (x, y, turn), (force_x, force_y, moment), (centre[0], centre[1]), strain)
 
 
 def given_data(conditions: NodalConditions, force: FloatArray, inside: ForcesInside | None) -> GivenData:

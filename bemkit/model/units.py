@@ -87,7 +87,7 @@ def largest_sizes(scene: Scene, mesh: BoundaryMesh, length: float) -> tuple[floa
     if scene.far is not None:
         of_turn = np.array([1.0, 1.0, length])
         loads.append(float(np.abs(scene.far.load / of_turn).max()) / length)
-        motions.append(float(np.abs(scene.far.motion * of_turn).max()))
+        motions.append(float(np.abs(np.append(scene.far.motion * of_turn, scene.far.strain * length)).max()))
     places = np.array([-1.0, 0.0, 1.0])
     for part, elements in scene.parts_on(mesh):
         points = mesh.points(elements, places).reshape(-1, 2)

@@ -38,8 +38,9 @@ def interior_fields(solution: SolvedBody) -> PotentialFields:
     if solution.mesh.surface is not None:
         from bemkit.operators.half_plane.fields import HalfPlaneFields
 
-        boundary = solution.boundary
-        return HalfPlaneFields(solution.mesh, solution.scene.material, boundary.traction, boundary.displacement)
+        boundary, far = solution.boundary, solution.scene.far
+        strain = 0.0 if far is None else far.strain
+        return HalfPlaneFields(solution.mesh, solution.scene.material, boundary.traction, boundary.displacement, strain)
     material, background = solution.scene.material, solution.particular
     return InteriorFields(solution.mesh.whole, material, *whole_boundary(solution), background)
 

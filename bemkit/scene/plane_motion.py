@@ -143,10 +143,24 @@ class FarField(PlaneMotion):
     moment : float, optional [N m/m]
         On the half-plane about the centre, anticlockwise.
     centre : (float, float) [m]
-        Where the forces act, and about which it turns.
+        Where the forces act, and about which it turns and is strained.
+    strain : float [-]
+        Strain of the whole half-plane along its surface, by a bulk stress of E' times as much; zero by default. That
+        of a specimen under tension or bending on which a pad is pressed.
 
     Raises
     ------
     InputError
         If a number is not finite, or a motion is given together with its load.
     """
+
+    strain: float = 0.0
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not math.isfinite(self.strain):
+            raise InputError(f"strain is {self.strain}: give a finite number")
+
+    def scaled(self, factor: float) -> Self:
+        """Return it with given motions, loads and strain multiplied by a number."""
+        return replace(super().scaled(factor), strain=factor * self.strain)

@@ -298,6 +298,8 @@ def _check_half_plane(
 
 
 def _check_periodic(far: FarField | None, mesh: MeshOptions, parts: Sequence[Part]) -> None:
+    if far is not None and far.strain:
+        raise InputError(f"far.strain is {far.strain}: a strained surface does not repeat: remove it")
     if far is not None and (far.turn or far.moment is not None):
         name = "turn" if far.turn else "moment"
         raise InputError(f"far.{name} is {getattr(far, name)}: a periodic half-plane cannot turn: remove it")

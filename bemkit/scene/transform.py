@@ -252,7 +252,8 @@ def _transformed_far(far: FarField, affine: AffineMap, stress: float, displaceme
     length = affine.factor[0]
     of_turn = np.array([1.0, 1.0, length])
     centre: tuple[float, float] = tuple(affine.forward(np.array([far.centre]))[0].tolist())
-    return replace(far.multiplied(displacement / of_turn, stress * length * of_turn), centre=centre)
+    moved = far.multiplied(displacement / of_turn, stress * length * of_turn)
+    return replace(moved, centre=centre, strain=far.strain * displacement / length)
 
 
 def _transformed_body_force(force: BodyForce, affine: AffineMap, stress: float, modulus: float) -> BodyForce:

@@ -138,8 +138,10 @@ class SurfaceBody(LinearBody):
     @cached_property
     def _displacement_at_rest(self) -> ComplexArray:
         """(n_elements,) array [m]: displacements under the given forces and motions."""
-        of_force = self.elastic.to_complex(self.elastic.strain_displacement(self.force))
-        return np.asarray(of_force + np.array(self.elastic.drive.motion) @ self._unit_motions)
+        elastic, drive = self.elastic, self.elastic.drive
+        of_force = elastic.to_complex(elastic.strain_displacement(self.force))
+        along = elastic.to_complex(dof_points(elastic.displacement_space) - np.array(drive.centre)).real
+        return np.asarray(of_force + np.array(drive.motion) @ self._unit_motions + drive.strain * along)
 
     @cached_property
     def rest(self) -> ComplexArray:

@@ -23,19 +23,23 @@ class FarDrive:
     load : tuple of float [N/m, N/m, N m/m]
         On the half-plane; zero where not driven.
     centre : tuple of float [m]
-        About which it turns, and where its forces act.
+        About which it turns and is strained, and where its forces act.
+    strain : float [-]
+        Along the surface, of the whole half-plane; no traction acts on the surface then.
     """
 
     driven: tuple[int, ...] = ()
     motion: tuple[float, float, float] = (0.0, 0.0, 0.0)
     load: tuple[float, float, float] = (0.0, 0.0, 0.0)
     centre: tuple[float, float] = (0.0, 0.0)
+    strain: float = 0.0
 
     def blended(self, other: FarDrive, share: float) -> FarDrive:
         """Return the drive a share of the way to another one."""
         pairs = ((self.motion, other.motion), (self.load, other.load))
         motion, load = (blended(np.array(one), np.array(two), share).tolist() for one, two in pairs)
-        return replace(other, motion=tuple(motion), load=tuple(load))
+        strain = (1.0 - share) * self.strain + share * other.strain
+        return replace(other, motion=tuple(motion), load=tuple(load), strain=strain)
 
     def motions_at(self, points: FloatArray) -> FloatArray:
         """Return the displacements (n, 2, 3) of points (n, 2) [m] by the three unit motions."""

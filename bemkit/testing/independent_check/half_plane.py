@@ -175,6 +175,12 @@ class Surface:
         logarithm = np.log(size, where=size > 0.0, out=np.zeros_like(size))
         return np.asarray(np.einsum("pnq,pnq,q,pno->n", logarithm, count, weights, span))
 
+    @property
+    def by_strain(self) -> FloatArray:
+        """(n_elements, 2) array [m]: displacements by the strain far away, along the surface from the centre."""
+        offset = (self.fields.solution.boundary.points - np.array(self.far.centre)) @ self.along
+        return np.asarray(self.far.strain * np.outer(offset, self.along))
+
     @cached_property
     def motion(self) -> FloatArray:
         """(3,) array: motion far away: as it is given, and where loads drive it as displacements show it."""
@@ -187,6 +193,7 @@ class Surface:
         of_turn = np.array([1.0, 1.0, 1.0 / self.extent])
         motions = self.motions[self.seen]
         left = self.fields.solution.boundary.displacement[self.seen] - self.by_tractions - motions @ self.far.motion
+        left -= self.by_strain[self.seen]
         matrix = (motions * of_turn)[:, :, rows].reshape(left.size, rows.size)
         amounts, result = np.linalg.lstsq(matrix, left.ravel(), rcond=None)[0], np.zeros(3)
         result[rows] = amounts * of_turn[rows]
@@ -195,7 +202,7 @@ class Surface:
     @cached_property
     def strained(self) -> FloatArray:
         """(n_elements, 2) array [m]: displacements without the motion of the whole body."""
-        return np.asarray(self.fields.solution.boundary.displacement - self.motions @ self.motion)
+        return np.asarray(self.fields.solution.boundary.displacement - self.motions @ self.motion - self.by_strain)
 
     @cached_property
     def trusted_force(self) -> float:
