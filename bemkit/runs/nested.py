@@ -87,7 +87,7 @@ def run_cascade(
 
 @dataclass
 class _Levels:
-    """What a mesh takes from the one before it."""
+    """The model and the solution on the mesh before."""
 
     models: list[Model] = field(default_factory=list)
     solution: SolvedProblem | None = None
