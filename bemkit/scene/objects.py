@@ -51,6 +51,12 @@ def check_objects(owner: Any, name: str = "") -> None:
         if isinstance(value, str | int | float | type | Mapping):
             shown = f"the class {value.__name__}" if isinstance(value, type) else repr(value)
             raise InputError(f"{begin}{attribute} is {shown}: give an object, such as {example}")
+    obstacle = getattr(owner, "obstacle", None)
+    if obstacle is not None and not callable(getattr(obstacle, "gap", None)):
+        raise InputError(
+            f"{begin}obstacle is {obstacle!r}, which has no method gap(points, normals): give one as "
+            "bemkit.contact.obstacle.Obstacle describes it"
+        )
     for attribute in _SEVERAL:
         value = getattr(owner, attribute, ())
         if isinstance(value, str) or not isinstance(value, Iterable):

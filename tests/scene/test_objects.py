@@ -19,6 +19,10 @@ PAIR = bk.ContactPair(("upper.bottom", "lower.top"))
     ("make", "message"),
     [
         (lambda: replace(SCENE, law="coulomb"), r"^law is 'coulomb': give an object, such as Coulomb\("),
+        (
+            lambda: bk.Contact(object()),
+            r"^obstacle is <object .*, which has no method gap\(points, normals\): give one as",
+        ),
         (lambda: replace(SCENE, law=0.3), r"^law is 0.3: give an object, such as Coulomb\("),
         (lambda: replace(SCENE, law=bk.Coulomb), "^law is the class Coulomb: give an object"),
         (lambda: replace(SCENE, solver="lemke"), r"^solver is 'lemke': give an object, such as Fallbacks\("),
