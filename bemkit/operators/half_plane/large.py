@@ -30,7 +30,7 @@ class LargeHalfPlane(HalfPlaneElasticity):
         Of the compression.
     """
 
-    tolerance: float = 1e-10
+    tolerance: float = 2e-11
 
     @property
     def work(self) -> OperationCounts:
