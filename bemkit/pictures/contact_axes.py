@@ -10,9 +10,10 @@ from typing import Any
 import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray
+from bemkit.pictures.abscissa import Abscissa
 from bemkit.pictures.drawing import BLUE, GREY, ORANGE, VERMILION, Axes, axes_or_new
 from bemkit.pictures.shown import Result
-from bemkit.scene.unit_names import UnitNames, amount, with_unit
+from bemkit.scene.unit_names import UnitNames, amount
 
 STATUS_COLOURS: Mapping[str, str] = MappingProxyType({"separated": "#D9D9D9", "slip": ORANGE, "stick": BLUE})
 _STATUS_TEXT: Mapping[str, str] = MappingProxyType({"separated": "#333333", "slip": "#000000", "stick": "#FFFFFF"})
@@ -47,10 +48,10 @@ def contact_axes(
     units = units or solution.units
     axes = axes_or_new(axes)
     strip = axes_with_strip(axes, f"{subject}\n{solution.title}")
-    label = with_unit(f"arc length $s$ along '{part}'", "length", units)
-    strip.set_xlabel(label, parse_math="$" not in part)
-    _draw_status(strip, solution, part)
-    places = [transition.s for transition in solution.transitions if transition.part == part]
+    abscissa = Abscissa.along(solution, part)
+    strip.set_xlabel(abscissa.label(units), parse_math="$" not in part)
+    _draw_status(strip, solution, part, abscissa)
+    places = [abscissa.at(transition.s) for transition in solution.transitions if transition.part == part]
     for place in places if len(places) <= _MOST_LINES else ():
         axes.axvline(place, color=GREY, linestyle="-", linewidth=0.8, zorder=0)
     return axes, units
@@ -66,7 +67,7 @@ def axes_with_strip(axes: Axes, title: str) -> Axes:
     return strip
 
 
-def _draw_status(strip: Axes, solution: Result, part: str) -> None:
+def _draw_status(strip: Axes, solution: Result, part: str, abscissa: Abscissa) -> None:
     """Paint the status along a part; name it where there is room, and in a legend where there is none."""
     from matplotlib.patches import Patch
 
@@ -77,7 +78,8 @@ def _draw_status(strip: Axes, solution: Result, part: str) -> None:
     words = [first, *(transition.to_status for transition in transitions)]
     edges = [0.0, *(transition.s for transition in transitions), length]
     named = set()
-    for (begin, end), word in zip(pairwise(edges), words, strict=True):
+    for (first_s, last_s), word in zip(pairwise(edges), words, strict=True):
+        begin, end = sorted((abscissa.at(first_s), abscissa.at(last_s)))
         strip.axvspan(begin, end, color=STATUS_COLOURS[word], linewidth=0)
         if end - begin > _NAMED * length:
             style: dict[str, Any] = {"ha": "center", "va": "center", "fontsize": 9, "color": _STATUS_TEXT[word]}
@@ -87,7 +89,7 @@ def _draw_status(strip: Axes, solution: Result, part: str) -> None:
     if handles:
         place = (1.0, -1.8)  # below the name of the abscissa
         strip.legend(handles=handles, loc="upper right", bbox_to_anchor=place, ncols=3, frameon=False, fontsize=9)
-    strip.set_xlim(0.0, length)
+    strip.set_xlim(*sorted((abscissa.at(0.0), abscissa.at(length))))
 
 
 def cut_peaks(
@@ -99,13 +101,14 @@ def cut_peaks(
     ----------
     axes : Axes
     s : (n,) array [m]
+        Ascending or descending.
     curves : sequence of (n,) arrays [Pa]
         Tractions there.
     units : UnitNames or None
     note_on_top : bool
         Whether what is cut is said at the upper end of the axes, not at the lower one.
     """
-    weights = np.gradient(s)
+    weights = np.abs(np.gradient(s))
     low, high, least, largest = 0.0, 0.0, 0.0, 0.0
     for values in curves:
         order = np.argsort(values)

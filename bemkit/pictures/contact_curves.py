@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from bemkit.pictures.abscissa import Abscissa
 from bemkit.pictures.contact_axes import (
     FIRST,
     LIMIT,
@@ -27,6 +28,9 @@ def draw_contact_displacement(
 ) -> Axes:
     """Draw normal and tangential displacement and the gap along one contact part, above its status.
 
+    Contacts on horizontal lines are drawn over x, with slip and friction positive along x; others over the arc length
+    of the boundary, positive along it.
+
     Parameters
     ----------
     solution : Solution or AssemblySolution
@@ -44,10 +48,11 @@ def draw_contact_displacement(
     """
     axes, units = contact_axes(axes, solution, part, units, "Displacements on the contact boundary")
     contact, chosen = solution.contact, solution.contact.rows(part)
-    s, gap = contact.s[chosen], contact.gap[chosen]
+    abscissa = Abscissa.along(solution, part)
+    s, gap = abscissa.at(contact.s[chosen]), contact.gap[chosen]
     marker = "o" if s.size <= MANY else ""
     axes.plot(s, contact.u_n[chosen], label="normal $u_n$", marker=marker, markersize=2.0, **FIRST)
-    axes.plot(s, contact.u_t[chosen], label="tangential $u_t$", **SECOND)
+    axes.plot(s, abscissa.sign * contact.u_t[chosen], label="tangential $u_t$", **SECOND)
     if np.any(np.isfinite(gap) & (gap != 0.0)):
         axes.plot(s, near(gap, solution, chosen), label="gap $g$", **LIMIT)
     label_values(axes, with_unit("displacement", "length", units), displacement_scale(solution))
@@ -66,17 +71,19 @@ def draw_contact_traction(
     """
     axes, units = contact_axes(axes, solution, part, units, "Tractions on the contact boundary")
     contact, chosen = solution.contact, solution.contact.rows(part)
-    s, curve = contact.s[chosen], traction_curve(solution, part)
-    axes.plot(curve.s, curve.normal, label=r"normal $\sigma_n$", **FIRST)
-    axes.plot(curve.s, curve.tangential, label=r"tangential $\sigma_t$", **SECOND)
+    abscissa, curve = Abscissa.along(solution, part), traction_curve(solution, part)
+    s, along = abscissa.at(contact.s[chosen]), abscissa.at(curve.s)
+    axes.plot(along, curve.normal, label=r"normal $\sigma_n$", **FIRST)
+    axes.plot(along, abscissa.sign * curve.tangential, label=r"tangential $\sigma_t$", **SECOND)
     if s.size <= MANY:
         axes.plot(s, contact.sigma_n[chosen], linestyle="", marker="o", markersize=2.5, color=BLUE)
-        axes.plot(s, contact.sigma_t[chosen], linestyle="", marker="o", markersize=2.0, color=VERMILION)
+        axes.plot(s, abscissa.sign * contact.sigma_t[chosen], linestyle="", marker="o", markersize=2.0, color=VERMILION)
     if solution.friction_bound is not None:
         axes.plot(s, solution.friction_bound[chosen], label="friction bound", **LIMIT)
         axes.plot(s, -solution.friction_bound[chosen], **LIMIT)
     label_values(axes, with_unit("traction", "stress", units), traction_scale(solution))
-    cut_peaks(axes, curve.s, (curve.normal, curve.tangential), units, note_on_top=True)  # below is the legend
+    # below is the legend
+    cut_peaks(axes, along, (curve.normal, abscissa.sign * curve.tangential), units, note_on_top=True)
     return axes
 
 
@@ -89,17 +96,18 @@ def draw_contact_clearance(
     """
     axes, units = contact_axes(axes, solution, part, units, "Contact pressure and clearance")
     contact, chosen = solution.contact, solution.contact.rows(part)
-    curve = traction_curve(solution, part)
-    pressure = axes.plot(curve.s, -curve.normal, label=r"pressure $-\sigma_n$ (left)", **FIRST)
+    abscissa, curve = Abscissa.along(solution, part), traction_curve(solution, part)
+    along = abscissa.at(curve.s)
+    pressure = axes.plot(along, -curve.normal, label=r"pressure $-\sigma_n$ (left)", **FIRST)
     axes.axhline(0.0, color="black", linewidth=0.6, zorder=0)
     axes.set_ylabel(with_unit("pressure", "stress", units))
     right = axes.twinx()
     clearance = near(contact.clearance[chosen], solution, chosen)
-    opening = right.plot(contact.s[chosen], clearance, label="clearance $g - u_n$ (right)", **SECOND)
+    opening = right.plot(abscissa.at(contact.s[chosen]), clearance, label="clearance $g - u_n$ (right)", **SECOND)
     right.set_ylabel(with_unit("clearance", "length", units))
     for each, scale in ((axes, traction_scale(solution)), (right, displacement_scale(solution))):
         ignore_round_off(each, scale)
-    cut_peaks(axes, curve.s, (-curve.normal,), units)
+    cut_peaks(axes, along, (-curve.normal,), units)
     for each in (axes, right):
         bottom, top = each.get_ylim()
         each.set_ylim(bottom, top + 0.15 * (top - bottom))  # room for the legend
@@ -121,6 +129,7 @@ def draw_friction_cone(
     axes = axes_or_new(axes, 5.6, 4.6)
     table, own = solution.contact, solution.contact.rows(part)
     pressure, scale = -table.sigma_n, traction_scale(solution)
+    friction = Abscissa.along(solution, part).sign * table.sigma_t
     if solution.friction_bound is not None:
         nodes = np.flatnonzero(own)[np.argsort(pressure[own])]
         bound = solution.friction_bound[nodes]
@@ -130,7 +139,7 @@ def draw_friction_cone(
         axes.plot(pressure[nodes], -bound, **style)
     words = np.array(table.status_words())
     for word, colour in STATUS_COLOURS.items():
-        chosen = np.stack([pressure, table.sigma_t], axis=1)[own & (words == word)]
+        chosen = np.stack([pressure, friction], axis=1)[own & (words == word)]
         if len(chosen):
             x, y = chosen[marked(chosen, chosen[:, 0], scale)].T
             axes.scatter(x, y, s=18.0, color=colour, edgecolors="black", linewidths=0.4, zorder=3, label=word)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from bemkit.errors import InputError
+from bemkit.pictures.abscissa import Abscissa, common_direction
 from bemkit.pictures.contact_axes import STATUS_COLOURS
 from bemkit.pictures.drawing import BLUE, GREEN, GREY, VERMILION, Axes, axes_or_new, ignore_round_off, show_grid
 from bemkit.pictures.shown import Result
@@ -26,6 +27,8 @@ def history_of(solution: Result) -> LoadHistory:
 def draw_friction_loop(solution: Result, axes: Axes | None = None, *, units: UnitNames | None = None) -> Axes:
     """Draw the friction force over the mean tangential displacement of the contact nodes, step by step.
 
+    If all contacts lie on horizontal lines, both are positive along x, else along the boundary.
+
     Parameters
     ----------
     solution : Solution or AssemblySolution
@@ -40,13 +43,15 @@ def draw_friction_loop(solution: Result, axes: Axes | None = None, *, units: Uni
     """
     loading, units = history_of(solution), units or solution.units
     axes = axes_or_new(axes, 6.0, 4.2)
-    places = np.array([0.0, *(step.mean_displacement for step in loading.steps)])
-    forces = np.array([0.0, *(step.force_tangential for step in loading.steps)])
+    direction = common_direction(solution.contact)
+    sign, over = direction or 1.0, " along $x$" if direction else ""
+    places = sign * np.array([0.0, *(step.mean_displacement for step in loading.steps)])
+    forces = sign * np.array([0.0, *(step.force_tangential for step in loading.steps)])
     axes.plot(places, forces, color=BLUE, linewidth=1.4, marker="o", markersize=3.0)
     axes.plot(places[:1], forces[:1], color=GREY, marker="o", markersize=6.0, linestyle="", label="begin")
     axes.plot(places[-1:], forces[-1:], color=VERMILION, marker="o", markersize=6.0, linestyle="", label="end")
     axes.legend(frameon=False)
-    axes.set_xlabel(with_unit("mean tangential displacement", "length", units))
+    axes.set_xlabel(with_unit(f"mean tangential displacement{over}", "length", units))
     axes.set_ylabel(with_unit("friction force on the body", "force", units))
     axes.set_title(f"Friction over displacement\n{solution.title}", parse_math=False, fontsize=11)
     axes.margins(0.08)
@@ -106,13 +111,14 @@ def draw_status_over_time(
     own = np.flatnonzero(table.rows(part))
     own = own[np.argsort(table.s[own])]
     numbers = np.array([[number_of[value] for value in step.contact.status[own].tolist()] for step in loading.steps])
+    abscissa = Abscissa.along(solution, part)
     s = table.s[own]
-    edges = np.concatenate([s[:1], 0.5 * (s[1:] + s[:-1]), s[-1:]])
+    edges = abscissa.at(np.concatenate([s[:1], 0.5 * (s[1:] + s[:-1]), s[-1:]]))
     times = np.concatenate([[0.0], loading.times])
     axes = axes_or_new(axes)
     colours = ListedColormap([STATUS_COLOURS[word] for word in words])
     axes.pcolormesh(edges, times, numbers, cmap=colours, vmin=-0.5, vmax=len(words) - 0.5)
-    axes.set_xlabel(with_unit(f"arc length $s$ along '{part}'", "length", units or solution.units))
+    axes.set_xlabel(abscissa.label(units or solution.units))
     axes.set_ylabel("time $t$")
     axes.set_title(f"Status over time\n{solution.title}", parse_math=False, fontsize=11)
     handles = [Patch(color=STATUS_COLOURS[word], label=word) for word in words]

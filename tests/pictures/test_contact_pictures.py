@@ -50,7 +50,7 @@ def test_contact_pictures_have_labels_curves_and_a_status_strip(solution: Soluti
     axes = draw(solution, "foundation")
     (strip,) = axes.child_axes
     assert axes.get_ylabel() == label
-    assert strip.get_xlabel() == "arc length $s$ along 'foundation'"
+    assert strip.get_xlabel() == "$x$ along 'foundation'"
     assert axes.get_title()
     assert len(axes.get_legend().get_texts()) >= 2
     bars = [(patch.get_x(), patch.get_x() + patch.get_width(), patch.get_facecolor()) for patch in strip.patches]

@@ -38,7 +38,7 @@ def test_the_loop_begins_at_rest_and_passes_through_all_steps(solution: bk.Solut
     line = axes.lines[0]
     expected = [0.0, *(step.force_tangential for step in loading.steps)]
     np.testing.assert_array_equal(line.get_ydata(), expected)
-    assert axes.get_xlabel() == "mean tangential displacement [mm]"
+    assert axes.get_xlabel() == "mean tangential displacement along $x$ [mm]"
     assert axes.get_ylabel().startswith("friction force on the body [")
 
 
