@@ -82,6 +82,8 @@ from bemkit.results.solution import Solution as Solution
 from bemkit.runs.collapse import largest_load_factor as largest_load_factor
 from bemkit.runs.critical_friction import CriticalFriction as CriticalFriction
 from bemkit.runs.critical_friction import critical_friction as critical_friction
+from bemkit.runs.first_yield import FirstYield as FirstYield
+from bemkit.runs.first_yield import first_yield as first_yield
 from bemkit.runs.history import run_history as run_history
 from bemkit.runs.nested import run_cascade as run_cascade
 from bemkit.runs.run import FailedRun as FailedRun

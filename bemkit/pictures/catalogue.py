@@ -21,8 +21,9 @@ from bemkit.pictures.deformation import draw_deformation, draw_scene
 from bemkit.pictures.drawing import Axes, Figure
 from bemkit.pictures.load_history import draw_friction_loop, draw_status_over_time, draw_work, has_friction
 from bemkit.pictures.shown import Result
-from bemkit.pictures.stress import STRESSES, draw_stress
+from bemkit.pictures.stress import draw_stress
 from bemkit.results.assembly_solution import AssemblySolution
+from bemkit.results.stress_measures import STRESSES
 from bemkit.stopwatch import announce
 
 MOST_CONTACTS = 6

@@ -2,55 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
-from types import MappingProxyType
-
 import numpy as np
 
 from bemkit.arrays import FloatArray
-from bemkit.errors import InputError
-from bemkit.operators.material import Material
-from bemkit.operators.somigliana.stress import principal_stresses, von_mises
 from bemkit.pictures.drawing import Axes
 from bemkit.pictures.obstacles import draw_obstacles, draw_rigid_bodies
-from bemkit.pictures.plane import draw_initial, inside, joined_frame, plane_axes, set_frame
+from bemkit.pictures.plane import draw_initial, joined_frame, plane_axes, set_frame
 from bemkit.pictures.shown import Result, shown
-from bemkit.pictures.stress_points import StressPoints, stress_points
+from bemkit.results.stress_measures import StressMeasure, find_measure
+from bemkit.results.stress_mesh import StressMesh, stress_mesh
 from bemkit.scene.unit_names import UnitNames, amount, with_unit
-
-
-@dataclass(frozen=True)
-class StressMeasure:
-    """A number that is drawn of each stress: its symbol, whether it is never negative, and how it is computed."""
-
-    symbol: str
-    is_positive: bool
-    of: Callable[[FloatArray, Material], FloatArray]
-
-
-def _von_mises(stress: FloatArray, material: Material) -> FloatArray:
-    return von_mises(stress, material.poisson_ratio, material.plane)
-
-
-def _shear(stress: FloatArray, material: Material) -> FloatArray:
-    principal = principal_stresses(stress)
-    return np.asarray(0.5 * (principal[..., 0] - principal[..., 1]))
-
-
-STRESSES: Mapping[str, StressMeasure] = MappingProxyType(
-    {
-        "von-mises": StressMeasure("equivalent stress of von Mises", True, _von_mises),
-        "stress-xx": StressMeasure(r"stress $\sigma_{xx}$", False, lambda stress, material: stress[..., 0, 0]),
-        "stress-yy": StressMeasure(r"stress $\sigma_{yy}$", False, lambda stress, material: stress[..., 1, 1]),
-        "stress-xy": StressMeasure(r"stress $\sigma_{xy}$", False, lambda stress, material: stress[..., 0, 1]),
-        "principal-stress": StressMeasure(
-            "larger principal stress", False, lambda stress, material: principal_stresses(stress)[..., 0]
-        ),
-        "shear-stress": StressMeasure("largest shear stress in the plane", True, _shear),
-    }
-)
-"""By the names of their pictures."""
 
 _ACROSS = 48
 """Points of the picture far from the boundary, along its longer side."""
@@ -88,9 +49,7 @@ def draw_stress(
     InputError
         If the measure is unknown.
     """
-    if measure not in STRESSES:
-        raise InputError(f"measure is {measure!r}: give one of {', '.join(STRESSES)}")
-    chosen, scene, units = STRESSES[measure], shown(solution), units or solution.units
+    chosen, scene, units = find_measure(measure), shown(solution), units or solution.units
     bodies = solution.solved_bodies
     size = float(np.ptp(scene.frame, axis=1).max())
     spacing = size / _ACROSS
@@ -98,18 +57,17 @@ def draw_stress(
     farthest = max(float(np.abs(body.boundary.displacement).max()) for body in bodies)
     is_seen = farthest > _SEEN * size
     factor = 1.0 if is_seen else 0.0
-    found = [stress_points(body, spacing, scene.frame, moved=is_seen) for body in bodies]
-    values = [chosen.of(each.stresses, body.scene.material) for each, body in zip(found, bodies, strict=True)]
+    filled = [stress_mesh(body, spacing, scene.frame) for body in bodies]
+    values = [chosen.of(each.stress, body.scene.material) for each, body in zip(filled, bodies, strict=True)]
     every = np.concatenate(values)
     extreme = float(every[np.argmax(np.abs(every))])
     title = f"{chosen.symbol}, up to {amount(extreme, 'stress', units)}\n{scene.title}"
     axes = plane_axes(axes, scene.frame, "", units)
     axes.set_title(title[0].upper() + title[1:], parse_math="$" not in scene.title, fontsize=11)
-    largest = largest_shown(np.concatenate([each.points for each in found]), every, spacing)
+    largest = largest_shown(np.concatenate([each.points for each in filled]), every, spacing)
     levels = _levels(largest, chosen.is_positive)
-    for body, points, value in zip(scene.bodies, found, values, strict=True):
-        outline = inside(body, body.outlines(factor), scene.frame)
-        _draw_contours(axes, points, value, levels, chosen, outline)
+    for triangles, value in zip(filled, values, strict=True):
+        _draw_contours(axes, triangles, factor, value, levels, chosen)
     draw_initial(axes, scene, factor=factor)
     loops = [loop for body in scene.bodies for loop in body.outlines(factor)]
     set_frame(axes, joined_frame(scene.frame.T, *loops), margin=0.05)
@@ -138,16 +96,16 @@ def _levels(largest: float, is_positive: bool) -> FloatArray:
 
 
 def _draw_contours(
-    axes: Axes, found: StressPoints, values: FloatArray, levels: FloatArray, chosen: StressMeasure, outline: object
+    axes: Axes, filled: StressMesh, factor: float, values: FloatArray, levels: FloatArray, chosen: StressMeasure
 ) -> None:
-    """Fill the triangles between the points of a body, cut along its outline."""
+    """Fill the triangles of a body moved by a factor times its displacement."""
     from matplotlib.tri import Triangulation
 
     smooth = np.where(np.abs(values) < _FLAT * levels[-1], 0.0, values)
-    net = Triangulation(*found.points.T)
+    x, y = (filled.points + factor * filled.displacement).T
+    net = Triangulation(x, y, filled.triangles)
     extend = "max" if chosen.is_positive else "both"
-    contours = axes.tricontourf(net, smooth, levels=levels, cmap=_colours(chosen), extend=extend)
-    contours.set_clip_path(outline, axes.transData)  # type: ignore[arg-type]
+    axes.tricontourf(net, smooth, levels=levels, cmap=_colours(chosen), extend=extend)
 
 
 def _colours(chosen: StressMeasure) -> str:

@@ -2,13 +2,8 @@
 
 from __future__ import annotations
 
-from bemkit.arrays import FloatArray
-from bemkit.geometry.reflection import reflected_to_whole
-from bemkit.geometry.spaces import BoundarySpace, ConstantSpace, ElementwiseSpace
-from bemkit.operators.somigliana.fields import InteriorFields
 from bemkit.operators.somigliana.potentials import PotentialFields
 from bemkit.results.solved_body import SolvedBody
-from bemkit.scene.discretisation import on_whole_body
 
 
 def interior_fields(solution: SolvedBody) -> PotentialFields:
@@ -35,28 +30,4 @@ def interior_fields(solution: SolvedBody) -> PotentialFields:
     versions). Inside, their error decays quickly with the distance from the boundary. Within about one element length
     of it, stresses are those of the piecewise data, with peaks at the ends of elements: see `InteriorFields`.
     """
-    if solution.mesh.surface is not None:
-        from bemkit.operators.half_plane.fields import HalfPlaneFields
-
-        boundary, far = solution.boundary, solution.scene.far
-        strain = 0.0 if far is None else far.strain
-        return HalfPlaneFields(solution.mesh, solution.scene.material, boundary.traction, boundary.displacement, strain)
-    material, background = solution.scene.material, solution.particular
-    return InteriorFields(solution.mesh.whole, material, *whole_boundary(solution), background)
-
-
-def whole_boundary(solution: SolvedBody) -> tuple[BoundarySpace, FloatArray, ElementwiseSpace, FloatArray]:
-    """Return displacements and tractions on the whole boundary, less the particular solution of body forces.
-
-    Each as its space and the dofs (n_scalar, 2) there [m], [Pa].
-    """
-    mesh, discretisation, boundary = solution.mesh, solution.scene.discretisation, solution.map_boundary
-    of_whole = on_whole_body(discretisation, mesh)
-    space, half_space = of_whole.displacement_space(mesh.whole), discretisation.displacement_space(mesh)
-    displacement = reflected_to_whole(half_space, space, boundary.displacement)
-    has_dofs = len(boundary.traction_dofs) > mesh.n_elements
-    tractions, half_tractions = (
-        ElementwiseSpace(d.traction_space(m) if has_dofs else ConstantSpace(m))
-        for d, m in ((of_whole, mesh.whole), (discretisation, mesh))
-    )
-    return space, displacement, tractions, reflected_to_whole(half_tractions, tractions, boundary.traction_dofs)
+    return solution.boundary_stress.interior

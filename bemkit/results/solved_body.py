@@ -17,9 +17,12 @@ from bemkit.scene.scene import Scene
 
 if TYPE_CHECKING:
     from bemkit.model.particular import ParticularFields
+    from bemkit.results.boundary_stress import BoundaryStress
     from bemkit.results.coefficient_decay import CoefficientErrors
     from bemkit.results.part_forces import PartForce
+    from bemkit.results.side_stress import LargestStress
     from bemkit.results.surface_errors import SurfaceErrors
+    from bemkit.table import Table
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,6 +114,78 @@ class SolvedBody:
         from bemkit.model.particular import ParticularFields
 
         return ParticularFields.of(self.scene, self.mesh)
+
+    @cached_property
+    def boundary_stress(self) -> BoundaryStress:
+        """Stress at local coordinates of elements of the whole boundary."""
+        from bemkit.results.boundary_stress import BoundaryStress
+
+        fields = self.map_boundary
+        return BoundaryStress.from_half(
+            self.mesh, self.scene, fields.displacement, fields.traction_dofs, self.particular
+        )
+
+    def stress(self, points: FloatArray, part: str | None = None) -> FloatArray:
+        """Evaluate the stress inside the body and on its boundary.
+
+        Parameters
+        ----------
+        points : (n, 2) array [m]
+        part : str, optional
+            With a part all points lie on it. At a corner the stress is that of this side; without a part it is the
+            mean of both sides.
+
+        Returns
+        -------
+        (n, 2, 2) array [Pa]
+
+        Raises
+        ------
+        PointNotInsideError
+            If a point lies outside of the body, or off the part.
+        UnknownPartError
+
+        Notes
+        -----
+        On the boundary the traction and the strain along it give the stress by Hooke's law, as accurate as both are;
+        see `BoundaryStress`. Inside, see `bemkit.interior_fields`.
+        """
+        from bemkit.results.boundary_stress import stress_at
+
+        return stress_at(self.boundary_stress, points, part)
+
+    def side_stress(self, part: str) -> Table:
+        """Return the stress along a part: ``s``, ``x``, ``y``, ``sigma_n``, ``sigma_t``, ``hoop``, ``von_mises``.
+
+        The hoop stress acts along the boundary. Constant and linear elements have a row each, for their centres.
+        """
+        from bemkit.results.side_stress import side_stress
+
+        return side_stress(self.boundary_stress, self.mesh, part)
+
+    def largest_stress(self, measure: str = "von-mises", part: str | None = None) -> LargestStress:
+        """Return the stress of largest size on the boundary and where it is.
+
+        Parameters
+        ----------
+        measure : str
+            ``"hoop"``, the stress along the boundary, or the name of a picture of stresses, such as ``"von-mises"``.
+        part : str, optional
+            The whole boundary by default. Near singular corners the value depends on the mesh.
+
+        Raises
+        ------
+        InputError
+            If the measure is unknown.
+        UnknownPartError
+        """
+        from bemkit.results.side_stress import largest_stress
+
+        return largest_stress(self.boundary_stress, measure, part)
+
+    def stress_concentration(self, nominal: float, measure: str = "hoop", part: str | None = None) -> float:
+        """Return the largest stress on the boundary over a nominal stress [Pa]; see `largest_stress`."""
+        return self.largest_stress(measure, part).value / nominal
 
     @cached_property
     def map_boundary(self) -> BoundaryFields:

@@ -14,8 +14,10 @@ from bemkit.errors import InputError
 from bemkit.geometry.local_values import values_on_elements
 from bemkit.results.contact_table import CONTACT_COLUMNS
 from bemkit.results.load_history import step_rows
+from bemkit.results.side_stress import components
 from bemkit.results.solution import Solution
 from bemkit.results.solved_body import SolvedBody
+from bemkit.results.stress_measures import STRESSES
 from bemkit.solvers.base import StepRecord
 from bemkit.table import Column, Table, json_text
 
@@ -32,6 +34,11 @@ _BOUNDARY = (
     Column("u_y", "m", "displacement along y at the centre", ".6g"),
     Column("t_x", "Pa", "mean traction along x", ".6g"),
     Column("t_y", "Pa", "mean traction along y", ".6g"),
+    Column("sigma_xx", "Pa", "stress along x at the centre", ".6g"),
+    Column("sigma_yy", "Pa", "stress along y at the centre", ".6g"),
+    Column("sigma_xy", "Pa", "shear stress at the centre", ".6g"),
+    Column("hoop", "Pa", "normal stress along the boundary at the centre", ".6g"),
+    Column("von_mises", "Pa", "equivalent stress of von Mises at the centre", ".6g"),
 )
 
 
@@ -138,4 +145,19 @@ def _columns_of_body(body: SolvedBody) -> dict[str, Any]:
         "u_y": displacement[:, 1],
         "t_x": traction[:, 0],
         "t_y": traction[:, 1],
+        **_stresses(body),
+    }
+
+
+def _stresses(body: SolvedBody) -> dict[str, FloatArray]:
+    """Return the stress at the centres of the elements by the names of its columns."""
+    mesh, centre = body.mesh, np.zeros(1)
+    elements = np.arange(mesh.n_elements)
+    stress = body.boundary_stress.at(elements, centre)[:, 0]
+    return {
+        "sigma_xx": stress[:, 0, 0],
+        "sigma_yy": stress[:, 1, 1],
+        "sigma_xy": stress[:, 0, 1],
+        "hoop": components(stress, mesh.normals_at(elements, centre)[:, 0])[2],
+        "von_mises": STRESSES["von-mises"].of(stress, body.scene.material),
     }

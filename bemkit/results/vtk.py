@@ -1,4 +1,4 @@
-"""Results for ParaView and the like: boundaries as lines, contact nodes as vertices, quadrilaterals inside.
+"""Results for ParaView and the like: boundaries as lines, contact nodes as vertices, triangles inside.
 
 The XML files of VTK are unstructured grids (.vtu) and polygonal data (.vtp). Arrays are written in base64, each behind
 the number of its bytes; see "VTK XML file formats" in the documentation of VTK.
@@ -15,31 +15,32 @@ from xml.etree import ElementTree
 import numpy as np
 import numpy.typing as npt
 
-from bemkit.arrays import BoolArray, FloatArray, IntArray
+from bemkit.arrays import FloatArray, IntArray
 from bemkit.atomic_files import replacing
 from bemkit.geometry.local_values import values_on_elements
-from bemkit.operators.material import Plane
+from bemkit.geometry.vectors import norms
+from bemkit.operators.material import Material, Plane
+from bemkit.operators.somigliana.locate import Locator
 from bemkit.operators.somigliana.stress import von_mises
 from bemkit.results.assembly_solution import AssemblySolution, BodyResult
-from bemkit.results.interior import interior_fields
 from bemkit.results.solution import Solution
+from bemkit.results.solved_body import SolvedBody
+from bemkit.results.stress_mesh import stress_mesh
 from bemkit.solvers.active_sets import NodeStatus
 
-_KINDS = {"vertex": (1, "Verts"), "line": (3, "Lines"), "quad": (9, "Polys")}
+_KINDS = {"vertex": (1, "Verts"), "line": (3, "Lines"), "triangle": (5, "Polys")}
 """Cells in the order that polygonal data want: the number of their type in grids, their place in polygonal data."""
 _TYPES = {"float64": "Float64", "int64": "Int64", "uint8": "UInt8"}
 _POINTS_OF_CURVE = 9
 """Points of an element whose displacement or shape is curved."""
 _CONTACT = ("u_n", "u_t", "sigma_n", "sigma_t", "gap", "clearance", "status", "weight")
-_CLEAR = 0.5
-"""Distance of points inside from the boundary, in lengths of its elements: closer, stresses have peaks of their own."""
 
 
 @dataclass(frozen=True)
 class Block:
     """Points (n, 2), cells (m, k) of them, and values at both; what a block lacks is not a number.
 
-    Cells are of the kind vertex, line or quad.
+    Cells are of the kind vertex, line or triangle.
     """
 
     kind: str
@@ -139,14 +140,16 @@ def write_vtk(path: Path, solution: Solution | AssemblySolution, inside: int = 0
 
     Notes
     -----
-    Point data: ``displacement`` [m] of boundaries and inside; ``stress`` [Pa], the nine components of the tensor row by
-    row, and ``von_mises`` [Pa] inside; ``u_n``, ``u_t``, ``slip``, ``sigma_n``, ``sigma_t``, ``gap``, ``clearance``,
-    ``status`` (`NodeStatus` values) and ``weight`` at contact nodes, where ``slip`` is u_t of nodes that touch. Cell
-    data: ``traction`` [Pa] of lines and ``body``, its number. What is not defined somewhere is not a number there.
+    Point data: ``displacement`` [m], ``stress`` [Pa], the nine components of the tensor row by row, and ``von_mises``
+    [Pa] everywhere; ``u_n``, ``u_t``, ``slip``, ``sigma_n``, ``sigma_t``, ``gap``, ``clearance``, ``status``
+    (`NodeStatus` values) and ``weight`` at contact nodes, where ``slip`` is u_t of nodes that touch. Cell data:
+    ``traction`` [Pa] of lines and ``body``, its number. What is not defined somewhere is not a number there. Triangles
+    end at the boundary; an exterior is cut at half its size from it.
     """
     bodies = list(bodies_of(solution).values())
     blocks = [_boundary(body, number) for number, body in enumerate(bodies)]
-    blocks.append(_contact_nodes(solution))
+    if solution.contact.n_contact:
+        blocks.append(_contact_nodes(solution, bodies))
     if inside:
         blocks += [_inside(body, number, inside) for number, body in enumerate(bodies)]
     write_vtk_xml(path, blocks)
@@ -159,62 +162,62 @@ def _boundary(body: Solution | BodyResult, number: int) -> Block:
     xi = np.linspace(-1.0, 1.0, n_points)
     points = mesh.points(np.arange(mesh.n_elements), xi).reshape(-1, 2)
     at_nodes = values_on_elements(space, body.boundary.displacement)
-    values = np.einsum("pq,epc->eqc", space.basis(xi), at_nodes).reshape(-1, 2)
+    moved = np.einsum("pq,epc->eqc", space.basis(xi), at_nodes).reshape(-1, 2)
+    stress = body.boundary_stress.at(np.arange(mesh.n_elements), xi).reshape(-1, 2, 2)
     start = (n_points * np.arange(mesh.n_elements)[:, None] + np.arange(n_points - 1)).ravel()
-    traction = in_space(np.repeat(body.boundary.traction, n_points - 1, axis=0))
-    of_body = np.full(len(start), float(number))
-    lines = np.stack([start, start + 1], axis=1)
-    return Block("line", points, lines, {"displacement": in_space(values)}, {"traction": traction, "body": of_body})
+    cells = {
+        "traction": in_space(np.repeat(body.boundary.traction, n_points - 1, axis=0)),
+        "body": np.full(len(start), float(number)),
+    }
+    return Block(
+        "line", points, np.stack([start, start + 1], axis=1), _fields(body.scene.material, moved, stress), cells
+    )
 
 
-def _contact_nodes(solution: Solution | AssemblySolution) -> Block:
-    table = solution.contact
-    values = {name: np.asarray(getattr(table, name), float) for name in _CONTACT}
-    values["slip"] = np.where(table.status == NodeStatus.SEPARATED, np.nan, table.u_t)
-    nodes = np.arange(table.n_contact)[:, None]
-    return Block("vertex", np.stack([table.x, table.y], axis=1), nodes, values, {})
-
-
-def _inside(body: Solution | BodyResult, number: int, across: int) -> Block:
-    """Return the squares of a grid whose corners lie inside a body, clear of its boundary; none without an end."""
-    mesh = body.mesh.whole
-    if mesh.is_exterior or mesh.surface is not None:
-        return Block("quad", np.zeros((0, 2)), np.zeros((0, 4), np.intp), {}, {})
-    low, size = mesh.nodes.min(axis=0), np.ptp(mesh.nodes, axis=0)
-    step = float(size.max()) / (across - 1)
-    n = np.maximum(np.ceil(size / step).astype(int), 1) + 1
-    x, y = (low[k] + 0.5 * (size[k] - step * (n[k] - 1)) + step * np.arange(n[k]) for k in range(2))
-    grid = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
-    fields = interior_fields(body)
-    is_kept = fields.is_inside(grid)
-    is_kept[is_kept] = _is_clear(mesh.centres, mesh.lengths, grid[is_kept])
-    corner = np.arange(len(grid)).reshape(n[1], n[0])
-    squares = np.stack([corner[:-1, :-1], corner[:-1, 1:], corner[1:, 1:], corner[1:, :-1]], axis=-1).reshape(-1, 4)
-    squares = squares[is_kept[squares].all(axis=1)]
-    used, cells = np.unique(squares, return_inverse=True)
-    points = grid[used]
-    if not len(points):
-        return Block("quad", points, np.zeros((0, 4), np.intp), {}, {})
-    stress, material = fields.stress(points), body.scene.material
-    tensor = np.zeros((len(points), 3, 3))
+def _fields(material: Material, displacement: FloatArray, stress: FloatArray) -> dict[str, FloatArray]:
+    """Return displacement, stress tensors in space and equivalent stress of points (n,) by their names."""
+    tensor = np.zeros((len(stress), 3, 3))
     tensor[:, :2, :2] = stress
     if material.plane is Plane.STRAIN:
         tensor[:, 2, 2] = material.poisson_ratio * (stress[:, 0, 0] + stress[:, 1, 1])
-    values = {
-        "displacement": in_space(fields.displacement(points)),
+    return {
+        "displacement": in_space(displacement),
         "stress": tensor.reshape(-1, 9),
         "von_mises": von_mises(stress, material.poisson_ratio, material.plane),
     }
-    of_body = np.full(len(squares), float(number))
-    return Block("quad", points, cells.reshape(-1, 4).astype(np.intp), values, {"body": of_body})
 
 
-def _is_clear(centres: FloatArray, lengths: FloatArray, points: FloatArray) -> BoolArray:
-    """Return which points are farther from every element than its half length; centres represent elements."""
-    from scipy.spatial import cKDTree
+def _contact_nodes(solution: Solution | AssemblySolution, bodies: Sequence[SolvedBody]) -> Block:
+    table = solution.contact
+    points = np.stack([table.x, table.y], axis=1)
+    values = {name: np.asarray(getattr(table, name), float) for name in _CONTACT}
+    values["slip"] = np.where(table.status == NodeStatus.SEPARATED, np.nan, table.u_t)
+    nearest = np.full(len(points), np.inf)
+    on_bodies: dict[str, FloatArray] = {}
+    for body in bodies:
+        boundary = body.boundary_stress
+        location = Locator(boundary.mesh).locate(points)
+        element, xi = location.element, location.xi[:, None]
+        distance = norms(boundary.mesh.points(element, xi)[:, 0] - points)
+        moved, stress = boundary.displacement_at(element, xi)[:, 0], boundary.at(element, xi)[:, 0]
+        is_closer = distance < nearest
+        nearest = np.minimum(nearest, distance)
+        for name, field in _fields(body.scene.material, moved, stress).items():
+            is_new = is_closer.reshape(-1, *[1] * (field.ndim - 1))
+            on_bodies[name] = np.where(is_new, field, on_bodies.get(name, field))
+    return Block("vertex", points, np.arange(table.n_contact)[:, None], values | on_bodies, {})
 
-    reach = (0.5 + _CLEAR) * lengths
-    near = cKDTree(points).query_ball_point(centres, reach)
-    is_clear = np.ones(len(points), bool)
-    is_clear[[k for own in near for k in own]] = False
-    return is_clear
+
+def _inside(body: Solution | BodyResult, number: int, across: int) -> Block:
+    """Return triangles that fill a body; none of a half-plane."""
+    mesh = body.mesh.whole
+    if mesh.surface is not None:
+        return Block("triangle", np.zeros((0, 2)), np.zeros((0, 3), np.intp), {}, {})
+    low, high = mesh.nodes.min(axis=0), mesh.nodes.max(axis=0)
+    size = float((high - low).max())
+    spare = 0.5 * size if mesh.is_exterior else 0.0
+    filled = stress_mesh(body, size / (across - 1), np.stack([low - spare, high + spare], axis=1))
+    values = _fields(body.scene.material, filled.displacement, filled.stress)
+    return Block(
+        "triangle", filled.points, filled.triangles, values, {"body": np.full(len(filled.triangles), float(number))}
+    )

@@ -13,9 +13,10 @@ import bemkit as bk
 from bemkit.geometry import Rectangle, discretise
 from bemkit.pictures import draw_stress
 from bemkit.pictures.shown import shown
-from bemkit.pictures.stress import STRESSES, largest_shown
-from bemkit.pictures.stress_points import StressPoints, _inner_points, stress_points
+from bemkit.pictures.stress import largest_shown
 from bemkit.results.interior import interior_fields
+from bemkit.results.stress_measures import STRESSES
+from bemkit.results.stress_mesh import StressMesh, _inner_points, stress_mesh
 from tests.slow import slow_except
 
 INNER = tuple(f"inner-{number}" for number in (1, 2, 3, 4))
@@ -23,8 +24,8 @@ STRESS_MATERIAL = bk.Material(100.0, 0.3, bk.Plane.STRESS)
 MATERIALS = bk.Material(100.0, 0.3), bk.Material(100.0, 0.5)
 
 
-def points_of(solution: bk.Solution) -> StressPoints:
-    return stress_points(solution, 0.1, shown(solution).frame)
+def points_of(solution: bk.Solution) -> StressMesh:
+    return stress_mesh(solution, 0.1, shown(solution).frame)
 
 
 def test_points_stay_as_far_from_short_elements_as_a_picture_shows() -> None:
@@ -32,7 +33,7 @@ def test_points_stay_as_far_from_short_elements_as_a_picture_shows() -> None:
     solution = bk.run(scene)
     spacing = 20.0 * float(solution.mesh.lengths.max())
     low, high = solution.mesh.nodes.min(axis=0), solution.mesh.nodes.max(axis=0)
-    found = stress_points(solution, spacing, shown(solution).frame).points
+    found = stress_mesh(solution, spacing, shown(solution).frame).points
     distance = np.minimum(found - low, high - found).min(axis=1)
     inner = distance > 1e-9
     assert inner.sum() > 20
@@ -45,12 +46,12 @@ def test_beside_constant_elements_stresses_have_no_kinks() -> None:
     true = bk.run(
         replace(scene, discretisation=bk.Galerkin(2), mesh=bk.MeshOptions(rising_degrees=True, accuracy=1e-4))
     )
-    found = stress_points(bk.run(scene), 0.02, shown(true).frame)
+    found = stress_mesh(bk.run(scene), 0.02, shown(true).frame)
     x, y = found.points.T
     beside = (x > 0.9) & (x < 0.999) & (y > 0.1) & (y < 0.9)
     assert beside.sum() > 100
     expected = interior_fields(true).stress(found.points[beside])
-    np.testing.assert_allclose(found.stresses[beside], expected, atol=0.005)  # 0.003 of elements that are a fiftieth
+    np.testing.assert_allclose(found.stress[beside], expected, atol=0.005)  # 0.003 of elements that are a fiftieth
 
 
 def test_of_many_elements_few_points_are_measured_from_the_boundary(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -63,7 +64,7 @@ def test_of_many_elements_few_points_are_measured_from_the_boundary(monkeypatch:
             distance, nearest = super().query(x)
             return distance, nearest
 
-    monkeypatch.setattr("bemkit.pictures.stress_points.KDTree", Counting)
+    monkeypatch.setattr("bemkit.results.stress_mesh.KDTree", Counting)
     frame = np.array([[0.0, 1.0], [0.0, 1.0]])
     found = _inner_points(mesh.centres, mesh.normals, mesh.lengths, 0.1, frame, is_exterior=False)
     assert 400 < len(found)
@@ -92,7 +93,7 @@ def test_a_ring_under_pressure_has_lames_stresses_everywhere(discretisation: str
     pressure, a = 3.0, 3.0 * 1.0 / (4.0 - 1.0)  # p a^2 / (b^2 - a^2)
     exact_radial, exact_hoop = a * (1.0 - 4.0 / radius**2), a * (1.0 + 4.0 / radius**2)
     for direction, exact in ((radial, exact_radial), (hoop, exact_hoop)):
-        value = np.einsum("ni,nij,nj->n", direction, found.stresses, direction)
+        value = np.einsum("ni,nij,nj->n", direction, found.stress, direction)
         assert np.abs(value - exact).max() < accuracy * (pressure + 2.0)
     assert radius.min() < 1.001
     assert radius.max() > 1.999
@@ -123,9 +124,7 @@ def test_uniform_stresses_are_exact(material: bk.Material) -> None:
     )
     scene = bk.Scene(title="bar", shape=bk.Rectangle(2.0, 1.0), material=material, parts=parts)
     found = points_of(bk.run(scene))
-    np.testing.assert_allclose(
-        found.stresses, np.broadcast_to([[2.0, 0.0], [0.0, 0.0]], found.stresses.shape), atol=1e-7
-    )
+    np.testing.assert_allclose(found.stress, np.broadcast_to([[2.0, 0.0], [0.0, 0.0]], found.stress.shape), atol=1e-7)
 
 
 def test_the_weight_counts() -> None:
@@ -135,9 +134,9 @@ def test_the_weight_counts() -> None:
     (weight,) = solution.scene.body_forces
     expected = -weight.density * 9.81 * (10.0 - found.points[:, 1])  # type: ignore[union-attr]
     # at corners the stresses beside them stand for those in them
-    np.testing.assert_allclose(found.stresses[:, 1, 1], expected, atol=0.03 * np.abs(expected).max())
+    np.testing.assert_allclose(found.stress[:, 1, 1], expected, atol=0.03 * np.abs(expected).max())
     np.testing.assert_allclose(
-        np.median(np.abs(found.stresses[:, 1, 1] - expected)), 0.0, atol=1e-6 * np.abs(expected).max()
+        np.median(np.abs(found.stress[:, 1, 1] - expected)), 0.0, atol=1e-6 * np.abs(expected).max()
     )
 
 
@@ -152,7 +151,7 @@ def test_bodies_without_an_end_are_drawn_as_far_as_the_frame() -> None:
     )
     found = points_of(bk.run(scene))
     radius = np.hypot(*found.points.T)
-    value = np.einsum("nij,nij->n", found.stresses, found.stresses)
+    value = np.einsum("nij,nij->n", found.stress, found.stress)
     np.testing.assert_allclose(np.sqrt(value), np.sqrt(2.0) / radius**2, atol=0.02)
     assert radius.max() > 2.5
 

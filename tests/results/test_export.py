@@ -13,8 +13,12 @@ import pytest
 import bemkit as bk
 from bemkit.atomic_files import OutputFileError
 from bemkit.cli.main import main
+from bemkit.pictures.shown import shown
 from bemkit.results.export import FORMATS, boundary_arrays
+from bemkit.results.stress_measures import STRESSES
+from bemkit.results.stress_mesh import stress_mesh
 from bemkit.scene.toml import with_overrides
+from tests.perforated_plate import NOMINAL, plate
 
 
 @pytest.fixture(scope="module")
@@ -88,23 +92,60 @@ def test_stress_inside_goes_with_the_lines(tmp_path: Path) -> None:
     )
     bk.export_result(tmp_path / "r.vtu", bk.run(scene), inside=11)
     mesh = meshio.read(tmp_path / "r.vtu")
-    assert [block.type for block in mesh.cells] == ["vertex", "line", "quad"]
-    squares = mesh.cells[2].data
-    assert len(squares) == 8 * 3  # eleven points along 2, the outermost on the boundary
-    inner = np.unique(squares)
+    assert [block.type for block in mesh.cells] == ["vertex", "line", "triangle"]
+    triangles = mesh.cells[2].data
+    inner = np.unique(triangles)
     x, y = mesh.points[inner, :2].T
-    assert np.ptp(x) == pytest.approx(1.6)
+    assert [x.min(), x.max(), y.min(), y.max()] == pytest.approx([0.0, 2.0, 0.0, 1.0], abs=1e-12)
     # uniform pressure in plane strain, which linear elements hold exactly
     expected = np.zeros((3, 3))
     expected[1, 1], expected[2, 2] = -1e-3, -0.3e-3
     np.testing.assert_allclose(
-        mesh.point_data["stress"][inner].reshape(-1, 3, 3), np.tile(expected, (len(inner), 1, 1)), atol=1e-12
+        mesh.point_data["stress"].reshape(-1, 3, 3), np.tile(expected, (len(mesh.points), 1, 1)), atol=1e-12
     )
     displacement = np.column_stack([0.39 * 1e-4 * x, -0.91 * 1e-4 * y, 0.0 * x])
     np.testing.assert_allclose(mesh.point_data["displacement"][inner], displacement, atol=1e-14)
-    np.testing.assert_allclose(mesh.point_data["von_mises"][inner], 1e-3 * np.sqrt(1.0 - 0.3 + 0.09), rtol=1e-9)
-    on_lines = np.unique(mesh.cells[1].data)
-    assert np.isnan(mesh.point_data["stress"][on_lines]).all()
+    np.testing.assert_allclose(mesh.point_data["von_mises"], 1e-3 * np.sqrt(1.0 - 0.3 + 0.09), rtol=1e-9)
+
+
+@pytest.mark.parametrize("is_biaxial", [True, False])
+def test_triangles_end_at_the_boundary_and_hold_the_largest_stress(is_biaxial: bool, tmp_path: Path) -> None:
+    meshio = pytest.importorskip("meshio")
+    scene = plate(
+        is_biaxial=is_biaxial,
+        mesh=bk.MeshOptions(accuracy=1e-7, rising_degrees=True),
+        discretisation=bk.Galerkin(2),
+    )
+    solution = bk.run(scene)
+    bk.export_result(tmp_path / "r.vtu", solution, inside=49)
+    mesh = meshio.read(tmp_path / "r.vtu")
+    for name, values in mesh.point_data.items():
+        assert np.isfinite(values).all(), name
+    largest = (2.0 if is_biaxial else 3.0) * NOMINAL
+    assert mesh.point_data["von_mises"].max() == pytest.approx(largest, rel=1e-6)
+    # the picture draws the same triangles and values
+    size = np.ptp(solution.mesh.whole.nodes, axis=0).max()
+    drawn = stress_mesh(solution, float(size) / 48, shown(solution).frame)
+    triangles = next(block.data for block in mesh.cells if block.type == "triangle")
+    used = mesh.point_data["von_mises"][-len(drawn.points) :]
+    np.testing.assert_allclose(used, STRESSES["von-mises"].of(drawn.stress, scene.material), rtol=1e-9)
+    corners = mesh.points[triangles][:, :, :2]
+    first, second = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    area = 0.5 * (first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0])
+    assert area.min() > 0.0
+    assert area.sum() == pytest.approx(solution.mesh.area, rel=2e-4)  # chords of the circles
+
+
+@pytest.mark.parametrize("name", ["pin-in-plate", "clamped-angle", "two-cylinders"])
+def test_triangles_fill_every_body(name: str) -> None:
+    solution = bk.run(bk.load_scene(name))
+    for body in solution.solved_bodies:
+        filled = stress_mesh(body, 0.05 * body.mesh.diameter, shown(solution).frame)
+        corners = filled.points[filled.triangles]
+        first, second = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+        area = 0.5 * float((first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]).sum())
+        assert area == pytest.approx(body.mesh.area, rel=2e-3)
+        assert np.isfinite(filled.stress).all()
 
 
 def test_inside_is_refused_where_it_cannot_be_held(solution: bk.Solution, tmp_path: Path, capsys) -> None:
@@ -170,7 +211,7 @@ def test_polygonal_data_hold_the_arrays_of_the_grid(bodies: bk.AssemblySolution,
     assert counts["Polys"] == 0
 
 
-def test_bodies_without_end_have_no_fields_inside(tmp_path: Path) -> None:
+def test_bodies_without_end_are_cut(tmp_path: Path) -> None:
     meshio = pytest.importorskip("meshio")
     parts = (bk.Part("load", bk.Pressure(1.0)),)
     shape = bk.ExteriorOf(bk.Disk(1.0))
@@ -178,4 +219,8 @@ def test_bodies_without_end_have_no_fields_inside(tmp_path: Path) -> None:
         title="t", shape=shape, material=bk.Material(1e3, 0.3), parts=parts, mesh=bk.MeshOptions(elements=16)
     )
     bk.export_result(tmp_path / "r.vtu", bk.run(scene), inside=10)
-    assert [block.type for block in meshio.read(tmp_path / "r.vtu").cells] == ["line"]
+    mesh = meshio.read(tmp_path / "r.vtu")
+    assert [block.type for block in mesh.cells] == ["line", "triangle"]
+    radius = np.hypot(*mesh.points[np.unique(mesh.cells[1].data), :2].T)
+    assert radius.min() > 0.99  # a chord of the hole
+    assert 2.0 < radius.max() < 4.0

@@ -1,0 +1,243 @@
+"""Stress and displacement of a body at the corners of triangles that fill it, fitted to its boundary.
+
+Close to constant, linear and quadratic elements the fields inside have peaks at the ends of elements, where boundary
+data kink. Points inside therefore lie opposite the middle of elements, and no closer than about their length. The
+stress on the boundary itself follows from tractions and from the strain along it; see `BoundaryStress`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import Delaunay, KDTree
+
+from bemkit.arrays import BoolArray, FloatArray, IntArray
+from bemkit.errors import InputError
+from bemkit.geometry.mesh import BoundaryMesh
+from bemkit.geometry.neighbours import corner_nodes
+from bemkit.geometry.vectors import cross, norms
+from bemkit.results.boundary_stress import BoundaryStress
+from bemkit.results.interior import interior_fields
+from bemkit.results.solved_body import SolvedBody
+
+_STEP = 1.4
+"""Distance of the first points inside from the boundary, in lengths of their elements: half as far from constant
+elements stresses are wrong by a thirtieth, there by two hundredths of that."""
+_NEAREST = 0.7
+"""Distance of points of a layer from all elements, by that from their own, below which others are closer."""
+_SMALLEST = 1.0 / 8.0
+"""Distance of neighbours, by the spacing far from the boundary, below which points are not seen apart."""
+_CROWDED = 0.25
+"""Distance of points of a layer, by that from the boundary, below which one of them represents all."""
+_GROWTH = 2.0
+"""Of the distances from the boundary, from one layer of points to the next."""
+_INTERVALS = (2, 2, 4, 8)
+"""Intervals of straight elements of degrees 0, 1, 2 and more; curved elements have the most."""
+_MOST_DIVISIONS = 8
+"""Times that an edge of the boundary is halved until it is an edge of triangles: sharp corners go on for ever."""
+_NODE = 1e-9
+"""Distance from the start of an element, in its local coordinate, within which a place counts as the node."""
+_FLAT = 1e-12
+"""Area of a triangle, by the square of the size of the body, that is round-off."""
+
+
+@dataclass(frozen=True, eq=False)
+class StressMesh:
+    """Stress and displacement at the corners of triangles.
+
+    Parameters
+    ----------
+    points : (n, 2) array [m]
+    triangles : (m, 3) int array
+        Anticlockwise.
+    stress : (n, 2, 2) array [Pa]
+    displacement : (n, 2) array [m]
+    """
+
+    points: FloatArray
+    triangles: IntArray
+    stress: FloatArray
+    displacement: FloatArray
+
+
+def stress_mesh(body: SolvedBody, spacing: float, frame: FloatArray) -> StressMesh:
+    """Fill a body with triangles and evaluate its stress and displacement at their corners.
+
+    Parameters
+    ----------
+    body : Solution or BodyResult
+        Bounded, or the exterior of closed curves.
+    spacing : float [m]
+        Distance of points far from the boundary; close to it they are as dense as its elements.
+    frame : (2, 2) array [m]
+        Least and largest x, least and largest y to which an exterior is cut.
+
+    Raises
+    ------
+    InputError
+        If the body is a half-plane.
+    """
+    fields, boundary = interior_fields(body), body.boundary_stress
+    mesh = boundary.mesh
+    if mesh.surface is not None:
+        raise InputError("the body is a half-plane, which has no end to fill with triangles: take a block")
+    inner = _inner_points(*_midpoints(boundary, spacing), spacing, frame, mesh.is_exterior)
+    inner = inner[fields.is_inside(inner)]
+    rings = [_Ring.on(boundary, loop, spacing) for loop in mesh.loops]
+    rings, inner, triangles = _fitted(rings, inner)
+    on_boundary = [ring.points for ring in rings]
+    points = np.concatenate([*on_boundary, inner])
+    corners = points[triangles]
+    doubled_area = cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    is_kept = np.abs(doubled_area) > _FLAT * mesh.diameter**2
+    is_kept[is_kept] = fields.is_inside(corners[is_kept].mean(axis=1))
+    triangles = np.where(doubled_area[:, None] > 0.0, triangles, triangles[:, ::-1])[is_kept]
+    stress = np.concatenate([*(ring.mean(boundary.at) for ring in rings), fields.stress(inner)])
+    displacement = [*(ring.mean(boundary.displacement_at) for ring in rings), fields.displacement(inner)]
+    return StressMesh(points, triangles, stress, np.concatenate(displacement))
+
+
+@dataclass(frozen=True, eq=False)
+class _Ring:
+    """Places on a closed loop of elements by their arc lengths, which ascend from its start."""
+
+    mesh: BoundaryMesh
+    loop: IntArray
+    s: FloatArray
+
+    @classmethod
+    def on(cls, boundary: BoundaryStress, loop: IntArray, spacing: float) -> _Ring:
+        """Return places on all elements; of those that are not seen apart the one of largest stress, and corners."""
+        mesh, degree = boundary.mesh, boundary.space.degree
+        lengths = mesh.lengths[loop]
+        counts = np.where(mesh.is_straight[loop], _INTERVALS[min(degree, 3)], _INTERVALS[-1])
+        counts = np.maximum(counts, np.ceil(lengths / spacing).astype(int))
+        starts = np.append(0.0, np.cumsum(lengths)[:-1])
+        number = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
+        every = cls(
+            mesh, loop, np.repeat(starts, counts) + number / np.repeat(counts, counts) * np.repeat(lengths, counts)
+        )
+        least = min(_SMALLEST * spacing, lengths.sum() / 8.0)
+        size = np.abs(every.mean(boundary.at)).max(axis=(1, 2))
+        is_corner = (number == 0) & np.repeat(corner_nodes(mesh)[mesh.elements[loop, 0]], counts)
+        # corners come first in their interval, then the largest stress
+        order = np.lexsort((-size, ~is_corner, np.floor(every.s / least)))
+        _, first = np.unique(np.floor(every.s[order] / least), return_index=True)
+        return cls(mesh, loop, every.s[np.sort(order[first])])
+
+    @property
+    def places(self) -> tuple[IntArray, FloatArray]:
+        """Elements (n,) and local coordinates (n, 1) of the places, starts of elements at -1."""
+        ends = np.cumsum(self.mesh.lengths[self.loop])
+        number = np.minimum(np.searchsorted(ends, self.s, side="right"), len(ends) - 1)
+        lengths = self.mesh.lengths[self.loop[number]]
+        return self.loop[number], np.clip(1.0 - 2.0 * (ends[number] - self.s) / lengths, -1.0, 1.0)[:, None]
+
+    @property
+    def points(self) -> FloatArray:
+        """(n, 2) array [m]."""
+        return self.mesh.points(*self.places)[:, 0]
+
+    def mean(self, values_at: Callable[[IntArray, FloatArray], FloatArray]) -> FloatArray:
+        """Return a field (n, ...) at the places, at nodes the mean of the two elements."""
+        elements, xi = self.places
+        values = values_at(elements, xi)[:, 0]
+        at_node = np.flatnonzero(xi[:, 0] < -1.0 + _NODE)
+        before = self.mesh.node_elements[self.mesh.elements[elements[at_node], 0], 0]
+        values[at_node] = 0.5 * (values[at_node] + values_at(before, np.ones(1))[:, 0])
+        return values
+
+    def halved(self, is_cut: BoolArray) -> _Ring:
+        """Return the ring with another place in the middle of each edge that is cut; edge k starts at place k."""
+        length = float(self.mesh.lengths[self.loop].sum())
+        middle = 0.5 * (self.s + np.append(self.s[1:], self.s[0] + length))
+        return _Ring(self.mesh, self.loop, np.sort(np.concatenate([self.s, middle[is_cut] % length])))
+
+
+def _fitted(rings: list[_Ring], inner: FloatArray) -> tuple[list[_Ring], FloatArray, IntArray]:
+    """Triangulate places on the boundary and points inside, such that all edges of the rings are edges of triangles.
+
+    Missing edges are halved, and points inside the circles around them are removed.
+    """
+    for division in range(_MOST_DIVISIONS + 1):
+        on_boundary = [ring.points for ring in rings]
+        points = np.concatenate([*on_boundary, inner])
+        size = np.ptp(points, axis=0).max()
+        triangles = Delaunay((points - points.mean(axis=0)) / size).simplices.astype(np.intp)
+        edges = np.sort(np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]), axis=1)
+        known = np.unique(edges[:, 0] * len(points) + edges[:, 1])
+        ends = np.cumsum([len(each) for each in on_boundary])
+        missing, middles, radii = [], [], []
+        for each, end in zip(on_boundary, ends, strict=True):
+            first = end - len(each) + np.arange(len(each))
+            second = np.roll(first, -1)
+            key = np.minimum(first, second) * len(points) + np.maximum(first, second)
+            missing.append(~np.isin(key, known))
+            cut = each[missing[-1]], np.roll(each, -1, axis=0)[missing[-1]]
+            middles.append(0.5 * (cut[0] + cut[1]))
+            radii.append(0.5 * norms(cut[1] - cut[0]))
+        if division == _MOST_DIVISIONS or not any(each.any() for each in missing):
+            break
+        if len(inner):
+            near = KDTree(inner).query_ball_point(np.concatenate(middles), np.concatenate(radii))
+            inner = np.delete(inner, np.unique([k for own in near for k in own]).astype(np.intp), axis=0)
+        rings = [ring.halved(cut) for ring, cut in zip(rings, missing, strict=True)]
+    return rings, inner, triangles
+
+
+def _midpoints(boundary: BoundaryStress, spacing: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return points (n, 2) of elements from which layers of points start, normals there, and their distances (n,).
+
+    Elements of degree 3 and more carry fields without visible peaks: they count as long as the spacing at most.
+    """
+    mesh, degree = boundary.mesh, boundary.space.degree
+    if degree <= 2:
+        counts = np.full(mesh.n_elements, max(degree, 1))
+    else:
+        counts = np.maximum(2, np.ceil(2.0 * mesh.lengths / spacing).astype(int))
+    element = np.repeat(np.arange(mesh.n_elements), counts)
+    number = np.arange(len(element)) - np.repeat(np.cumsum(counts) - counts, counts)
+    xi = ((2.0 * number + 1.0) / counts[element] - 1.0)[:, None]
+    points, normals = mesh.points(element, xi)[:, 0], mesh.normals_at(element, xi)[:, 0]
+    return points, normals, mesh.lengths[element] / counts[element]
+
+
+def _inner_points(
+    on_boundary: FloatArray,
+    normals: FloatArray,
+    lengths: FloatArray,
+    spacing: float,
+    frame: FloatArray,
+    is_exterior: bool,
+) -> FloatArray:
+    """Return layers of points along the inner normals, the denser the shorter the elements, and a grid between them."""
+    tree = KDTree(on_boundary)
+    layers = []
+    depth = np.maximum(_STEP * lengths, _SMALLEST * spacing)
+    while (going := depth < 1.5 * spacing).any():
+        points, inward = on_boundary[going] - depth[going, None] * normals[going], depth[going]
+        few = _apart(points, _CROWDED * inward)  # each distance to the boundary takes long
+        points, inward = points[few], inward[few]
+        is_kept = tree.query(points)[0] > _NEAREST * inward
+        points, inward = points[is_kept], inward[is_kept]
+        layers.append(points[_apart(points, inward)])
+        depth = np.where(going, _GROWTH * depth, np.inf)
+    inner = np.concatenate([np.zeros((0, 2)), *layers])
+    low, high = (frame[:, 0], frame[:, 1]) if is_exterior else (on_boundary.min(axis=0), on_boundary.max(axis=0))
+    x, y = (np.arange(a, b + spacing, spacing) for a, b in zip(low, high, strict=True))
+    grid = np.stack(np.meshgrid(x, y), axis=2).reshape(-1, 2)
+    distance, nearest = tree.query(grid)
+    grid = grid[distance > np.maximum(0.7 * spacing, lengths[nearest])]
+    if len(inner) and len(grid):
+        grid = grid[KDTree(inner).query(grid)[0] > 0.5 * spacing]
+    return np.concatenate([inner, grid])
+
+
+def _apart(points: FloatArray, distance: FloatArray) -> IntArray:
+    """Return which of points (n, 2) that are closer to each other than distances (n,), about, represent all of them."""
+    cell = 2.0 ** np.floor(np.log2(distance))
+    keys = np.column_stack([np.round(points / cell[:, None]), cell])
+    _, first = np.unique(keys, axis=0, return_index=True)
+    return np.sort(first)

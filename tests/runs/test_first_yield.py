@@ -1,0 +1,56 @@
+"""The load under which von Mises' stress first reaches the yield stress."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+import bemkit as bk
+from bemkit.results.equivalent_stress import largest_equivalent_stress
+from tests.perforated_plate import NOMINAL, plate
+
+
+def test_a_plate_yields_at_its_hole() -> None:
+    scene = plate(
+        is_biaxial=False, mesh=bk.MeshOptions(accuracy=1e-7, rising_degrees=True), discretisation=bk.Galerkin(2)
+    )
+    found = bk.first_yield(scene, 12.0)
+    assert found.load_factor == pytest.approx(12.0 / (3.0 * NOMINAL), rel=1e-6)
+    assert abs(found.x) < 1e-6
+    assert abs(found.y) == pytest.approx(1.0)
+
+
+def test_below_a_contact_the_stress_follows_a_power_of_the_load() -> None:
+    """A disc on a plane [Johnson1985, 4.4]: 0.56 p_0 for nu = 0.3 at a depth of 0.7 half widths, p_0 ~ force**0.5."""
+    scene = bk.Scene(
+        title="disc",
+        shape=bk.Disk(1.0, (0.0, 1.0)),
+        material=bk.Material(100.0, 0.3),
+        parts=(
+            bk.Part("contact", bk.Contact(bk.HalfPlane()), ("arc-3", "arc-4")),
+            bk.Part("load", bk.Traction(y=-0.05), ("arc-1", "arc-2")),
+        ),
+        law=bk.Frictionless(),
+        symmetry=bk.Symmetry(x=0.0),
+        mesh=bk.MeshOptions(elements=240),
+    )
+    one = largest_equivalent_stress(bk.run(scene))
+    found = bk.first_yield(scene, 2.0**0.5 * one.value, rtol=1e-4)
+    assert found.load_factor == pytest.approx(2.0, rel=0.05)  # elements are a tenth of the contact
+    assert 0.0 < found.y < 0.2
+    pressure = float(-found.solution.contact.sigma_n.min())
+    assert 2.0**0.5 * one.value == pytest.approx(0.56 * pressure, rel=0.05)
+
+
+def test_what_cannot_yield_is_refused() -> None:
+    scene = bk.load_scene("disc-between-plates")
+    assert isinstance(scene, bk.Scene)
+    with pytest.raises(bk.InputError, match=r"the largest stress does not follow the load: 0\.0296"):
+        bk.first_yield(scene, 0.05)
+    with pytest.raises(bk.InputError, match=r"yield_stress is -1\.0: give a positive stress"):
+        bk.first_yield(scene, -1.0)
+    with pytest.raises(bk.InputError, match="the scene has several load steps: give first_yield a scene with a single"):
+        bk.first_yield(replace(scene, load_factors=(0.5, 1.0)), 1.0)
+    with pytest.raises(bk.InputError, match="the scene has no stress under its load"):
+        bk.first_yield(replace(scene, parts=(bk.Part("held", bk.Clamped(), ("end",)),), law=bk.Frictionless()), 1.0)
