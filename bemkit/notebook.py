@@ -1,8 +1,13 @@
-"""HTML representation of values in notebooks: a table, and a picture if matplotlib is installed."""
+"""HTML representation of values in notebooks, and the ways to explore a result from Python.
+
+What is shown and written comes from modules that import the results: they are loaded by name on first use.
+"""
 
 from __future__ import annotations
 
 from importlib import import_module
+from pathlib import Path
+from typing import Any
 
 _MAKER = "bemkit.report.notebook"
 """Imported by all that it shows, and loaded when a notebook first asks, by its name as `bemkit` loads its parts."""
@@ -15,3 +20,47 @@ class ShownInNotebooks:
         """Return a piece of HTML."""
         html: str = import_module(_MAKER).notebook_html(self)
         return html
+
+
+class Explorable(ShownInNotebooks):
+    """A result that is printed as its summary, drawn, written and tabulated."""
+
+    def __str__(self) -> str:
+        """Return the summary that the command line prints."""
+        text: str = import_module("bemkit.results.summary_rows").summary_text(self)
+        return text
+
+    def plot(self, what: str, part: str | None = None) -> Any:
+        """Draw a picture.
+
+        Parameters
+        ----------
+        what : str
+            Name of a picture, such as ``"von-mises"``; see `bemkit.pictures.catalogue`.
+        part : str, optional
+            Contact of a picture along contacts, required if there are several.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+            Notebooks show it.
+
+        Raises
+        ------
+        InputError
+            If the name is unknown, the result does not have what the picture shows, or the contact is not named.
+        """
+        return import_module("bemkit.pictures.catalogue").plot(self, what, part)
+
+    def save(self, path: str | Path, *, inside: int = 0) -> None:
+        """Write the result in the format that the ending of the file name names; see `bemkit.export_result`."""
+        import_module("bemkit.results.export").export_result(path, self, inside=inside)
+
+    def to_pandas(self, table: str = "contact") -> Any:
+        """Return a table as a pandas data frame: ``contact``, ``boundary``, ``history``, ``steps``, ``forces``."""
+        return import_module("bemkit.results.tables").table_of(self, table).to_pandas()
+
+    @property
+    def forces(self) -> Any:
+        """Table of the resultants on the parts of all bodies."""
+        return import_module("bemkit.results.tables").table_of(self, "forces")

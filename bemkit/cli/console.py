@@ -2,32 +2,23 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
-import numpy as np
 from rich.console import Console, Group
 from rich.table import Table
 from rich.text import Text
 
 from bemkit.cli.outputs import plain_table, stdout_console
-from bemkit.contact.certificate import Certificate
-from bemkit.geometry.shapes import Shape
 from bemkit.operators.counts import OperationCounts
 from bemkit.plan import Plan
 from bemkit.result_warning import ResultWarning
-from bemkit.results.between_nodes import BetweenNodes
 from bemkit.results.solution import Solution
-from bemkit.scene.registry import DISCRETISATIONS, SOLVERS
-from bemkit.scene.unit_names import UnitNames, amount
+from bemkit.results.summary_rows import summary_rows
 from bemkit.solvers.base import StepRecord
-from bemkit.solvers.fallbacks import drivers_at_work
 
 if TYPE_CHECKING:
     from bemkit.results.assembly_solution import AssemblySolution
-
-_MANY_TRANSITIONS, _MANY_CONTACTS = 12, 8
 
 
 def print_summary(solution: Solution | AssemblySolution, console: Console | None = None) -> None:
@@ -36,11 +27,17 @@ def print_summary(solution: Solution | AssemblySolution, console: Console | None
     table = Table(box=None, show_header=False, padding=(0, 2, 0, 0), title_justify="left")
     table.add_column(style="bold", no_wrap=True)
     table.add_column(overflow="fold")
-    for name, value in _summary_rows(solution):
-        table.add_row(name, Text(value) if isinstance(value, str) else value)
+    for name, value in summary_rows(solution):
+        table.add_row(name, _status(solution, value) if name == "status" else Text(value))
     console.print(Text(solution.title, style="bold"))
     console.print(table)
     _print_warnings(solution.warnings, console)
+
+
+def _status(solution: Solution | AssemblySolution, text: str) -> Text:
+    colour = "green" if solution.is_converged else "yellow" if solution.is_certified else "red"
+    words = len(solution.status_words)
+    return Text.assemble((text[:words], f"bold {colour}"), text[words:])
 
 
 def print_plan(title: str, plan: Plan) -> None:
@@ -148,151 +145,3 @@ def format_size(n_bytes: int) -> str:
 def format_seconds(seconds: float) -> str:
     """Return a time in words such as ``3.3 ms``."""
     return f"{seconds:.3g} s" if seconds >= 1.0 else f"{1e3 * seconds:.3g} ms"
-
-
-def _summary_rows(solution: Solution | AssemblySolution) -> Iterator[tuple[str, Text | str]]:
-    yield "status", _status(solution)
-    if isinstance(solution, Solution):
-        solver, of_tractions = solution.scene.solver, _traction_errors(solution)
-        yield from _body_rows(solution)
-    else:
-        solver, of_tractions = solution.assembly.solver, ""
-        yield from _bodies_rows(solution)
-    if has_contact := solution.contact.n_contact > 0:
-        yield "contact nodes", _node_counts(solution)
-        yield from _force_rows(solution) if isinstance(solution, Solution) else _contacts_rows(solution)
-    else:
-        yield "contact", "none"
-    yield "elastic energy", f"{_amount(solution.energy, 'energy', solution.units)}  per unit thickness"
-    yield from _history_rows(solution)
-    if solution.estimated_error is not None:
-        yield "estimated error", f"{solution.estimated_error:.1e}  relative, in the energy norm{of_tractions}"
-    if has_contact:
-        yield "transitions", "\n".join(_transition_lines(solution))
-        drivers = drivers_at_work(solver, (record.message for record in solution.history))
-        words = ", ".join(dict.fromkeys(map(SOLVERS.word_of, drivers)))
-        yield "linear solves", f"{solution.linear_solves} in {solution.outer_steps} steps ({words})"
-    yield from _violation_rows(solution)
-    yield "time", _time(solution)
-
-
-def _body_rows(solution: Solution) -> Iterator[tuple[str, str]]:
-    mesh = solution.mesh
-    discretisation = DISCRETISATIONS.word_of(solution.scene.discretisation)
-    if (degree := solution.scene.discretisation.displacement_space(mesh).degree) > 2:
-        discretisation += f", degree {degree}"
-    yield "elements", f"{mesh.n_elements} ({discretisation})"
-    if notes := _notes(solution.scene.shape):
-        yield "outline", notes
-    if mesh.symmetry is not None:
-        values = f"values of one side, {mesh.n_elements} of {mesh.whole.n_elements} elements"
-        yield "symmetry", f"about {mesh.symmetry}: {values}"
-
-
-def _notes(shape: Shape) -> str:
-    """Return what was done to read the outline of a body, in lines."""
-    drawing = shape.outline().drawing
-    return "" if drawing is None else "\n".join(drawing.notes)
-
-
-def _force_rows(solution: Solution) -> Iterator[tuple[str, str]]:
-    units = solution.units
-    yield "normal force", f"{_amount(solution.force_normal, 'force', units)}  pressing, per unit thickness"
-    yield "friction force", f"{_amount(solution.force_tangential, 'force', units)}  on the body, along the boundary"
-
-
-def _traction_errors(solution: Solution) -> str:
-    tractions, local = solution.estimated_traction_error, solution.estimated_local_traction_error
-    words = "" if tractions is None else f", {tractions:.1e} of contact tractions"
-    return words if local is None else f"{words}, {local:.1e} of single ones"
-
-
-def _bodies_rows(solution: AssemblySolution) -> Iterator[tuple[str, str]]:
-    yield "bodies", f"{len(solution.bodies)}, with {solution.n_elements} elements"
-    for elastic in solution.assembly.bodies:
-        if notes := _notes(elastic.shape):
-            yield f"outline of {elastic.name}", notes
-
-
-def _contacts_rows(solution: AssemblySolution) -> Iterator[tuple[str, str]]:
-    units = solution.units
-    for contact in solution.contacts[:_MANY_CONTACTS]:
-        yield (
-            contact.name,
-            f"normal force {_amount(contact.force_normal, 'force', units)}, "
-            f"friction {_amount(contact.force_tangential, 'force', units)}, "
-            f"length {amount(contact.contact_length, 'length', units, digits=6)}, "
-            f"peak pressure {amount(contact.peak_pressure, 'stress', units, digits=6)}, "
-            f"slip up to {amount(contact.largest_slip, 'length', units, digits=3)}",
-        )
-    if len(solution.contacts) > _MANY_CONTACTS:
-        yield "", f"and {len(solution.contacts) - _MANY_CONTACTS} contacts more (--json -)"
-    for body in list(solution.rigid.values())[:_MANY_CONTACTS]:
-        yield (
-            body.name,
-            f"moved by ({body.x:.6g}, {body.y:.6g}), turned by {body.turn:.6g}; "
-            f"force ({body.force_x:.8g}, {body.force_y:.8g}), moment {body.moment:.8g} on it",
-        )
-    if len(solution.rigid) > _MANY_CONTACTS:
-        yield "", f"and {len(solution.rigid) - _MANY_CONTACTS} rigid bodies more (--json -)"
-
-
-def _violation_rows(solution: Solution | AssemblySolution) -> Iterator[tuple[str, str]]:
-    round_off = f"round-off of the forces up to {solution.certificate.round_off:.1e}"
-    yield "certificate", f"{_worst_entry(solution.certificate)}; {round_off}"
-    if (between := solution.between_nodes) is not None:
-        yield "between nodes", f"{_worst_entry(between)}; penetration up to {between.penetration_depth:.1e}"
-
-
-def _history_rows(solution: Solution | AssemblySolution) -> Iterator[tuple[str, str]]:
-    loading = solution.loading
-    if loading is not None:
-        work, units = loading.total(), solution.units
-        yield "load history", f"{len(loading.steps)} of {loading.n_steps} steps, up to t = {loading.times[-1]:.6g}"
-        yield "external work", f"{_amount(work.external_work, 'energy', units)}  in all steps"
-        yield "dissipation", f"{_amount(work.dissipation, 'energy', units)}  in all steps"
-        if loading.has_coarse_increments:
-            left = _amount(work.increment_work, "energy", units)
-            yield "increment error", f"{left}  decreases with smaller increments"
-
-
-def _status(solution: Solution | AssemblySolution) -> Text:
-    colour = "green" if solution.is_converged else "yellow" if solution.is_certified else "red"
-    status = Text(solution.status_words, style=f"bold {colour}")
-    if not solution.is_converged:
-        status.append(f": {solution.message or solution.status.value}", style="not bold")
-    return status
-
-
-def _node_counts(solution: Solution | AssemblySolution) -> str:
-    counts = Counter(solution.contact.status_words())
-    nodes = f"{counts['separated']} separated, {counts['slip']} slip, {counts['stick']} stick"
-    return f"{solution.contact.n_contact}: {nodes}"
-
-
-def _time(solution: Solution | AssemblySolution) -> str:
-    timings = solution.timings
-    stages = ", ".join(f"{name} {value:.2f}" for name, value in timings.items() if name != "total" and value > 0.0)
-    return f"{timings.get('total', sum(timings.values())):.2f} s ({stages})"
-
-
-def _amount(value: float, quantity: str, units: UnitNames | None) -> str:
-    return amount(value, quantity, units, digits=8)
-
-
-def _worst_entry(measured: Certificate | BetweenNodes) -> str:
-    violations = measured.violations
-    worst = max(violations, key=lambda name: np.nan_to_num(violations[name], nan=np.inf))
-    name = f" ({worst.replace('_', ' ')})" if measured.worst != 0.0 else ""  # where all are equal
-    return f"worst entry {measured.worst:.1e}{name}"
-
-
-def _transition_lines(solution: Solution | AssemblySolution) -> list[str]:
-    lines = [
-        f"{item.part}: {item.from_status} to {item.to_status} at ({item.x:.6g}, {item.y:.6g}), s = {item.s:.6g}"
-        for item in solution.transitions[:_MANY_TRANSITIONS]
-    ]
-    n_more = len(solution.transitions) - len(lines)
-    if n_more > 0:
-        lines.append(f"and {n_more} more (--csv -)")
-    return lines or ["none"]

@@ -16,7 +16,9 @@ from bemkit.cli.streams import print_data
 @click.argument("result")
 @options.csv_option
 @click.option(
-    "--table", type=click.Choice(["contact", "boundary", "history", "steps"]), help="Table of --csv and -o (contact)."
+    "--table",
+    type=click.Choice(["contact", "boundary", "history", "steps", "forces"]),
+    help="Table of --csv (contact).",
 )
 @options.json_option
 @options.plot_option

@@ -96,6 +96,20 @@ def figures(result: Result, what: Sequence[str] | None = None) -> dict[str, Figu
     return found  # type: ignore[return-value]
 
 
+def plot(result: Result, what: str, part: str | None = None) -> Figure:
+    """Return one picture; see `Solution.plot`."""
+    picture, parts = find_picture(what), result.contact.parts
+    if reason := picture.why_not(result):
+        raise InputError(f"there is no picture {what!r} of {result.title!r}: {reason}")
+    if not picture.is_along_contacts:
+        axes = picture.draw(result)
+    elif part in parts or (part is None and len(parts) == 1):
+        axes = picture.draw(result, part or parts[0])
+    else:
+        raise InputError(f"part is {part!r}: name one of the contacts {', '.join(map(repr, parts))}")
+    return axes.get_figure(root=True)  # type: ignore[return-value]
+
+
 def default_pictures(result: Result) -> list[Picture]:
     """Return the pictures that suit a result."""
     return [picture for picture in PICTURES.values() if not picture.why_not(result) and picture.is_default(result)]

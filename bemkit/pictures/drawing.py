@@ -25,9 +25,9 @@ _FLAT = 0.05
 
 def new_figure(width: float, height: float) -> Figure:
     """Return an empty figure whose parts keep clear of each other; sizes in inches."""
-    from matplotlib.figure import Figure
+    from bemkit.pictures.notebook_figure import NotebookFigure
 
-    return Figure(figsize=(width, height), layout="constrained")
+    return NotebookFigure(figsize=(width, height), layout="constrained")
 
 
 def axes_or_new(axes: Axes | None, width: float = 7.0, height: float = 4.6) -> Axes:

@@ -15,10 +15,11 @@ from bemkit.pictures.shown import Result
 from bemkit.plan import Plan
 from bemkit.report.html import Element, element, facts, image, render, table
 from bemkit.report.pictures import has_pictures
-from bemkit.report.sections import badge, headline_rows, plan_section
+from bemkit.report.sections import badge, plan_section
 from bemkit.results.assembly_solution import AssemblySolution
 from bemkit.results.solution import Solution
 from bemkit.results.solved_problem import SolvedSteps
+from bemkit.results.summary_rows import summary_rows
 from bemkit.scene.assembly import Assembly
 from bemkit.scene.scene import Scene
 
@@ -44,7 +45,7 @@ def notebook_html(value: object) -> str:
 def _result(result: Result) -> Element:
     warnings = [element("li", warning.text) for warning in result.warnings]
     lists = [element("ul", *warnings)] if warnings else []
-    return element("div", element("p", badge(result)), facts(headline_rows(result), "Result"), *lists)
+    return element("div", element("p", badge(result)), facts(summary_rows(result), "Result"), *lists)
 
 
 def _pictures_of(result: Result) -> list[Callable[[], Axes]]:

@@ -14,13 +14,13 @@ from bemkit.report.sections import (
     certificate_section,
     convergence_section,
     forces_section,
-    headline_rows,
     plan_section,
     scene_section,
     timing_section,
     version_section,
     warnings_section,
 )
+from bemkit.results.summary_rows import summary_rows
 
 _START = "<!DOCTYPE html>"
 
@@ -38,7 +38,7 @@ def report(result: Result) -> str:
         The page loads nothing from elsewhere: pictures are inside, if matplotlib is installed.
     """
     sections: dict[str, list[Element]] = {
-        "Summary": [facts(headline_rows(result), "The result in numbers")],
+        "Summary": [facts(summary_rows(result), "The result in numbers")],
         "Warnings": warnings_section(result),
         "Pictures": _pictures(result),
         "Forces": forces_section(result),

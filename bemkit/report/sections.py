@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from bemkit.hdf5 import provenance
@@ -12,33 +12,16 @@ from bemkit.report.html import Element, element, facts, number, table
 from bemkit.results.tables import history_columns
 from bemkit.scene.serialisation import UnstructureError
 from bemkit.scene.toml import SceneError, scene_to_toml
-from bemkit.scene.unit_names import amount
 from bemkit.version import __version__
 
 _MOST_ROWS = 200
 """Largest number of rows of a table; the files hold all."""
-_QUANTITIES = {"force_normal": "force", "force_tangential": "force", "energy": "energy"}
-_COUNTED = ("n_bodies", "n_elements", "n_contact", "linear_solves", "outer_steps")
 
 
 def badge(result: Result) -> Element:
     """Return the status in a word, with a class for its colour."""
     kind = "good" if result.is_converged else "warned" if result.is_certified else "bad"
     return element("strong", result.status_words, class_=f"badge {kind}")
-
-
-def headline_rows(result: Result) -> Iterator[tuple[str, str]]:
-    """Yield the numbers that sum a result up."""
-    summary = result.summary()
-    for name in _COUNTED:
-        if name in summary:
-            yield _words(name), str(summary[name])
-    for name, quantity in _QUANTITIES.items():
-        yield _words(name), amount(summary[name], quantity, result.units, digits=6)
-    for name in ("estimated_error", "estimated_traction_error", "estimated_local_traction_error"):
-        if summary.get(name) is not None:
-            yield _words(name), number(summary[name], 2)
-    yield "largest violation", number(result.certificate.worst, 2)
 
 
 def warnings_section(result: Result) -> list[Element]:

@@ -15,6 +15,7 @@ from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.results.between_nodes import BetweenNodes
 from bemkit.results.contact_table import resolved_transitions, single_contacts
 from bemkit.results.part_forces import ContactForce, RigidResult
+from bemkit.results.resultants import contact_facts
 from bemkit.results.solved_body import BoundaryFields, SolvedBody
 from bemkit.results.solved_problem import SolvedProblem
 from bemkit.results.zone_ends import Side, ZoneEnd
@@ -263,7 +264,7 @@ class AssemblySolution(SolvedProblem):
             "singular_corners": [
                 {"body": name, **corner.as_dict()} for name, own in self.singular_corners.items() for corner in own
             ],
-            "contacts": [contact.as_dict() for contact in self.contacts],
+            "contacts": contact_facts(self),
             "bodies": {name: body.summary() for name, body in self.bodies.items()},
             "rigid": {name: body.as_dict() for name, body in self.rigid.items()},
         }

@@ -19,6 +19,7 @@ from bemkit.results.between_nodes import BetweenNodes, violations_between_nodes
 from bemkit.results.contact_table import ContactTable as ContactTable
 from bemkit.results.contact_table import Transition as Transition
 from bemkit.results.contact_table import bound_at, resolved_transitions, single_contacts
+from bemkit.results.resultants import contact_facts
 from bemkit.results.solved_body import BoundaryFields as BoundaryFields
 from bemkit.results.solved_body import SolvedBody
 from bemkit.results.solved_problem import SolvedProblem
@@ -181,5 +182,5 @@ class Solution(SolvedProblem, SolvedBody):
             **{name: getattr(self, name) for name in ("estimated_traction_error", "estimated_local_traction_error")},
             "singular_corners": [corner.as_dict() for corner in self.singular_corners],
             "parts": [force.as_dict() for force in self.part_forces],
-            "contacts": [contact.as_dict() for contact in self.contacts],
+            "contacts": contact_facts(self),
         }

@@ -13,7 +13,7 @@ import numpy as np
 from bemkit.contact.body import SlipHistory
 from bemkit.contact.certificate import Certificate
 from bemkit.errors import InputError
-from bemkit.notebook import ShownInNotebooks
+from bemkit.notebook import Explorable, ShownInNotebooks
 from bemkit.operators.counts import OperationCounts
 from bemkit.plan import Plan
 from bemkit.result_warning import ResultWarning, without_duplicates
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class SolvedProblem(ShownInNotebooks):
+class SolvedProblem(Explorable):
     """Status, certificate, contact table and history of a solved scene or assembly.
 
     Parameters

@@ -14,6 +14,7 @@ from bemkit.errors import InputError
 from bemkit.geometry.local_values import values_on_elements
 from bemkit.results.contact_table import CONTACT_COLUMNS
 from bemkit.results.load_history import step_rows
+from bemkit.results.resultants import part_facts
 from bemkit.results.side_stress import components
 from bemkit.results.solution import Solution
 from bemkit.results.solved_body import SolvedBody
@@ -24,7 +25,7 @@ from bemkit.table import Column, Table, json_text
 if TYPE_CHECKING:
     from bemkit.results.assembly_solution import AssemblySolution
 
-TABLES = ("contact", "boundary", "history", "steps")
+TABLES = ("contact", "boundary", "history", "steps", "forces")
 CERTIFICATE_ENTRIES = tuple(entry.name for entry in fields(Certificate))
 RECORD_COUNTS = ("step", "linear_solves", "n_separated", "n_stick", "n_slip", "n_changed")
 _BOUNDARY = (
@@ -40,6 +41,13 @@ _BOUNDARY = (
     Column("hoop", "Pa", "normal stress along the boundary at the centre", ".6g"),
     Column("von_mises", "Pa", "equivalent stress of von Mises at the centre", ".6g"),
 )
+_FORCES = (
+    Column("body", "", "name of the body"),
+    Column("name", "", "part of the boundary"),
+    Column("force_x", "N/m", "resultant along x, on the body", ".6g"),
+    Column("force_y", "N/m", "resultant along y, on the body", ".6g"),
+    Column("moment", "N m/m", "moment about the origin, anticlockwise", ".6g"),
+)
 
 
 def to_csv(solution: Solution | AssemblySolution, table: str) -> str:
@@ -50,7 +58,8 @@ def to_csv(solution: Solution | AssemblySolution, table: str) -> str:
     solution : Solution or AssemblySolution
     table : str
         ``"contact"``: one row per contact node; ``"boundary"``: one row per element, values at its centre;
-        ``"history"``: one row per step of the solver; ``"steps"``: one row per step of the load history.
+        ``"history"``: one row per step of the solver; ``"steps"``: one row per step of the load history; ``"forces"``:
+        the resultants on each part.
 
     Raises
     ------
@@ -65,7 +74,7 @@ def table_of(solution: Solution | AssemblySolution, table: str) -> Table:
     if table not in TABLES:
         raise InputError(f"table is {table!r}: give one of {', '.join(TABLES)}")
     arrays = _columns(solution, table)
-    known = {head.name: head for head in (*CONTACT_COLUMNS, *_BOUNDARY)}
+    known = {head.name: head for head in (*CONTACT_COLUMNS, *_BOUNDARY, *_FORCES)}
     return Table.from_arrays([known.get(name) or Column(name) for name in arrays], arrays)
 
 
@@ -109,6 +118,10 @@ def _columns(solution: Solution | AssemblySolution, table: str) -> dict[str, Any
             return {head.name: columns[head.name] for head in CONTACT_COLUMNS if head.name != "weight"}
         case "boundary":
             return _boundary_columns(solution)
+        case "forces":
+            facts = part_facts(solution)
+            names = list(facts[0]) if facts else [head.name for head in _FORCES if head.name != "body"]
+            return {name: [fact[name] for fact in facts] for name in names}
         case "steps":
             rows = step_rows(solution.loading)
             if not rows:

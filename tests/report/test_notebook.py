@@ -24,7 +24,7 @@ def test_results_scenes_and_plans_show_a_table_and_a_picture() -> None:
     solution = bk.run(scene)
     several = bk.load_scene("two-cylinders")
     for value, words in (
-        (solution, ("converged", "contact nodes", "24")),
+        (solution, ("converged", "contact nodes", "24 (constant)")),
         (scene, ("Rectangle", "Coulomb(friction_coefficient=0.5)", "24 elements")),
         (several, ("bodies", "2", "contacts")),
         (bk.run(with_overrides(several, elements=60)), ("converged", "bodies")),

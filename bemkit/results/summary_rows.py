@@ -1,0 +1,216 @@
+"""What a summary says of a result: printed by the command line and by Python, shown by reports and notebooks."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import numpy as np
+
+from bemkit.contact.certificate import Certificate
+from bemkit.geometry.shapes import Shape
+from bemkit.results.assembly_solution import AssemblySolution
+from bemkit.results.between_nodes import BetweenNodes
+from bemkit.results.resultants import contact_facts, part_facts
+from bemkit.results.solution import Solution
+from bemkit.scene.registry import DISCRETISATIONS, SOLVERS
+from bemkit.scene.unit_names import UnitNames, amount, unit_of
+from bemkit.solvers.fallbacks import drivers_at_work
+
+DIGITS = 8
+"""Of the numbers of a summary."""
+_MANY_TRANSITIONS, _MANY_CONTACTS = 6, 8
+
+
+def summary_text(solution: Solution | AssemblySolution) -> str:
+    """Return the summary of a result in lines: title, rows, warnings."""
+    rows = list(summary_rows(solution))
+    width = max(len(name) for name, _ in rows)
+    lines = [f"{name:{width}}  {line}" for name, text in rows for name, line in _lines(name, text)]
+    return "\n".join([solution.title, *lines, *(f"warning: {warning}" for warning in solution.warnings)])
+
+
+def _lines(name: str, text: str) -> list[tuple[str, str]]:
+    first, *more = text.split("\n")
+    return [(name, first), *(("", line) for line in more)]
+
+
+def summary_rows(solution: Solution | AssemblySolution) -> Iterator[tuple[str, str]]:
+    """Yield names and texts of all that a summary says of a result, numbers with their units."""
+    yield "status", _status(solution)
+    if isinstance(solution, Solution):
+        solver, of_tractions = solution.scene.solver, _traction_errors(solution)
+        yield from _body_rows(solution)
+    else:
+        solver, of_tractions = solution.assembly.solver, ""
+        yield from _bodies_rows(solution)
+    if has_contact := solution.contact.n_contact > 0:
+        yield "contact nodes", _node_counts(solution)
+        yield from _force_rows(solution)
+    else:
+        yield "contact", "none"
+    yield from _part_rows(solution)
+    yield "elastic energy", f"{_amount(solution.energy, 'energy', solution.units)}  per unit thickness"
+    yield from _history_rows(solution)
+    if solution.estimated_error is not None:
+        yield "estimated error", f"{solution.estimated_error:.1e}  relative, in the energy norm{of_tractions}"
+    if has_contact:
+        yield "transitions", "\n".join(_transition_lines(solution))
+        drivers = drivers_at_work(solver, (record.message for record in solution.history))
+        words = ", ".join(dict.fromkeys(map(SOLVERS.word_of, drivers)))
+        yield "linear solves", f"{solution.linear_solves} in {solution.outer_steps} steps ({words})"
+    yield from _violation_rows(solution)
+    yield "time", _time(solution)
+
+
+def _body_rows(solution: Solution) -> Iterator[tuple[str, str]]:
+    mesh = solution.mesh
+    discretisation = DISCRETISATIONS.word_of(solution.scene.discretisation)
+    if (degree := solution.scene.discretisation.displacement_space(mesh).degree) > 2:
+        discretisation += f", degree {degree}"
+    yield "elements", f"{mesh.n_elements} ({discretisation})"
+    if notes := _notes(solution.scene.shape):
+        yield "outline", notes
+    if mesh.symmetry is not None:
+        values = f"values of one side, {mesh.n_elements} of {mesh.whole.n_elements} elements"
+        yield "symmetry", f"about {mesh.symmetry}: {values}"
+
+
+def _notes(shape: Shape) -> str:
+    """Return what was done to read the outline of a body, in lines."""
+    drawing = shape.outline().drawing
+    return "" if drawing is None else "\n".join(drawing.notes)
+
+
+def _force_rows(solution: Solution | AssemblySolution) -> Iterator[tuple[str, str]]:
+    """Yield the forces of all contacts together, then those of each, the largest first."""
+    units = solution.units
+    total, friction = solution.force_normal, solution.force_tangential
+    yield "normal force", f"{_amount(total, 'force', units)}  pressing, per unit thickness"
+    yield "friction force", f"{_amount(friction, 'force', units)}  on the body, along the boundary"
+    facts = sorted(contact_facts(solution), key=lambda fact: -fact["force_normal"])
+    if len(facts) == 1:
+        (fact,) = facts
+        yield "contact length", _length(fact, units)
+        yield "peak pressure", _peak(fact, units)
+        yield "largest slip", _amount(fact["largest_slip"], "length", units)
+        return
+    for fact in facts[:_MANY_CONTACTS]:
+        yield (
+            fact["name"],
+            f"normal force {_amount(fact['force_normal'], 'force', units)}, "
+            f"friction {_amount(fact['force_tangential'], 'force', units)}, length {_length(fact, units)}, "
+            f"peak pressure {_peak(fact, units)}, slip up to {_amount(fact['largest_slip'], 'length', units)}",
+        )
+    if len(facts) > _MANY_CONTACTS:
+        yield "", f"and {len(facts) - _MANY_CONTACTS} contacts more (--json -)"
+
+
+def _length(fact: Mapping[str, Any], units: UnitNames | None) -> str:
+    return f"{_amount(fact['contact_length'], 'length', units)} ({100.0 * fact['contact_fraction']:.4g} %)"
+
+
+def _peak(fact: Mapping[str, Any], units: UnitNames | None) -> str:
+    place = _vector(fact["peak_x"], fact["peak_y"], "length", units)
+    return f"{_amount(fact['peak_pressure'], 'stress', units)} at {place}"
+
+
+def _vector(x: float, y: float, quantity: str, units: UnitNames | None) -> str:
+    return f"({_amount(x, '', None)}, {_amount(y, '', None)}) {unit_of(quantity, units)}".rstrip()
+
+
+def _part_rows(solution: Solution | AssemblySolution) -> Iterator[tuple[str, str]]:
+    """Yield resultants on the parts of the bodies, and how rigid bodies moved and what acts on them."""
+    units = solution.units
+    forces = part_facts(solution)
+    for fact in forces[:_MANY_CONTACTS]:
+        moment = _amount(fact["moment"], "energy", units)
+        name = f"{fact['body']}.{fact['name']}" if "body" in fact else fact["name"]
+        yield f"force on {name}", f"{_vector(fact['force_x'], fact['force_y'], 'force', units)}, moment {moment}"
+    if len(forces) > _MANY_CONTACTS:
+        yield "", f"and {len(forces) - _MANY_CONTACTS} parts more (--json -)"
+    rigid = [] if isinstance(solution, Solution) else list(solution.rigid.values())
+    for body in rigid[:_MANY_CONTACTS]:
+        yield (
+            body.name,
+            f"moved by {_vector(body.x, body.y, 'length', units)}, turned by {body.turn:.8g} rad; "
+            f"force {_vector(body.force_x, body.force_y, 'force', units)}, "
+            f"moment {_amount(body.moment, 'energy', units)} on it",
+        )
+    if len(rigid) > _MANY_CONTACTS:
+        yield "", f"and {len(rigid) - _MANY_CONTACTS} rigid bodies more (--json -)"
+
+
+def _traction_errors(solution: Solution) -> str:
+    tractions, local = solution.estimated_traction_error, solution.estimated_local_traction_error
+    words = "" if tractions is None else f", {tractions:.1e} of contact tractions"
+    return words if local is None else f"{words}, {local:.1e} of single ones"
+
+
+def _bodies_rows(solution: AssemblySolution) -> Iterator[tuple[str, str]]:
+    yield "bodies", f"{len(solution.bodies)}, with {solution.n_elements} elements"
+    for elastic in solution.assembly.bodies:
+        if notes := _notes(elastic.shape):
+            yield f"outline of {elastic.name}", notes
+
+
+def _violation_rows(solution: Solution | AssemblySolution) -> Iterator[tuple[str, str]]:
+    round_off = f"round-off of the forces up to {solution.certificate.round_off:.1e}"
+    yield "certificate", f"{_worst_entry(solution.certificate)}; {round_off}"
+    if (between := solution.between_nodes) is not None:
+        depth = amount(between.penetration_depth, "length", solution.units, digits=2)
+        yield "between nodes", f"{_worst_entry(between)}; penetration up to {depth}"
+
+
+def _history_rows(solution: Solution | AssemblySolution) -> Iterator[tuple[str, str]]:
+    loading = solution.loading
+    if loading is not None:
+        work, units = loading.total(), solution.units
+        yield "load history", f"{len(loading.steps)} of {loading.n_steps} steps, up to t = {loading.times[-1]:.6g}"
+        yield "external work", f"{_amount(work.external_work, 'energy', units)}  in all steps"
+        yield "dissipation", f"{_amount(work.dissipation, 'energy', units)}  in all steps"
+        if loading.has_coarse_increments:
+            left = _amount(work.increment_work, "energy", units)
+            yield "increment error", f"{left}  decreases with smaller increments"
+
+
+def _status(solution: Solution | AssemblySolution) -> str:
+    words = solution.status_words
+    return words if solution.is_converged else f"{words}: {solution.message or solution.status.value}"
+
+
+def _node_counts(solution: Solution | AssemblySolution) -> str:
+    counts = Counter(solution.contact.status_words())
+    nodes = f"{counts['separated']} separated, {counts['slip']} slip, {counts['stick']} stick"
+    return f"{solution.contact.n_contact}: {nodes}"
+
+
+def _time(solution: Solution | AssemblySolution) -> str:
+    timings = solution.timings
+    stages = ", ".join(f"{name} {value:.2f}" for name, value in timings.items() if name != "total" and value > 0.0)
+    return f"{timings.get('total', sum(timings.values())):.2f} s ({stages})"
+
+
+def _amount(value: float, quantity: str, units: UnitNames | None) -> str:
+    return amount(value, quantity, units, digits=DIGITS)
+
+
+def _worst_entry(measured: Certificate | BetweenNodes) -> str:
+    violations = measured.violations
+    worst = max(violations, key=lambda name: np.nan_to_num(violations[name], nan=np.inf))
+    name = f" ({worst.replace('_', ' ')})" if measured.worst != 0.0 else ""  # where all are equal
+    return f"worst entry {measured.worst:.1e}{name}"
+
+
+def _transition_lines(solution: Solution | AssemblySolution) -> list[str]:
+    units = solution.units
+    lines = [
+        f"{item.part}: {item.from_status} to {item.to_status} at {_vector(item.x, item.y, 'length', units)}, "
+        f"s = {_amount(item.s, 'length', units)}"
+        for item in solution.transitions[:_MANY_TRANSITIONS]
+    ]
+    n_more = len(solution.transitions) - len(lines)
+    if n_more > 0:
+        lines.append(f"and {n_more} more (--csv -)")
+    return lines or ["none"]
