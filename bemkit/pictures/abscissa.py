@@ -1,4 +1,4 @@
-"""What a contact is drawn over: x from left to right along horizontal lines, else the arc length."""
+"""Abscissa of pictures along a contact: x from left to right along horizontal lines, else the arc length."""
 
 from __future__ import annotations
 

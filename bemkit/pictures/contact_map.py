@@ -45,7 +45,7 @@ def draw_contact_map(solution: Result, axes: Axes | None = None, *, units: UnitN
     largest = float(pressure.max(initial=0.0))
     title = f"Contacts, pressure up to {amount(largest, 'stress', units)}\n{scene.title}"
     axes = plane_axes(axes, scene.frame, title, units)
-    draw_initial(axes, scene)
+    draw_initial(axes, scene, is_filled=True)
     set_frame(axes, scene.frame)
     draw_rigid_bodies(axes, scene, 0.0)
     draw_obstacles(axes, scene)

@@ -20,8 +20,8 @@ from bemkit.pictures.plane import set_frame
 from bemkit.pictures.shown import Shown
 from bemkit.scene.conditions import Contact
 
-_EDGE, _HATCH = "#555555", "#888888"
-_FILLED: dict[str, Any] = {"facecolor": "#EDEDED", "hatch": "////", "edgecolor": _EDGE, "linewidth": 1.0, "zorder": 0}
+_EDGE, _HATCH = "#555555", "#B0B0B0"
+_FILLED: dict[str, Any] = {"facecolor": "#EDEDED", "hatch": "//", "edgecolor": "#A8A8A8", "linewidth": 1.0, "zorder": 0}
 _BEFORE: dict[str, Any] = {"fill": False, "edgecolor": GREY, "linewidth": 1.0, "linestyle": "--", "zorder": 0}
 _POINTS_OF_CIRCLE, _POINTS_OF_SPAN, _POINTS_OF_GRID, _POINTS_OF_ELEMENT = 181, 12, 301, 5
 _BAND = 0.04

@@ -18,7 +18,7 @@ class _Body(Protocol):
 
 
 class _Result(Protocol):
-    """What is needed of a solution."""
+    """Needs of a solution."""
 
     @property
     def contact(self) -> ContactTable:
@@ -26,7 +26,7 @@ class _Result(Protocol):
 
     @property
     def contacts(self) -> tuple[ContactForce, ...]:
-        """What each contact transmits."""
+        """Forces of each contact."""
 
     @property
     def solved_bodies(self) -> Sequence[_Body]:

@@ -32,7 +32,7 @@ _SMALLEST = 1.0 / 8.0
 _CROWDED = 0.25
 """Distance of points of a layer, by that from the boundary, below which one of them represents all."""
 _GROWTH = 2.0
-"""Of the distances from the boundary, from one layer of points to the next."""
+"""Growth of the distances from the boundary, from one layer of points to the next."""
 _INTERVALS = (2, 2, 4, 8)
 """Intervals of straight elements of degrees 0, 1, 2 and more; curved elements have the most."""
 _MOST_DIVISIONS = 8

@@ -1,4 +1,4 @@
-"""What a summary says of a result: printed by the command line and by Python, shown by reports and notebooks."""
+"""Summary of a result in rows: printed by the command line and by Python, shown by reports and notebooks."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from bemkit.scene.unit_names import UnitNames, amount, unit_of
 from bemkit.solvers.fallbacks import drivers_at_work
 
 DIGITS = 8
-"""Of the numbers of a summary."""
+"""Digits of the numbers of a summary."""
 _MANY_TRANSITIONS, _MANY_CONTACTS = 6, 8
 
 

@@ -17,7 +17,7 @@ _MOST_SOLVES = 20
 
 @dataclass(frozen=True)
 class FirstYield:
-    """Where and under which load a body first yields.
+    """The load and the place at which a body first yields.
 
     Parameters
     ----------
