@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
 from bemkit.results.contact_table import ContactTable
-from bemkit.results.part_forces import ContactForce, PartForce
+
+if TYPE_CHECKING:
+    from bemkit.results.part_forces import ContactForce, PartForce
 
 
 class _Body(Protocol):
