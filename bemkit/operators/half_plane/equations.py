@@ -19,9 +19,6 @@ from bemkit.operators.hierarchy.interpolative import Block, Interpolation, sketc
 from bemkit.operators.hierarchy.skeletons import LevelView, Skeleton
 from bemkit.operators.material import Material
 
-_RANK = 36
-"""Guess of the rank of a leaf."""
-
 
 @dataclass(frozen=True, eq=False)
 class HalfPlaneEquations:
@@ -158,10 +155,8 @@ class StripView(LevelView):
         blocks = [Block(of.potentials(proxies, elements), np.ones(proxies.size))]
         if near.size:
             blocks.append(Block(of.logarithms(near, elements), np.sqrt(of.lengths[near])))
-        guess = self.guess(elements.size, np.append(near, elements), self.tolerance, 1)
-        if guess is not None and self.is_lowest:
-            guess = min(_RANK, elements.size)
-        found = sketched(blocks, np.sqrt(of.lengths[elements]), self.tolerance_at(cluster, elements), guess)
+        # all rows: random combinations of them would cost a digit of the tractions
+        found = sketched(blocks, np.sqrt(of.lengths[elements]), self.tolerance_at(cluster, elements), None)
         by_length = found.scaled(1.0 / of.lengths[elements])
         chosen = elements[found.skeleton]
         rows, columns = ((stride * chosen[:, None] + np.arange(2)).ravel() for stride in (2, 4))
