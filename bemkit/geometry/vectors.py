@@ -51,3 +51,11 @@ def check_magnitude(points: FloatArray, owner: str) -> None:
             f"{owner}: the boundary measures {size:.3g} and its coordinates reach {farthest:.3g}, the squares of which "
             f"overflow: choose a unit of length in which both lie between {SMALLEST:g} and {LARGEST:g}"
         )
+
+
+def components_before(stress: FloatArray, normals: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return sigma_nn, sigma_nt and sigma_tt (...) [Pa] of stresses (..., 2, 2) before unit normals (..., 2)."""
+    tangents = -turned_right(normals)
+    pairs = ((normals, normals), (normals, tangents), (tangents, tangents))
+    normal, shear, along = (np.einsum("...i,...ij,...j->...", one, stress, other) for one, other in pairs)
+    return normal, shear, along

@@ -11,7 +11,7 @@ from bemkit.arrays import FloatArray, IntArray
 from bemkit.errors import InputError
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.neighbours import along_boundary
-from bemkit.geometry.vectors import turned_right
+from bemkit.geometry.vectors import components_before
 from bemkit.results.boundary_stress import BoundaryStress
 from bemkit.results.stress_measures import STRESSES
 from bemkit.table import Column, Table
@@ -37,7 +37,7 @@ def side_stress(boundary: BoundaryStress, mesh: BoundaryMesh, part: str) -> Tabl
     stress, points = boundary.at(elements, xi), mesh.points(elements, xi).reshape(-1, 2)
     ends = np.cumsum(mesh.lengths[elements])
     s = (ends - mesh.lengths[elements])[:, None] + 0.5 * (1.0 + xi) * mesh.lengths[elements, None]
-    normal, shear, hoop = components(stress, mesh.normals_at(elements, xi))
+    normal, shear, hoop = components_before(stress, mesh.normals_at(elements, xi))
     columns = {
         "s": s,
         "x": points[:, 0],
@@ -48,14 +48,6 @@ def side_stress(boundary: BoundaryStress, mesh: BoundaryMesh, part: str) -> Tabl
         "von_mises": STRESSES["von-mises"].of(stress, boundary.material),
     }
     return Table.from_arrays(SIDE_COLUMNS, {name: np.ravel(values) for name, values in columns.items()})
-
-
-def components(stress: FloatArray, normals: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return sigma_nn, sigma_nt and sigma_tt (...) [Pa] of stresses (..., 2, 2) before unit normals (..., 2)."""
-    tangents = -turned_right(normals)
-    pairs = ((normals, normals), (normals, tangents), (tangents, tangents))
-    normal, shear, along = (np.einsum("...i,...ij,...j->...", one, stress, other) for one, other in pairs)
-    return normal, shear, along
 
 
 @dataclass(frozen=True)
@@ -82,7 +74,7 @@ def largest_stress(boundary: BoundaryStress, measure: str = "von-mises", part: s
     def values(some: IntArray, xi: FloatArray) -> FloatArray:
         stress = boundary.at(some, xi)
         if measure == HOOP:
-            return components(stress, mesh.normals_at(some, xi))[2]
+            return components_before(stress, mesh.normals_at(some, xi))[2]
         return STRESSES[measure].of(stress, boundary.material)
 
     if measure != HOOP and measure not in STRESSES:

@@ -12,10 +12,10 @@ from bemkit.arrays import FloatArray
 from bemkit.contact.certificate import Certificate
 from bemkit.errors import InputError
 from bemkit.geometry.local_values import values_on_elements
+from bemkit.geometry.vectors import components_before
 from bemkit.results.contact_table import CONTACT_COLUMNS
 from bemkit.results.load_history import step_rows
 from bemkit.results.resultants import part_facts
-from bemkit.results.side_stress import components
 from bemkit.results.solution import Solution
 from bemkit.results.solved_body import SolvedBody
 from bemkit.results.stress_measures import STRESSES
@@ -171,6 +171,6 @@ def _stresses(body: SolvedBody) -> dict[str, FloatArray]:
         "sigma_xx": stress[:, 0, 0],
         "sigma_yy": stress[:, 1, 1],
         "sigma_xy": stress[:, 0, 1],
-        "hoop": components(stress, mesh.normals_at(elements, centre)[:, 0])[2],
+        "hoop": components_before(stress, mesh.normals_at(elements, centre)[:, 0])[2],
         "von_mises": STRESSES["von-mises"].of(stress, body.scene.material),
     }

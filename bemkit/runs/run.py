@@ -128,7 +128,7 @@ def _cascade(scene: Stated) -> tuple[int, int] | None:
     if outline.surface is not None:
         return coarsest, ratio
     smaller = replace(scene, mesh=replace(scene.mesh, elements=max(_LARGE, few_on(outline))))
-    return (_COARSEST, ratio) if make_plan(smaller).is_compressed else None
+    return (coarsest, ratio) if make_plan(smaller).is_compressed else None
 
 
 def run_probe(scene: Stated, *, n_starts: int = 8, mesh: Meshes = None) -> tuple[Any, ...]:

@@ -30,10 +30,11 @@ def tables() -> tuple[PaperTable, PaperTable]:
 def test_the_mesh_is_the_papers() -> None:
     for number in (1, 2):
         model = paper_model(number)
-        assert model.nodes.nodes.size == 80
-        lengths = model.mesh.lengths[model.mesh.part("foundation")]
+        assert model.prepared.n_contact == 80
+        mesh = model.prepared.bodies[0].mesh
+        lengths = mesh.lengths[mesh.part("foundation")]
         np.testing.assert_allclose(lengths, lengths[0], rtol=1e-12)
-        assert model.mesh.n_elements == 320
+        assert mesh.n_elements == 320
 
 
 def test_example_1_is_constant_where_the_print_is(tables: tuple[PaperTable, PaperTable]) -> None:

@@ -219,7 +219,7 @@ class CollocationEquations:
                 np.arange(elements.size)[:, None], np.full((elements.size, 1, 1), -1.0 + 0j), columns
             )
         touched, at = np.unique(self.acted_on[elements], return_inverse=True)
-        return touched, Unknowns(at.reshape(elements.size, -1), self.reconstruction[elements], columns)
+        return touched, Unknowns(at.reshape(self.acted_on[elements].shape), self.reconstruction[elements], columns)
 
 
 def distinct(numbers: IntArray) -> tuple[IntArray, IntArray]:

@@ -212,7 +212,7 @@ def test_the_hierarchy_inverts_the_single_layer_on_waves() -> None:
 
 
 @pytest.mark.parametrize(
-    ("options", "words"), [((1e-12,), "give 1e-11"), ((1e-9,), "to 3e-10"), ((1e-10, 0), "max_steps is 0")]
+    ("options", "words"), [((1e-12,), "from 1e-11"), ((1e-9,), "to 3e-10"), ((1e-10, 0), "max_steps is 0")]
 )
 def test_options_out_of_range(options: tuple[float, int], words: str) -> None:
     with pytest.raises(ValueError, match=words):
@@ -221,8 +221,8 @@ def test_options_out_of_range(options: tuple[float, int], words: str) -> None:
 
 def test_no_stiffness_is_condensed_without_stored_equations() -> None:
     scene = paper(1, bk.ConstantCollocation(), replace(paper(1).mesh, elements=240))
-    given = prepare(scene, scene.build_mesh())
-    elastic = HierarchicalCollocation(given.mesh.unit, given.material, bk.MatrixFree())
+    given = prepare(scene, scene.build_mesh()).bodies[0]
+    elastic = HierarchicalCollocation(given.own_mesh.unit, given.material, bk.MatrixFree())
     with pytest.raises(
         bk.errors.InputError, match="MatrixFree forms no stiffness: condense this body with Hierarchical"
     ):

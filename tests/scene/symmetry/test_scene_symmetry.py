@@ -163,6 +163,6 @@ def test_images_need_symmetric_local_nodes() -> None:
             return np.array([-1.0, 0.5])
 
     with pytest.raises(
-        GeometryError, match=r"Lopsided has the local nodes \[-1.0, 0.5\], which an image does not share"
+        GeometryError, match=r"Lopsided has the local nodes \[-1.0, 0.5\], which its image does not have"
     ):
         list(element_images(Lopsided(square(symmetry=HALF).build_mesh())))

@@ -44,5 +44,5 @@ def test_wrong_degrees_are_named() -> None:
         options(degrees="2.5").runs(scene)
     with pytest.raises(ValueError, match="degree is 13: give a whole number from 1 to 12"):
         options(degrees="13").runs(scene)
-    with pytest.raises(StudyError, match=r"nothing to run: .* and with 'hp' adaptive ones"):
+    with pytest.raises(StudyError, match=r"no run is possible: .* and with 'hp' adaptive ones"):
         options(degrees="hp", meshes="uniform").runs(scene)
