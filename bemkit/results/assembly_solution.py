@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple, cast
@@ -147,11 +147,13 @@ class AssemblySolution(SolvedProblem):
         """Energy [J/m] to which squared errors in the energy norm are relative; see `SolvedBody.error_unit`."""
         return sum(body.error_unit for body in self.bodies.values())
 
-    def _measured_between(self, motion: SlipHistory | None) -> dict[str, BetweenNodes]:
+    def _measured_between(
+        self, motion: SlipHistory | None, names: Collection[str] | None = None
+    ) -> dict[str, BetweenNodes]:
         from bemkit.results.between_bodies import violations_between_bodies  # mortars, which single bodies lack
 
         return violations_between_bodies(
-            self.assembly, self.bodies, self.contact_sides, self.rigid, self.contact, motion
+            self.assembly, self.bodies, self.contact_sides, self.rigid, self.contact, motion, names
         )
 
     def contact_elements(self, body: str) -> IntArray:

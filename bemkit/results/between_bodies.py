@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
 from typing import NamedTuple
@@ -40,12 +40,12 @@ _LIGHTEST = 1e-3
 
 
 class _Measured(NamedTuple):
-    """A contact of an assembly, the elastic bodies that it joins, its law, and points of it."""
+    """A contact of an assembly, the elastic bodies that it joins, its law, and what measures points of it."""
 
     name: str
     bodies: tuple[str, ...]
     law: FrictionLaw
-    values: PointsBetween
+    measure: Callable[[], PointsBetween]
 
 
 def violations_between_bodies(
@@ -55,6 +55,7 @@ def violations_between_bodies(
     rigid: Mapping[str, RigidResult],
     contact: ContactTable,
     motion: SlipHistory | None = None,
+    names: Collection[str] | None = None,
 ) -> dict[str, BetweenNodes]:
     """Measure displacements and tractions of an assembly along its contacts, without running anything again.
 
@@ -70,6 +71,8 @@ def violations_between_bodies(
     contact : ContactTable
     motion : SlipHistory, optional
         Of the contact nodes, for laws that depend on slip or time.
+    names : collection of str, optional
+        The contacts to measure; by default all. What they are relative to comes from all in either case.
 
     Returns
     -------
@@ -83,8 +86,7 @@ def violations_between_bodies(
     contact that carries less, and lengths to the displacement of the softer one, so that a light block is not judged by
     the heaviest. Without any contact force lengths are relative to the larger displacement of the two.
     """
-    with np.errstate(all="ignore"):  # results that are not finite are measured by nan
-        stated = [*_at_obstacles(assembly, bodies, rigid), *_at_bodies(assembly, bodies, sides)]
+    stated = [*_at_obstacles(assembly, bodies, rigid), *_at_bodies(assembly, bodies, sides)]
     forces = {name: 0.0 for name in bodies}
     stresses = dict(forces)
     size = np.hypot(contact.sigma_n, contact.sigma_t)
@@ -95,12 +97,15 @@ def violations_between_bodies(
             stresses[body] = max(stresses[body], float(size[rows].max(initial=0.0)))
     violations: dict[str, BetweenNodes] = {}
     moved = {name: float(np.abs(body.boundary.displacement).max()) for name, body in bodies.items()}
-    for name, partners, law, values in stated:
+    for name, partners, law, measure in stated:
+        if names is not None and name not in names:
+            continue
         modulus = min(bodies[body].scene.material.plane_modulus for body in partners)
         force, stress = (
             max(min(of[body] for body in partners), _LIGHTEST * max(of.values())) for of in (forces, stresses)
         )
         with np.errstate(all="ignore"):  # results that are not finite are measured by nan
+            values = measure()
             violations[name] = violations_at(
                 values,
                 law_between(law, values, contact, name, motion),
@@ -135,8 +140,8 @@ def _at_obstacles(
         for part_name, rivals in facing.items():
             samples = [sample for _, _, sample in rivals]
             for k, (name, law, _) in enumerate(rivals):
-                values = with_least_clearances(nearest_only(samples, k), mesh.part(part_name).size, xi)
-                yield _Measured(name, (owner,), law, values)
+                sample, n_elements = nearest_only(samples, k), mesh.part(part_name).size
+                yield _Measured(name, (owner,), law, partial(with_least_clearances, sample, n_elements, xi))
 
 
 def _moved(stated: RigidBody, motion: RigidResult, points: FloatArray) -> FloatArray:
@@ -150,16 +155,21 @@ def _at_bodies(
     """Yield the contacts between elastic bodies, the tractions of both sides one after the other."""
     placements = {body.name: body.placement for body in assembly.placed_bodies}
     known: dict[Hashable, _Facing] = {}
-    for pair in assembly.elastic_contacts:
-        names, parts = zip(*sides[pair.name], strict=True)
+
+    def measured(pair: ContactPair, names: tuple[str, str], parts: tuple[str, str]) -> PointsBetween:
         one, two = (solved[name] for name in names)
         reach = reach_of(pair, one.mesh, two.mesh)
         alike = stand_alike((one.mesh, placements[names[0]]), (two.mesh, placements[names[1]]), reach)
         key = (alike, parts)
         if key not in known:
             known[key] = _Facing.of((one, two), parts, placements[names[0]], reach)
-        values = known[key].values((one, two), placements[names[0]], pair.gap)
-        yield _Measured(pair.name, names, assembly.law_of(pair), values)
+        return known[key].values((one, two), placements[names[0]], pair.gap)
+
+    for pair in assembly.elastic_contacts:
+        (one, part), (two, other) = sides[pair.name]
+        yield _Measured(
+            pair.name, (one, two), assembly.law_of(pair), partial(measured, pair, (one, two), (part, other))
+        )
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -96,7 +96,10 @@ class BetweenNodes:
 
 
 def violations_between_nodes(
-    body: SolvedBody, contact: ContactTable, motion: SlipHistory | None = None
+    body: SolvedBody,
+    contact: ContactTable,
+    motion: SlipHistory | None = None,
+    names: Collection[str] | None = None,
 ) -> dict[str, BetweenNodes]:
     """Measure the displacements and tractions of one body along its contact parts, without running anything again.
 
@@ -106,6 +109,8 @@ def violations_between_nodes(
     contact : ContactTable
     motion : SlipHistory, optional
         Of the contact nodes, for laws that depend on slip or time; interpolated between them.
+    names : collection of str, optional
+        The contact parts to measure; by default all.
 
     Returns
     -------
@@ -125,6 +130,8 @@ def violations_between_nodes(
     length = force / scene.material.plane_modulus or float(np.abs(body.boundary.displacement).max()) or 1.0
     violations = {}
     for part in scene.parts:
+        if names is not None and part.name not in names:
+            continue
         if isinstance(part.condition, Contact) and (elements := mesh.part(part.name)).size:  # none beyond a symmetry
             with np.errstate(all="ignore"):  # results that are not finite are measured by nan
                 sample = sample_at_obstacle(body, part.condition.obstacle, elements)

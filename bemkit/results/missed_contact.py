@@ -31,7 +31,8 @@ def with_missed_contact_named(solution: AnySolution) -> AnySolution:
         return solution
     if solution.wrongly_free:
         name, (x, y) = next(iter(solution.wrongly_free.items()))
-        depth = amount(solution.contacts_between_nodes[name].penetration_depth, "length", solution.units, 2)
+        between = solution.between_nodes_of({name})[name]
+        depth = amount(between.penetration_depth, "length", solution.units, 2)
         words = f"Contact {name!r} overlaps by {depth} at ({x:.4g}, {y:.4g})."
     elif apart := _pressed_apart(solution):
         words = f"Contact {apart[0]!r} has a force, but its sides touch nowhere."
@@ -45,5 +46,5 @@ def _pressed_apart(solution: SolvedProblem) -> list[str]:
     """Return the contacts between elastic bodies with a force whose sides touch nowhere."""
     table = solution.contact
     n_pressed = {name: np.count_nonzero(table.sigma_n[table.rows(name)]) for name in table.parts}
-    narrow = [name for name, n in n_pressed.items() if 0 < n <= _FEW and solution.n_sides(name) > 1]
-    return [name for name in narrow if solution.contacts_between_nodes[name].apart > LARGEST_APART]
+    narrow = {name for name, n in n_pressed.items() if 0 < n <= _FEW and solution.n_sides(name) > 1}
+    return [name for name, each in solution.between_nodes_of(narrow).items() if each.apart > LARGEST_APART]

@@ -6,6 +6,7 @@ anticlockwise boundary, traction = stress @ n; a pressed contact has sigma_n <= 
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, cast
@@ -174,8 +175,10 @@ class Solution(SolvedProblem, SolvedBody):
 
         return tuple(zone_end(self.mesh, self.contact, each.place) for each in slip_reversals(self.contact))
 
-    def _measured_between(self, motion: SlipHistory | None) -> dict[str, BetweenNodes]:
-        return violations_between_nodes(self, self.contact, motion)
+    def _measured_between(
+        self, motion: SlipHistory | None, names: Collection[str] | None = None
+    ) -> dict[str, BetweenNodes]:
+        return violations_between_nodes(self, self.contact, motion, names)
 
     def _parts(self) -> dict[str, Any]:
         return {

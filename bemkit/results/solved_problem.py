@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -96,8 +96,13 @@ class SolvedProblem(Explorable):
         """The elastic bodies, one or several."""
         raise NotImplementedError
 
-    def _measured_between(self, motion: SlipHistory | None) -> dict[str, BetweenNodes]:
-        """Return the violations between the nodes of each contact; `motion` is for laws that depend on slip."""
+    def _measured_between(
+        self, motion: SlipHistory | None, names: Collection[str] | None = None
+    ) -> dict[str, BetweenNodes]:
+        """Return the violations between the nodes of some contacts, of all without names.
+
+        `motion` is for laws that depend on slip.
+        """
         raise NotImplementedError
 
     def corners_of(self, body: SolvedBody) -> tuple[SingularCorner, ...]:
@@ -208,7 +213,17 @@ class SolvedProblem(Explorable):
     @cached_property
     def contacts_between_nodes(self) -> dict[str, BetweenNodes]:
         """Largest violations between the nodes of each contact, by its name in the contact table."""
-        return self._measured_between(None if self.loading is None else self.loading.motion)
+        return self._measured_between(self._motion)
+
+    @property
+    def _motion(self) -> SlipHistory | None:
+        return None if self.loading is None else self.loading.motion
+
+    def between_nodes_of(self, names: Collection[str]) -> dict[str, BetweenNodes]:
+        """Return the largest violations between the nodes of some contacts; the others are not measured for it."""
+        if "contacts_between_nodes" in vars(self):
+            return {name: each for name, each in self.contacts_between_nodes.items() if name in names}
+        return self._measured_between(self._motion, names) if names else {}
 
     @cached_property
     def missed_contacts(self) -> dict[str, tuple[float, float]]:
@@ -217,9 +232,8 @@ class SolvedProblem(Explorable):
 
     @cached_property
     def wrongly_free(self) -> dict[str, tuple[float, float]]:
-        """The missed contacts without any force; nothing is measured if each contact has a force."""
-        free = free_contacts(self.contact)
-        return {name: place for name, place in self.missed_contacts.items() if name in free} if free else {}
+        """The missed contacts without any force; those with a force are not measured for it."""
+        return missed_contacts(self.contact, self.between_nodes_of(free_contacts(self.contact)))
 
     @property
     def unasked_warnings(self) -> Any:
