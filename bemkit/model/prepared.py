@@ -344,8 +344,8 @@ def prepare_steps(scenes: Sequence[Stated], meshes: Meshes = None) -> tuple[Prep
     later = tuple(first.under(step) for step in steps[1:])
     if later:  # what later steps give decides how much of the compressed equations is kept
         pairs = [(body, tuple(step.bodies[k].map_data for step in later)) for k, body in enumerate(first.bodies)]
-        told = (replace(body, conditions=replace(body.conditions, later=data)) for body, data in pairs)
-        first = replace(first, bodies=tuple(told))
+        informed = (replace(body, conditions=replace(body.conditions, later=data)) for body, data in pairs)
+        first = replace(first, bodies=tuple(informed))
     return (first, *later)
 
 
