@@ -10,8 +10,8 @@ from bemkit.pictures.shown import Result
 from bemkit.plan import Plan
 from bemkit.report.html import Element, element, facts, number, table
 from bemkit.results.tables import history_columns
-from bemkit.scene.serialisation import UnstructureError
 from bemkit.scene.toml import SceneError, scene_to_toml
+from bemkit.scene.written_tables import UnstructureError
 from bemkit.version import __version__
 
 _MOST_ROWS = 200

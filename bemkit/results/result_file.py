@@ -66,8 +66,9 @@ from bemkit.results.step_group import (
 from bemkit.scene.assembly import Assembly
 from bemkit.scene.load_history import load_steps
 from bemkit.scene.scene import Scene
-from bemkit.scene.serialisation import structure, unstructure
+from bemkit.scene.serialisation import structure
 from bemkit.scene.toml import MAX_BYTES, SceneError, scene_from_toml, scene_to_toml
+from bemkit.scene.written_tables import unstructure
 from bemkit.sealed_file import GrowingFile
 from bemkit.solvers.base import Status
 

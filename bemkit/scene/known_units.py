@@ -89,3 +89,9 @@ def name_of_force(length: str, stress: str) -> str:
     names = ("N", "kN", "MN", "mN", "lbf", "kip")
     per_length = {f"{name}/{length}": read_unit(f"{name}/{length}").factor for name in names}
     return next((name for name, own in per_length.items() if math.isclose(own, size, rel_tol=1e-9)), "")
+
+
+def length_in_metres(name: str) -> float | None:
+    """Return the size of a unit of length by its name; None if that names no known length."""
+    unit = _UNITS.get(name)
+    return unit.factor if unit is not None and unit.powers == (0, 1, 0, 0, 0) else None

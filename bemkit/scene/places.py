@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields, is_dataclass, replace
+from functools import partial
 from types import UnionType
 from typing import Any, TypeVar, Union, cast, get_args, get_origin
 
@@ -17,6 +18,7 @@ from bemkit.scene.conditions import Part
 from bemkit.scene.declared_types import hints_of
 from bemkit.scene.plane_motion import RigidBody
 from bemkit.scene.registry import SYNONYMS
+from bemkit.scene.unit_names import UnitNames
 
 _NAME = r'(?:"[^"]+"|[^.\[\]"=\s]+)'
 _PLACE = re.compile(rf"{_NAME}(?:\.{_NAME}|\[\d+\])*")
@@ -126,34 +128,27 @@ def with_value(scene: Node, place: Place, value: object) -> Node:
     PlaceError
         If there is no such place, or the value does not fit there.
     """
-    changed: Node = _replaced(scene, type(scene), place.names, _without_unit(scene, place, value), "")
+    fitting = partial(_fitting, value, cast(Any, scene).units)
+    changed: Node = _replaced(scene, type(scene), place.names, fitting, "", None)
     return changed
 
 
-def _without_unit(scene: Any, place: Place, value: object) -> object:
-    """Return a number with a unit as a number in the units of the scene, every other value as it is."""
-    *outer, name = place.names
-    if not isinstance(value, str) or isinstance(name, int):
-        return value
-    owner, declared, path = scene, cast(Any, type(scene)), ""
-    for each in outer:
-        owner, declared, path = _inside(owner, declared, each, path)
-    if not is_dataclass(owner):
-        return value
-    from bemkit.scene.quantities import in_units_of_scene
-
-    try:
-        return in_units_of_scene(value, cast(type, type(owner)), name, scene.units)
-    except InputError as error:
-        raise PlaceError(f"{place.text}: {error}") from error
-
-
-def _replaced(node: Any, declared: Any, names: tuple[str | int, ...], value: object, path: str) -> Any:
+def _replaced(
+    node: Any,
+    declared: Any,
+    names: tuple[str | int, ...],
+    fitting: Callable[[Any, str, tuple[type, str] | None], Any],
+    path: str,
+    field: tuple[type, str] | None,
+) -> Any:
+    """Return an object with another value at a place inside; `field`: class and name of the field it is in."""
     if not names:
-        return _fitting(value, declared, path)
+        return fitting(declared, path, field)
     name, rest = names[0], names[1:]
     inner, inner_declared, inner_path = _inside(node, declared, name, path)
-    changed = _replaced(inner, inner_declared, rest, value, inner_path)
+    if is_dataclass(node):
+        field = type(node), str(name)
+    changed = _replaced(inner, inner_declared, rest, fitting, inner_path, field)
     if isinstance(node, Mapping):
         return {**node, name: changed}
     if isinstance(node, np.ndarray):
@@ -169,14 +164,14 @@ def _replaced(node: Any, declared: Any, names: tuple[str | int, ...], value: obj
         raise PlaceError(f"{path}: {error}" if path else str(error)) from error
 
 
-def _fitting(value: object, declared: Any, path: str) -> Any:
-    """Return a value in the type that the place has."""
+def _fitting(value: object, units: UnitNames | None, declared: Any, path: str, field: tuple[type, str] | None) -> Any:
+    """Return a value in the type that the place has, a number with a unit in the units of the scene."""
     if not isinstance(value, bool | int | float | str | list | dict):
         return value
     from bemkit.scene.serialisation import StructureError, structure  # heavy, and only for scenes that change
 
     try:
-        return structure(value, declared)
+        return structure(value, declared, units, field)
     except StructureError as error:
         raise PlaceError(f"{path}: {error}") from error
 

@@ -22,7 +22,7 @@ from bemkit.scene.declared_types import default_of, heading_of, hints_of, is_req
 from bemkit.scene.docstrings import parameters, summary
 from bemkit.scene.registry import RISING, Registry
 from bemkit.scene.scene import Scene
-from bemkit.scene.serialisation import unstructure
+from bemkit.scene.written_tables import unstructure
 
 _QUANTITY = r"^\s*[+-]?[\d.]+([eE][+-]?\d+)?\s*[^\d\s.,]"
 """A number with a unit."""

@@ -1,4 +1,4 @@
-"""Plain tables (from TOML) to frozen dataclasses and back, each way one plain recursion over the declared types.
+"""Plain tables (from TOML) to frozen dataclasses, one plain recursion over the declared types.
 
 A class that a word names is the word itself (``solver = "semismooth-newton"``) or a table with its options
 (``{ kind = "tresca", bound_value = 0.5 }``). All mistakes of a table are found in one pass.
@@ -9,8 +9,8 @@ from __future__ import annotations
 import math
 import re
 import types
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import Field, dataclass, fields, is_dataclass, replace
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, fields, is_dataclass, replace
 from enum import Enum
 from functools import cache
 from typing import Any, TypeVar, cast, get_args, get_origin
@@ -18,12 +18,11 @@ from typing import Any, TypeVar, cast, get_args, get_origin
 import numpy as np
 
 from bemkit.arrays import FloatArray
-from bemkit.contact.laws import FrictionLaw
 from bemkit.errors import InputError
 from bemkit.formulas import Expression, closest, nearest, shorten
-from bemkit.scene.declared_types import default_of, heading_of, hints_of, is_required, options_of, registry_of
+from bemkit.scene.declared_types import heading_of, hints_of, is_required, options_of, registry_of
 from bemkit.scene.quantities import in_units_of_scene
-from bemkit.scene.registry import LAWS, SYNONYMS, Registry
+from bemkit.scene.registry import SYNONYMS, Registry
 from bemkit.scene.unit_names import UnitNames
 
 T = TypeVar("T")
@@ -59,11 +58,9 @@ class StructureError(InputError):
         return StructureError, (self.mistakes,)
 
 
-class UnstructureError(InputError):
-    """An object that cannot be written as a table."""
-
-
-def structure(table: object, declared: type[T], units: UnitNames | None = None) -> T:
+def structure(
+    table: object, declared: type[T], units: UnitNames | None = None, field: tuple[type, str] | None = None
+) -> T:
     """Turn a table into an object.
 
     Parameters
@@ -72,6 +69,8 @@ def structure(table: object, declared: type[T], units: UnitNames | None = None) 
     declared : type
     units : UnitNames, optional
         Those of the scene, to which numbers with units such as ``"210 GPa"`` are converted.
+    field : (type, str), optional
+        The class and the name of the field that the table is the value of, whose docstring states its unit.
 
     Returns
     -------
@@ -83,96 +82,9 @@ def structure(table: object, declared: type[T], units: UnitNames | None = None) 
         With all mistakes, each naming the key, the value and the remedy.
     """
     try:
-        return cast(T, _structured(table, declared, _Place("", units)))
+        return cast(T, _structured(table, declared, _Place("", units, field)))
     except RecursionError:
         raise StructureError(["nested too deeply: simplify it"]) from None
-
-
-def unstructure(value: Any, declared: Any = None, path: str = "", *, keep_defaults: bool = False) -> Any:
-    """Turn an object into numbers, texts, lists and tables, without keys that have their default value.
-
-    Parameters
-    ----------
-    value : object
-    declared : type
-        The type under which the object is held: decides whether its class must be named by a word.
-    path : str
-        Where the object is, for messages.
-    keep_defaults : bool
-        Whether the object's own fields are written even where they have their default value.
-
-    Returns
-    -------
-    dict, list, str, number or bool
-
-    Raises
-    ------
-    UnstructureError
-        If there is a Python function inside, or an object of a class without a word.
-    """
-    if isinstance(value, Expression):
-        return value.text
-    if isinstance(value, Enum):
-        return value.value
-    if isinstance(value, bool | int | float | str):
-        return value
-    if isinstance(value, np.ndarray | np.generic):
-        return value.tolist()
-    if isinstance(value, tuple | list):
-        inner = get_args(declared)[0] if get_args(declared) else None
-        return [unstructure(item, inner, f"{path}[{index}]") for index, item in enumerate(value)]
-    if isinstance(value, Mapping):
-        inner = get_args(declared)[1] if get_args(declared) else None
-        return {key: unstructure(item, inner, f"{path}.{key}") for key, item in value.items()}
-    if is_dataclass(value):
-        return _unstructure_dataclass(_without_file(value), declared, path, keep_defaults)
-    if callable(value):
-        raise UnstructureError(f"{path}: a Python function cannot be written to TOML: use Expression('...') instead")
-    raise UnstructureError(
-        f"{path}: {shorten(repr(value))} cannot be written to TOML: use numbers, texts or Expression"
-    )
-
-
-def _without_file(value: Any) -> Any:
-    """Return the shape that a file holds instead of the file, so that the text does not depend on the file."""
-    from bemkit.geometry.files.shape_file import ShapeFile  # heavy, and only needed for writing
-
-    return value.shape if isinstance(value, ShapeFile) else value
-
-
-def _unstructure_dataclass(value: Any, declared: Any, path: str, keep_defaults: bool) -> Any:
-    hints = hints_of(cast(type, type(value)))
-    prefix = f"{path}." if path else ""
-    table = {
-        entry.name: unstructure(content, hints[entry.name], prefix + entry.name)
-        for entry, content in _written_fields(value, keep_defaults)
-    }
-    registry = LAWS if isinstance(value, FrictionLaw) else registry_of(declared)
-    if registry is None:
-        return table
-    try:
-        kind = registry.kind_of(value)
-    except InputError as error:
-        raise UnstructureError(f"{path}: {error}") from error
-    if table and kind == registry.listed:
-        return next(iter(table.values()))
-    return registry.written(kind, table)
-
-
-def _written_fields(value: Any, keep_defaults: bool) -> Iterator[tuple[Field[Any], Any]]:
-    for entry in fields(value):
-        content = getattr(value, entry.name)
-        # the number of elements is always written, so that a file states how fine its mesh is
-        is_kept = keep_defaults or entry.name == "elements" or not _is_default(content, entry)
-        if entry.init and content is not None and is_kept:
-            yield entry, content
-
-
-def _is_default(content: object, entry: Field[Any]) -> bool:
-    if is_required(entry):
-        return False
-    default = default_of(entry)
-    return type(content) is type(default) and bool(np.all(content == default))
 
 
 @dataclass(frozen=True)

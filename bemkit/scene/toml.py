@@ -19,9 +19,10 @@ from bemkit.scene.load_history import load_steps
 from bemkit.scene.mesh_options import MeshOptions
 from bemkit.scene.registry import FILE_KINDS, RISING, SOLVERS
 from bemkit.scene.scene import Scene
-from bemkit.scene.serialisation import StructureError, UnstructureError, structure, unstructure
+from bemkit.scene.serialisation import StructureError, structure
 from bemkit.scene.steps import Stated
 from bemkit.scene.unit_names import UnitNames
+from bemkit.scene.written_tables import UnstructureError, unstructure
 from bemkit.solvers.base import ContactSolver
 from bemkit.solvers.fallbacks import Fallbacks
 

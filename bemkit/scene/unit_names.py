@@ -2,17 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, fields
-from types import MappingProxyType
 
 from bemkit.errors import InputError
-from bemkit.scene.known_units import name_of_force
+from bemkit.scene.known_units import length_in_metres, name_of_force
 
 _LONGEST = 24
-_METRES: Mapping[str, float] = MappingProxyType(
-    {"um": 1e-6, "mm": 1e-3, "cm": 1e-2, "in": 0.0254, "ft": 0.3048, "m": 1.0, "km": 1e3}
-)
 
 
 @dataclass(frozen=True)
@@ -80,9 +75,10 @@ def with_unit(label: str, quantity: str, units: UnitNames | None) -> str:
 
 def check_length_of_file(stated: str, units: UnitNames) -> None:
     """Raise if the file of a shape states another unit of length than a scene; empty is no statement."""
-    if stated not in _METRES or units.length not in _METRES or stated == units.length:
+    of_file, of_scene = length_in_metres(stated), length_in_metres(units.length)
+    if of_file is None or of_scene is None or stated == units.length:
         return
-    factor = _METRES[stated] / _METRES[units.length]
+    factor = of_file / of_scene
     raise InputError(
         f"units.length is {units.length!r}, but the file of the shape is in {stated!r}: give the shape scale = "
         f"{factor:.10g}, or scale = 1 to take its numbers as they are"
