@@ -4,8 +4,9 @@ import zlib
 
 import numpy as np
 
-from bemkit.contact.condensation.direct_body import condensed_body
+from bemkit.contact.condensation.direct_body import DirectBody
 from bemkit.contact.condensation.nodes import ContactNodes, contact_conditions, contact_frame, nodes_on
+from bemkit.contact.condensation.whole_body import WholeBody
 from bemkit.contact.laws import Coulomb
 from bemkit.contact.problem import ContactProblem, ContactState, DenseBody, LinearBody
 from bemkit.geometry.local_values import dof_weights
@@ -23,6 +24,13 @@ def condense(elastic, supports, candidates, force):
     """Reduce an elastic body with supports to those of the candidates that can touch."""
     conditions, contact = contact_conditions(elastic.displacement_space, supports, candidates)
     return condensed_body(elastic, conditions, contact, force)
+
+
+def condensed_body(elastic, conditions, contact, force):
+    """Reduce a body to contact nodes and the conditions that `contact_conditions` has found for them."""
+    condensed = elastic.condense(conditions, force)
+    whole = WholeBody.of(elastic.displacement_space, condensed, conditions, force)
+    return DirectBody.of(whole, contact, elastic.material.plane_modulus)
 
 
 def block_stiffness(n, poisson_ratio):

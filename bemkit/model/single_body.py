@@ -38,9 +38,7 @@ def is_single(prepared: Prepared) -> bool:
 
 def _check_without_nodes(prepared: Prepared) -> None:
     if prepared.scene.contacts or any(body.scene.contact_parts for body in prepared.bodies):
-        raise NoContactNodesError(
-            "supports fix every node of the contact boundary: use more elements, or restrict the supports"
-        )
+        raise NoContactNodesError
     if len(prepared.bodies) > 1:
         raise InputError("no two bodies are in contact: list contacts, or solve each body as a scene of its own")
 

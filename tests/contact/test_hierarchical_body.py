@@ -9,7 +9,6 @@ import pytest
 
 import bemkit as bk
 from bemkit.contact.body import ContactState, SingularResponse
-from bemkit.contact.condensation.direct_body import condensed_body
 from bemkit.contact.condensation.hierarchical_body import HierarchicalBody, hierarchical_body
 from bemkit.contact.condensation.nodes import NoContactNodesError, contact_conditions
 from bemkit.contact.conditions import separated, stick
@@ -26,6 +25,7 @@ from bemkit.operators.linear.solvers import DenseCholesky, Hierarchical
 from bemkit.operators.steklov_poincare.hierarchical import HierarchicalCollocation
 from bemkit.operators.steklov_poincare.nodal_conditions import Support
 from bemkit.testing import check_body
+from tests.handmade import condensed_body
 from tests.scenes import Perforated, paper, squeezed, wavy
 from tests.slow import slow_except
 

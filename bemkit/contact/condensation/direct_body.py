@@ -13,11 +13,11 @@ from bemkit.arrays import FloatArray
 from bemkit.contact.body import ContactState
 from bemkit.contact.condensation.dense_body import DenseBody
 from bemkit.contact.condensation.node_coupling import NodeCoupling
-from bemkit.contact.condensation.nodes import ContactNodes, NoContactNodesError
+from bemkit.contact.condensation.nodes import ContactNodes
 from bemkit.contact.condensation.whole_body import WholeBody
 from bemkit.contact.equilibrium import Imbalance
 from bemkit.operators.counts import OperationCounts
-from bemkit.operators.steklov_poincare import CondensedMap, SteklovPoincare
+from bemkit.operators.steklov_poincare import CondensedMap
 from bemkit.operators.steklov_poincare.forces_inside import ForcesInside
 from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions
 
@@ -108,39 +108,3 @@ def _prescribed(conditions: NodalConditions, nodes: ContactNodes) -> FloatArray:
     fixed = np.where(conditions.is_fixed, conditions.displacement, 0.0)[nodes.nodes]
     given = np.einsum("nkc,nk->nc", conditions.frame[nodes.nodes], fixed)
     return np.asarray(np.einsum("nkc,nc->nk", nodes.frame, given)).ravel()
-
-
-def condensed_body(
-    elastic: SteklovPoincare,
-    conditions: NodalConditions,
-    contact: ContactNodes,
-    force: FloatArray,
-    modes: FloatArray | None = None,
-) -> DirectBody:
-    """Reduce a body to its contact boundary.
-
-    Parameters
-    ----------
-    elastic : SteklovPoincare
-    conditions : NodalConditions
-    contact : ContactNodes
-        Both as `contact_conditions` has found them.
-    force : (n_nodes, 2) array [N/m]
-        Given nodal forces.
-    modes : (n_motions, n_nodes, 2) array, optional
-        The `free_modes` of the conditions, where they are known.
-
-    Raises
-    ------
-    NoContactNodesError
-        If supports leave no node of the contact boundary free to move towards the obstacle.
-    SingularMatrixError
-        If even tied contact does not hold the body.
-    """
-    condensed = elastic.condense(conditions, force)
-    if not contact.nodes.size:
-        raise NoContactNodesError(
-            "supports fix every node of the contact boundary: use more elements, or restrict the supports"
-        )
-    whole = WholeBody.of(elastic.displacement_space, condensed, conditions, force, modes)
-    return DirectBody.of(whole, contact, elastic.material.plane_modulus)

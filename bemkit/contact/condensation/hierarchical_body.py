@@ -379,8 +379,6 @@ def hierarchical_body(
         If supports leave no node of the contact boundary free to move towards the obstacle.
     """
     if not contact.nodes.size:
-        raise NoContactNodesError(
-            "supports fix every node of the contact boundary: use more elements, or restrict the supports"
-        )
+        raise NoContactNodesError
     loaded = LoadedSystem.of(elastic, *_left_of(conditions, force, inside))
     return HierarchicalBody(loaded, contact, conditions, force, inside)

@@ -22,6 +22,12 @@ which contact there is left to the support: it would have to slide a thousand ti
 class NoContactNodesError(InputError):
     """A contact boundary whose nodes are all held by supports."""
 
+    def __init__(
+        self,
+        message: str = "supports fix every node of the contact boundary: use more elements, or restrict the supports",
+    ) -> None:
+        super().__init__(message)
+
 
 @dataclass(frozen=True, eq=False)
 class ContactNodes:

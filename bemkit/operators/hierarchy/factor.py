@@ -272,11 +272,6 @@ class Factor:
         return self._of_border(replace(root, of_loads=root.of_loads - self.border_load[:, None]))[:, 0]
 
     @property
-    def is_current(self) -> bool:
-        """Whether the factors are those of the laws: `update` has come and met no error."""
-        return not self._stale
-
-    @property
     def n_bytes(self) -> int:
         """Memory of all factors [bytes]."""
         return sum(each.n_bytes for level in self._levels for each in level if each is not None)

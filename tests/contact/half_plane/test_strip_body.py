@@ -9,12 +9,12 @@ import pytest
 
 import bemkit as bk
 from bemkit.contact.body import ContactState, SingularResponse
-from bemkit.contact.condensation.direct_body import condensed_body
 from bemkit.contact.conditions import separated, slip, stick
 from bemkit.contact.half_plane.strip_body import StripBody
 from bemkit.model.model import build_model
 from bemkit.model.prepared import prepare
 from bemkit.testing import check_body
+from tests.handmade import condensed_body
 
 DRIVES = {
     "at rest": None,
