@@ -70,6 +70,12 @@ def protect_formulas(*event: object) -> None:
     lines[:] = as_restructured_text(lines)
 
 
+def skip_what_matplotlib_writes(*event: object) -> bool | None:
+    """Skip the method ``set`` that matplotlib writes into each subclass of its figures, with markup of its own."""
+    member = event[3]
+    return True if getattr(member, "__module__", None) == "matplotlib.artist" else None
+
+
 def make_pages() -> None:
     """Write the pages that are made of the package, and the schema of scene files."""
     make_api.main()
@@ -80,5 +86,6 @@ def make_pages() -> None:
 def setup(app: Sphinx) -> None:
     """Make the generated pages."""
     app.connect("builder-inited", lambda app: make_pages())
+    app.connect("autodoc-skip-member", skip_what_matplotlib_writes)
     app.connect("autodoc-process-signature", shorten_defaults)
     app.connect("autodoc-process-docstring", protect_formulas, priority=100)  # sections are read at 500

@@ -20,9 +20,6 @@ EXTENDED = (
     *("studies", "testing", "reference"),
 )
 
-_NOT_OURS = "set"
-"""A method that matplotlib writes into each subclass of its figures, with markup of its own."""
-
 
 def main() -> None:
     """Write all pages anew."""
@@ -107,11 +104,10 @@ def modules_page(package: str, modules: list[str]) -> str:
     """Show the modules of a folder; members that are names of the package are on other pages."""
     text = heading(package)
     for module in modules:
-        public = [name for name in bemkit.__all__ if home_of(name) == module]
-        excluded = ", ".join([_NOT_OURS, *public])
         text += heading(module, "-") + f".. automodule:: {module}\n   :members:\n   :member-order: bysource\n"
-        text += f"   :exclude-members: {excluded}\n\n"
+        public = [name for name in bemkit.__all__ if home_of(name) == module]
         if public:
+            text += f"   :exclude-members: {', '.join(public)}\n\n"
             text += f"Names of ``bemkit``: {', '.join(f':py:obj:`bemkit.{name}`' for name in public)}.\n"
         text += "\n"
     return text
