@@ -27,6 +27,7 @@ _COMMANDS = {
         "critical_friction",
         "Find the friction coefficient above which sliding states may not be unique.",
     ),
+    "new": ("new", "Write a commented scene to start from."),
     "outline": ("outline", "Show the sides of a part from a file; write a scene to start from."),
     "plan": ("plan", "List what would be computed, what skipped, and why, with time and memory."),
     "plot": ("plot", "Draw a result or a scene."),

@@ -49,9 +49,9 @@ class SceneError(InputError):
     """A scene that cannot be read, understood or written; each mistake is a line with key, value and remedy."""
 
 
-def shipped_files() -> dict[str, Traversable]:
-    """Return the shipped scene files by name."""
-    folder = resources.files("bemkit") / "scene" / "shipped"
+def shipped_files(folder_name: str = "shipped") -> dict[str, Traversable]:
+    """Return the shipped scene files by name, or those to start from, in the folder ``"new"``."""
+    folder = resources.files("bemkit") / "scene" / folder_name
     files = sorted((file for file in folder.iterdir() if file.name.endswith(".toml")), key=lambda file: file.name)
     return {file.name.removesuffix(".toml"): file for file in files}
 
