@@ -113,7 +113,7 @@ class Polygon(CheckedShape):
 
 @dataclass(frozen=True)
 class Disk(CheckedShape):
-    """A disk with the sides arc-1 to arc-4, one for each quadrant, from angle 0 on.
+    """A disk with the sides arc-1 to arc-4, together arc, one for each quadrant, from angle 0 on.
 
     Parameters
     ----------
@@ -175,7 +175,7 @@ class Sector(CheckedShape):
 
 @dataclass(frozen=True)
 class Ring(CheckedShape):
-    """A ring with the sides outer-1 to outer-4 and inner-1 to inner-4, numbered by quadrant.
+    """A ring with the sides outer-1 to outer-4, together outer, and inner-1 to inner-4, together inner, by quadrant.
 
     Parameters
     ----------
@@ -207,7 +207,7 @@ class Ring(CheckedShape):
 
 @dataclass(frozen=True)
 class PlateWithHole(CheckedShape):
-    """A rectangle with a round hole in the middle; sides bottom, right, top, left and hole-1 to hole-4 by quadrant.
+    """A rectangle with a round hole in the middle: bottom, right, top, left and hole-1 to hole-4, together hole.
 
     Parameters
     ----------
@@ -342,9 +342,9 @@ def _polygon_loop(vertices: tuple[tuple[float, float], ...], names: tuple[str, .
 
 
 def _circle_loop(centre: tuple[float, float], radius: float, name: str) -> tuple[Side, ...]:
-    """Return four arcs, anticlockwise from angle 0."""
+    """Return a group of four arcs, anticlockwise from angle 0."""
     return tuple(
-        Side(f"{name}-{k + 1}", Arc(centre, radius, float(start), float(end)))
+        Side(f"{name}-{k + 1}", Arc(centre, radius, float(start), float(end)), name)
         for k, (start, end) in enumerate(pairwise(_QUADRANTS))
     )
 

@@ -55,7 +55,7 @@ def test_every_option_is_listed_and_accepted(path: str) -> None:
     command, text = COMMANDS[path], section(PAGE, path)
     for parameter in command.params:
         if isinstance(parameter, click.Argument):
-            name = re.escape(parameter.human_readable_name)  # in brackets already where it is optional
+            name = re.escape(parameter.human_readable_name)
             assert re.search(rf"`{path} [^`]*{name}[^`]*`", text)
     options = [name for parameter in command.params if isinstance(parameter, click.Option) for name in parameter.opts]
     shared = re.search(r"^Common options: (.*)\.$", text, re.MULTILINE)

@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 
 from bemkit.geometry.errors import GeometryError
 from bemkit.geometry.meshing.discretise import discretise
+from bemkit.geometry.outline import Selection
 from bemkit.geometry.shapes import Disk, ExteriorOf, PlateWithHole, Polygon, Rectangle, Ring, Sector, Shape
 
 from .strategies import angles, polygon_area, rotation, sizes, star_polygons
@@ -131,3 +132,21 @@ def test_polygon_that_is_none_is_refused(vertices, size, angle) -> None:
 def test_refused(make, message: str) -> None:
     with pytest.raises(GeometryError, match=message):
         make()
+
+
+@pytest.mark.parametrize(
+    ("shape", "group", "radius"),
+    [
+        (Disk(2.0), "arc", 2.0),
+        (Ring(1.0, 2.0), "inner", 1.0),
+        (Ring(1.0, 2.0), "outer", 2.0),
+        (PlateWithHole(6.0, 6.0, 0.5, corner=(-3.0, -3.0)), "hole", 0.5),
+        (ExteriorOf(Disk(2.0)), "arc", 2.0),
+    ],
+)
+def test_the_arcs_of_a_circle_are_a_group(shape, group: str, radius: float) -> None:
+    chosen = Selection((group,))
+    sides = [side for side in shape.outline().sides if chosen.names(side.name, side.group)]
+    assert {side.name for side in sides} == {f"{group}-{k}" for k in range(1, 5)}
+    points = np.concatenate([side.curve.point(np.linspace(0.0, 1.0, 5)) for side in sides])
+    assert np.allclose(np.hypot(*points.T), radius, rtol=1e-14)  # cos and sin are rounded
