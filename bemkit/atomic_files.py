@@ -37,7 +37,7 @@ def check_target(path: Path) -> Path:
     Raises
     ------
     OutputFileError
-        If the folder does not exist or cannot be written to, or the path names something that is no file.
+        If the folder does not exist or cannot be written to, or the path names something that is not a file.
     """
     try:
         target = path.resolve()
@@ -137,7 +137,7 @@ def _reserved(target: Path) -> Iterator[None]:
         try:
             yield
         finally:
-            if path.stat().st_size == 0:  # otherwise it is no lock of ours
+            if path.stat().st_size == 0:  # otherwise it is not a lock of ours
                 path.unlink()
 
 

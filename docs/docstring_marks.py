@@ -14,7 +14,7 @@ def as_restructured_text(lines: list[str]) -> list[str]:
     """Return the lines with formulas protected.
 
     An indented block after a line that ends with a colon is shown verbatim, and so is a paragraph that begins with
-    a slash, a list of places in a file; bars such as those of ``|x|`` are no marks.
+    a slash, a list of places in a file; bars such as those of ``|x|`` are not marks.
     """
     lines = list(_with_places_indented(lines))
     written: list[str] = []
@@ -46,7 +46,7 @@ def _with_places_indented(lines: list[str]) -> Iterator[str]:
 
 
 def _is_block(following: list[str], indent: int) -> bool:
-    """Return whether a blank line and an indented block follow that is no list."""
+    """Return whether a blank line and an indented block follow that is not a list."""
     if len(following) < 2 or following[0].strip():
         return False
     first = following[1]

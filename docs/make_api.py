@@ -39,7 +39,7 @@ def main() -> None:
 
 
 def write(name: str, text: str) -> None:
-    """Write a page; the first blank line of a text is no part of it."""
+    """Write a page; the first blank line of a text is not a part of it."""
     path = FOLDER / f"{name}.rst"
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text(text.lstrip("\n"), "utf-8")

@@ -8,8 +8,6 @@ import click
 
 from bemkit.atomic_files import check_target, write_text
 from bemkit.errors import InputError, printable
-from bemkit.formulas import choices
-from bemkit.scene.toml import shipped_files
 
 
 @click.command()
@@ -20,6 +18,9 @@ def new(kind: str, file: str | None) -> None:
 
     The kinds are block, cylinders, pin, rough-surface and wall. A file that exists is never replaced.
     """
+    from bemkit.formulas import choices
+    from bemkit.scene.toml import shipped_files
+
     scenes = shipped_files("new")
     if kind not in scenes:
         raise InputError(f"no kind {printable(kind)!r} of scene: the kinds are {choices(kind, list(scenes))}")

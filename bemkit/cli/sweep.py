@@ -64,7 +64,7 @@ def sweep(
     The exit code is 1 if a row has no certified result, or one less accurate than asked for.
     """
     if jobs is not None and cluster is not None:
-        raise click.UsageError("--jobs and --on both say where to compute: give one of them")
+        raise click.UsageError("--jobs and --on exclude each other: give one of them")
     if folder is None and (over is not None or show):
         raise click.UsageError("--over and --show go with figures: add --plot DIR")
     with StudyProgress(quiet) as progress:
@@ -104,5 +104,5 @@ def _figures(
     abscissa, names = over or keys[0], [*keys, *QUANTITIES]
     for name in (abscissa, *shown):
         if name not in names:
-            raise click.UsageError(f"{name!r} is no column of numbers: give one of {', '.join(names)}")
+            raise click.UsageError(f"{name!r} is not a column of numbers: give one of {', '.join(names)}")
     return partial(draw_all, abscissa, shown), figure_name(abscissa, shown[0])

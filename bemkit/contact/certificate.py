@@ -101,7 +101,7 @@ def certify(problem: ContactProblem, state: ContactState) -> Certificate:
     stress, length = scales.stresses(problem.body.weights), scales.lengths
     clearance = problem.gap - state.u_n
     slip = state.u_t - problem.slip_origin
-    # friction given across the gap is no sign of contact
+    # friction given across the gap is not a sign of contact
     shear = np.where(problem.law.acts_across_gap, 0.0, np.abs(state.sigma_t))
     traction, distance = np.maximum(np.abs(state.sigma_n), shear) / stress, np.abs(clearance) / length
     bound = problem.friction_bound(state.sigma_n, is_closed=traction > distance)

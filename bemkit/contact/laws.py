@@ -28,7 +28,7 @@ Coefficient: TypeAlias = ScalarField | FloatArray
 
 
 class LawError(InputError):
-    """A friction law failed or returned values that are no bounds; the message names the law."""
+    """A friction law failed or returned values that are not bounds; the message names the law."""
 
 
 def checked_coefficient(name: str, value: Coefficient, *, may_be_infinite: bool = False) -> Coefficient:

@@ -34,7 +34,7 @@ _MANY_MOTIONS = 60
 more motions the sum of all residuals is."""
 
 _PRESSES = 1e-9
-"""Speed into an obstacle, relative to the largest speed of the motion, above which it is no round-off."""
+"""Speed into an obstacle, relative to the largest speed of the motion, above which it is not round-off."""
 
 _MEETS = 1e-7
 """The same for motions that are found by linear programming, whose tolerance is larger."""

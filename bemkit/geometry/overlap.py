@@ -49,7 +49,7 @@ class Polyline:
 
     @classmethod
     def of(cls, mesh: BoundaryMesh, displacement: FloatArray | None = None) -> Polyline:
-        """Return the polyline of a mesh that is no half-plane, displaced by (n_elements, q, 2) [m] at `places`."""
+        """Return the polyline of a mesh that is not a half-plane, displaced by (n_elements, q, 2) [m] at `places`."""
         elements, xi = np.arange(mesh.n_elements), cls.places()
         points = mesh.points(elements, xi)
         middles = mesh.points(elements, 0.5 * (xi[:-1] + xi[1:]))

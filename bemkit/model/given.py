@@ -168,7 +168,7 @@ def linear_solver_of(
     requested : LinearSolver, Hierarchical or Automatic
     discretisation : Discretisation
     case : BodyCase
-        Its linear solver counts for nothing.
+        Its linear solver is not used.
 
     Raises
     ------

@@ -69,7 +69,7 @@ class Units:
 def _check_scale(name: str, scale: float) -> None:
     if not SMALLEST <= scale <= LARGEST:
         raise OutOfRangeError(
-            f"the {name} is about {scale:.1e}, and its square is no number any more: choose units in which stiffness, "
+            f"the {name} is about {scale:.1e}, and its square is no longer a number: choose units in which stiffness, "
             f"stresses, strains, displacements and the roots of energies lie between {SMALLEST:g} and {LARGEST:g}"
         )
 

@@ -87,7 +87,7 @@ class HypersingularForm(PairForm):
 
     @property
     def tags(self) -> frozenset[Tag]:
-        """Symmetric on one space; the rotation of a curved element is no polynomial, hence not in the space."""
+        """Symmetric on one space; the rotation of a curved element is not a polynomial, hence not in the space."""
         is_straight = bool(self.trial.mesh.is_straight.all())
         kernel = Tag.KILLS_RIGID_MOTIONS if is_straight else Tag.KILLS_TRANSLATIONS
         symmetric = {Tag.SYMMETRIC, Tag.POSITIVE_SEMIDEFINITE} if self.trial is self.test else set[Tag]()

@@ -28,7 +28,7 @@ class GravityColumn:
 
     Notes
     -----
-    Uniaxial strain: u_y'(y) = -p(y) / (lambda + 2 mu) with the weight p above. With free sides this is no solution.
+    Uniaxial strain: u_y'(y) = -p(y) / (lambda + 2 mu) with the weight p above. With free sides this is not a solution.
     """
 
     heights: tuple[float, ...]

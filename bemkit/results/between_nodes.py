@@ -258,7 +258,7 @@ def law_between(
 def violations_at(values: PointsBetween, law: FrictionLaw, stress: float, length: float) -> BetweenNodes:
     """Measure violations relative to a stress [Pa] and a length [m]."""
     bound = law.bound(np.minimum(values.sigma_n, 0.0))
-    # friction given across the gap is no sign of contact
+    # friction given across the gap is not a sign of contact
     shear = 0.0 if law.acts_across_gap else np.abs(values.sigma_t)
     traction = np.maximum(np.abs(values.sigma_n), shear) / stress
     round_off = _ROUND_OFF * _largest(np.abs(values.points))
@@ -282,7 +282,7 @@ def violations_at(values: PointsBetween, law: FrictionLaw, stress: float, length
 def missed_contacts(table: ContactTable, measured: Mapping[str, BetweenNodes]) -> dict[str, tuple[float, float]]:
     """Return the points where sides overlap without any traction, by contact.
 
-    Of a contact without any force every overlap counts that is no round-off; of others those that exceed a share of the
+    In a contact without force every overlap above round-off counts; in others, overlaps above a share of the
     displacement that contact forces cause.
     """
     free, missed = free_contacts(table), {}

@@ -37,7 +37,7 @@ DRIVERS: Mapping[str, tuple[str, ...]] = MappingProxyType(
 LAW_WORKS: Mapping[str, tuple[str, ...]] = MappingProxyType(
     {"slip-weakening": ("Ida1972",), "rate-strengthening": ("Dieterich1979",)}
 )
-"""The works behind friction laws that are no textbook matter, by their words in scene files."""
+"""The works behind friction laws that are not in textbooks, by their words in scene files."""
 
 
 @cache

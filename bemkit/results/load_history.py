@@ -157,7 +157,7 @@ class LoadHistory:
     asked : Scene or Assembly
         With all steps; the scene of a solution is that of its own step.
     n_steps : int
-        As many as there are to be.
+        Number of steps that were asked for.
     steps : tuple of LoadStep
     """
 

@@ -85,7 +85,7 @@ class Body:
 
     @property
     def is_held(self) -> bool:
-        """Whether a support or a rigid obstacle belongs to the body, so that it is no copy of another."""
+        """Whether a support or a rigid obstacle belongs to the body, so that it is not a copy of another."""
         return any(
             isinstance(part.condition, Clamped | Roller | PrescribedDisplacement | Contact) for part in self.parts
         )

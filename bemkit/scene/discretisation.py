@@ -152,7 +152,7 @@ class Galerkin(SymmetricGalerkin):
     Raises
     ------
     GeometryError
-        If a degree is no whole number from 1 to 12; on a mesh, if there is not one for each element.
+        If a degree is not a whole number from 1 to 12; on a mesh, if there is not one for each element.
     """
 
     degree: int | tuple[int, ...]

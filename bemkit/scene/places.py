@@ -80,7 +80,7 @@ def read_setting(text: str) -> tuple[Place, object]:
     except (tomllib.TOMLDecodeError, KeyError, ValueError, RecursionError):
         if value[0] in "[{\"'":
             raise PlaceError(
-                f"{place.text}: {value!r} is no value of a scene file: check brackets and quotes"
+                f"{place.text}: {value!r} is not a value of a scene file: check brackets and quotes"
             ) from None
         return place, value
 
@@ -195,7 +195,7 @@ def _inside(node: Any, declared: Any, name: str | int, path: str) -> tuple[Any, 
     if is_dataclass(node):
         _known(name, [entry.name for entry in fields(node) if entry.init and entry.name != "name"], path)
         return getattr(node, name), hints_of(cast(type, type(node)))[name], inner_path
-    kind = "a list: give the number of an entry, such as [0]" if isinstance(node, tuple | list) else "no table"
+    kind = "a list: give the number of an entry, such as [0]" if isinstance(node, tuple | list) else "not a table"
     raise PlaceError(f"{path}.{name}: unknown key: {path} is {kind}")
 
 

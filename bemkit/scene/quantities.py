@@ -19,7 +19,7 @@ def in_units_of_scene(text: str, owner: type, name: str, units: UnitNames | None
     Parameters
     ----------
     text : str
-        What is no number with a unit, such as a formula, is returned as it is.
+        What is not a number with a unit, such as a formula, is returned as it is.
     owner : type
         The class of the field. Its docstring states the unit of the field in SI, such as ``[Pa]``.
     name : str
@@ -57,7 +57,7 @@ def _scale(unit: Unit, units: UnitNames | None, text: str) -> float:
     for name, powers in (("length", (0, 1, 0, 0, 0)), ("stress", (1, -1, -2, 0, 0))):
         found = read_unit(getattr(units, name))
         if found.powers != powers:
-            raise InputError(f"units.{name} is {getattr(units, name)!r}, which is no unit of {name}: give one")
+            raise InputError(f"units.{name} is {getattr(units, name)!r}, which is not a unit of {name}: give one")
         own.append(found.factor)
     of_length, of_stress = own
     return float((of_stress * of_length) ** mass * of_length**length)  # a mass is a stress times a length, at 1 s

@@ -284,7 +284,7 @@ def _check_half_plane(
     if outline.surface is None:
         if far is not None:
             raise InputError(
-                f"far is {far}, but the body is no half-plane: hold or load its parts, or give the shape "
+                f"far is {far}, but the body is not a half-plane: hold or load its parts, or give the shape "
                 "'half-plane' or 'periodic-half-plane'"
             )
         return

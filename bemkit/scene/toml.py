@@ -141,7 +141,7 @@ def scene_from_toml(text: str, *, name: str = "scene", folder: Path | None = Non
     except tomllib.TOMLDecodeError as error:
         raise SceneError(f"{name}: not valid TOML: {printable(str(error))}") from None
     except (RecursionError, ValueError):  # ValueError: an integer of thousands of digits
-        raise SceneError(f"{name}: not valid TOML: nested too deeply or a number too long: simplify it") from None
+        raise SceneError(f"{name}: not valid TOML: it is nested too deeply, or a number has too many digits") from None
     try:
         return scene_from_table(table, folder)
     except SceneError as error:
@@ -157,7 +157,7 @@ def scene_from_table(table: dict[str, Any], folder: Path | None = None) -> Scene
     Raises
     ------
     SceneError
-        If it is no valid scene; the message begins with the key.
+        If it is not a valid scene; the message begins with the key.
     """
     table = _with_rising_degrees(_with_places_of_files(table, folder, ""))
     try:

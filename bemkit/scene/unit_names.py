@@ -74,7 +74,7 @@ def with_unit(label: str, quantity: str, units: UnitNames | None) -> str:
 
 
 def check_length_of_file(stated: str, units: UnitNames) -> None:
-    """Raise if the file of a shape states another unit of length than a scene; empty is no statement."""
+    """Raise if the file of a shape states another unit of length than a scene; empty is not a statement."""
     of_file, of_scene = length_in_metres(stated), length_in_metres(units.length)
     if of_file is None or of_scene is None or stated == units.length:
         return

@@ -131,7 +131,7 @@ class ProjectionEquations:
         multiplier = state.traction if self.multiplier is None else self.multiplier
         towards_obstacle = self.rho_n * (state.u_n - problem.gap) - multiplier[:, 0]
         along_obstacle = self.rho_t * (state.u_t - problem.slip_origin) - multiplier[:, 1]
-        # where the tangent follows, slip is no unknown: it has its direction for any friction
+        # where the tangent follows, slip is not an unknown: it has its direction for any friction
         follows = problem.body.tangent_follows
         if follows.any():
             along_obstacle = np.where(follows, problem.given_direction(state) * _FAR, along_obstacle)

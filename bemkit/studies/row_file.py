@@ -63,7 +63,7 @@ class RowFile(Generic[R]):
         return [check_target(Path(path))]
 
     def read(self, path: str | Path) -> tuple[dict[str, str], tuple[R, ...]]:
-        """Read labels and rows; a last line without its end was cut off and is no row.
+        """Read labels and rows; a last line without its end was cut off and is not a row.
 
         Raises
         ------
@@ -83,7 +83,7 @@ class RowFile(Generic[R]):
         except OSError as error:
             raise RowFileError(f"{shown}: cannot be read ({error.strerror}): give the name of a file") from error
         except (ValueError, LookupError, TypeError) as error:
-            reason = f"is no complete file of the format {self.format!r}"
+            reason = f"is not a complete file of the format {self.format!r}"
             raise RowFileError(f"{shown}: {reason}: choose another name or delete it first") from error
 
     def finished(self, path: str | Path | None, labels: Mapping[str, str]) -> dict[Hashable, R]:

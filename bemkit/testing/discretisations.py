@@ -40,7 +40,7 @@ def check_discretisation(discretisation: Discretisation) -> None:
         Naming the discretisation, the promise broken, and by how much.
     """
     name = type(discretisation).__name__
-    demand(is_dataclass(discretisation), f"{name} is no dataclass: scenes are compared and written by their values")
+    demand(is_dataclass(discretisation), f"{name} is not a dataclass: scenes compare and write it by its fields")
     demand(copy(discretisation) == discretisation, f"{name} does not equal its copy")
     demand(bool(discretisation.method), f"{name}.method is empty: messages name it")
     for promise in ("is_symmetric", "estimates_error"):

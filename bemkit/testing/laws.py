@@ -40,7 +40,10 @@ def check_law(law: FrictionLaw, *, stress_scale: float = 1.0, n_contact: int = 5
     if law.needs_history:
         _check_history(law, name, stress_scale, n_contact, random)
     acts = np.asarray(law.acts_across_gap)
-    demand(acts.dtype == bool and acts.shape in ((), (n_contact,)), f"{name}.acts_across_gap is no bool")
+    demand(
+        acts.dtype == bool and acts.shape in ((), (n_contact,)),
+        f"{name}.acts_across_gap is not boolean: give True or False, or one of them for each node",
+    )
 
 
 def _check_history(

@@ -36,7 +36,7 @@ def random_assembly(seed: int, index: int) -> RandomCase[Assembly]:
     Raises
     ------
     BemkitError
-        If what was drawn is no assembly; the message says why.
+        If what was drawn is not an assembly; the message says why.
     """
     draw = Draw(np.random.PCG64([seed, index, _STREAM]))
     members = Members.drawn(draw)

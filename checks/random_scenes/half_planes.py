@@ -80,7 +80,7 @@ def random_half_plane(draw: Draw, title: str, material: Material, solver: Contac
     Raises
     ------
     BemkitError
-        If what was drawn is no scene.
+        If what was drawn is not a scene.
     """
     length = 1.0 if draw.chance(0.4) else draw.decades(-3.0, 3.0)
     left = length * (-0.5 if draw.chance(0.4) else draw.between(-3.0, 3.0))

@@ -43,7 +43,7 @@ def random_case(seed: int, index: int) -> RandomCase[Scene]:
     Raises
     ------
     BemkitError
-        If what was drawn is no scene; the message says why.
+        If what was drawn is not a scene; the message says why.
     """
     title = f"random scene {index} of seed {seed}"
     draw = Draw(np.random.PCG64([seed, index, 3]))  # of its own, so that all other scenes are drawn as without

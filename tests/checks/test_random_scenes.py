@@ -53,7 +53,7 @@ def test_random_scenes_end_in_the_right_answer_or_a_named_failure() -> None:
 
 
 def half_planes_among(seed: int, count: int) -> list[RandomCase[bk.Scene]]:
-    """Return the half-planes among single bodies; what was drawn and is no scene is not among them."""
+    """Return the half-planes among single bodies; what was drawn and is not a scene is not among them."""
     cases = []
     for index in range(count):
         with contextlib.suppress(bk.BemkitError):

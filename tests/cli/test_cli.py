@@ -247,7 +247,7 @@ def one_line_error(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
         (["run", "paper-1", "--bogus"], "--bogus"),
         (["run", "paper-1", "--set", "law.friction"], "set is 'law.friction': give KEY=VALUE"),
         (["run", "paper-1", "--set", "law.friction=1"], "law.friction: unknown key.*did you mean"),
-        (["run", "paper-1", "--set", "mesh.elements=[1"], r"mesh.elements: '\[1' is no value of a scene file"),
+        (["run", "paper-1", "--set", "mesh.elements=[1"], r"mesh.elements: '\[1' is not a value of a scene file"),
         (["run", "paper-1", "--set", "mesh.elements=many"], "mesh.elements: .*many"),
         (["run"], "Missing argument"),
         (["rn"], "no command 'rn'; did you mean 'run'?"),

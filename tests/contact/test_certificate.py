@@ -134,7 +134,7 @@ def test_open_nodes_carry_shear_only_under_friction_given_across_the_gap():
 
 
 def test_what_is_left_of_tractions_is_measured_by_itself_not_by_those_that_would_hold_the_body():
-    """A loose body lifted out of an overlap of one: 1e-9 of the tractions of the sticking state are no round-off."""
+    """A loose body lifted out of an overlap of one: 1e-9 of the tractions of the sticking state are not round-off."""
     body = block_body(press=0.0, push=0.0, is_held_sideways=False)
     problem = ContactProblem(body, np.full(body.n_contact, -1.0), Coulomb(0.5))
     lifted = -body.motions[0]

@@ -1,4 +1,4 @@
-"""Rigid motions of a condensed body to the last digit, and nothing repaired that is no round-off."""
+"""Rigid motions of a condensed body to the last digit, and nothing repaired that is not round-off."""
 
 from __future__ import annotations
 

@@ -27,7 +27,7 @@ def stress_of(gradient: FloatArray, material: Material) -> FloatArray:
     [(GalerkinElasticity, 2.0, 2e-3), (quadratic_map, 3.0, 1e-4), (CollocationElasticity, 2.0, 4e-3)],
 )
 def test_linear_field_on_a_plate_with_a_hole(make: type, order: float, ceiling: float) -> None:
-    # exact on the straight sides; on arcs x and y are no polynomials of the arc length, and the order shows
+    # exact on the straight sides; on arcs x and y are not polynomials of the arc length, and the order shows
     material = Material(2.0, 0.3)
     stress = stress_of(GRADIENT, material)
     errors = []

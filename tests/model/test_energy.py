@@ -110,7 +110,7 @@ def test_round_off_of_a_body_that_only_moves_is_no_negative_energy() -> None:
     sensitivity, astray = np.full((8, 2), 5.0), 1e-23 * np.random.default_rng(3).normal(size=(8, 2))
     force = -1e-21 * np.sign(astray)  # thrice the round-off of 16 terms, each of 5 * 1e-7
     assert negative_share(travel + astray, force, motions, sensitivity) == 0.0
-    # the same forces are no round-off of a body that stays where it is
+    # the same forces are not round-off of a body that stays where it is
     assert negative_share(1e10 * astray, force, motions, sensitivity) > 0.1
 
 

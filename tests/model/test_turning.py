@@ -1,4 +1,4 @@
-"""Round bodies without friction turn; their meshes are no support."""
+"""Round bodies without friction turn; their meshes do not support."""
 
 from __future__ import annotations
 

@@ -410,7 +410,7 @@ def test_the_map_kills_rigid_motions_and_is_in_equilibrium(name: str) -> None:
     elastic = GalerkinElasticity(mesh, Material(1.0, 0.3))
     matrix = SteklovPoincareOperator(elastic).matrix()
     motions = rigid_motions(mesh.nodes, mesh.centre, mesh.diameter).reshape(-1, 3)
-    # the rotation is no polynomial of the arc length: its interpolant is made the rigid motion
+    # the rotation is not a polynomial of the arc length: its interpolant is made the rigid motion
     assert np.abs(matrix @ motions).max() < 1e-13
     np.testing.assert_allclose(matrix, matrix.T, rtol=0.0, atol=1e-15)
     assert np.linalg.eigvalsh(matrix)[3] > 1e-3

@@ -53,7 +53,7 @@ def changed(solution: AssemblySolution, body: str, displacement: float = 0.0, no
 def test_uniform_contact_is_perfect_between_the_nodes_too(degree: int, turn: float) -> None:
     assembly = patch(max(degree, 1), turn=turn)
     if not degree:
-        # without friction, whose rest of a coarse mesh is no uniform field of constant elements
+        # without friction, whose rest of a coarse mesh is not a uniform field of constant elements
         assembly = replace(assembly, discretisation=bk.ConstantCollocation())
         assert measured(bk.run(assembly)).penetration < 0.05  # collocation is exact for no linear field
         return

@@ -113,6 +113,6 @@ def test_the_largest_error_leaves_out_an_equally_small_share() -> None:
     assert largest_but_a_share(np.array([0.1, 0.2, 0.15, 0.05]), lengths) == 0.2
     assert largest_but_a_share(np.array([0.1, 0.2, 0.15, 9.0]), lengths) == 0.2  # a hundredth may be as wrong as it is
     assert largest_but_a_share(np.array([0.1, 0.02, 9.0, 9.0]), lengths) == pytest.approx(0.2)
-    # elements without tractions have no error, and are no share of anything
+    # elements without tractions have no error, and are not shares of anything
     assert largest_but_a_share(np.array([0.0, 0.0, 0.1, 9.0]), lengths) == 0.1
     assert largest_but_a_share(np.zeros(4), lengths) == 0.0

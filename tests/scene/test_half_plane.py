@@ -210,5 +210,5 @@ def test_an_elastic_disk_on_an_elastic_half_plane() -> None:
     assert solution.is_converged, solution.message
     force = sum(contact.force_normal for contact in solution.contacts)
     half_width = 0.5 * sum(contact.contact_length for contact in solution.contacts)
-    # 2 a / R = 0.1 of a disk that is no half-plane, and elements of a twelfth of a
+    # 2 a / R = 0.1 of a disk that is not a half-plane, and elements of a twelfth of a
     assert half_width == pytest.approx(np.sqrt(8.0 * force / (np.pi * disk.material.plane_modulus)), rel=0.05)

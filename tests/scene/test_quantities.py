@@ -61,7 +61,7 @@ def test_mistakes_name_key_value_and_remedy() -> None:
     own = 'units = { length = "furlong", stress = "MPa" }'
     with pytest.raises(SceneError, match="the unit 'furlong' is unknown"):
         bk.scene_from_toml(BLOCK.format(units=own, **WITH_UNITS))
-    with pytest.raises(SceneError, match=r"units.length is 'MPa', which is no unit of length"):
+    with pytest.raises(SceneError, match=r"units.length is 'MPa', which is not a unit of length"):
         bk.scene_from_toml(BLOCK.format(units='units = { length = "MPa", stress = "MPa" }', **WITH_UNITS))
     with pytest.raises(SceneError, match=r"'0.3 mm' has a unit of another kind: give it without a unit"):
         bk.scene_from_toml(

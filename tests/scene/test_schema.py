@@ -89,7 +89,7 @@ def test_random_scenes_are_accepted() -> None:
     for number in range(30):
         try:
             files = random_case(7, number).files()
-        except BemkitError:  # what was drawn is no scene
+        except BemkitError:  # what was drawn is not a scene
             continue
         for text in files.values():
             assert errors_in(text) == [], text

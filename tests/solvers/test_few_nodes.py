@@ -68,7 +68,7 @@ def test_what_round_off_leaves_of_a_stiffness_is_no_scale(left_over):
     problem = ContactProblem(body, np.array([10.0]), Coulomb(0.5))
     hovering = ContactState(np.zeros((1, 2)), np.array([[-100.0, 0.0]]))
     assert certify(problem, hovering).complementarity == 1.0
-    assert contact_sets(problem, hovering).is_closed.tolist() == [False]  # rho is no round-off either
+    assert contact_sets(problem, hovering).is_closed.tolist() == [False]  # rho is not round-off either
     resting = ContactState(np.array([[10.0, 0.0]]), np.array([[-100.0, 0.0]]))
     assert certify(problem, resting).is_below(1e-9)
 

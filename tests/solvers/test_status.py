@@ -177,7 +177,7 @@ def test_messages_name_the_reason(case, words):
 
 @pytest.mark.parametrize("far", [1e8, 1e12])
 def test_only_an_obstacle_that_the_load_needs_is_too_far(far):
-    """A distant obstacle is no trouble where a near one holds the load, and is not blamed for other failures."""
+    """A distant obstacle does not matter where a near one holds the load, and is not blamed for other failures."""
     problem = block_problem(Coulomb(0.5))
     gap = np.where(np.arange(12) < 6, far, 0.0)
     assert solve(replace(problem, gap=gap), SemismoothNewton()).is_converged

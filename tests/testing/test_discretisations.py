@@ -198,7 +198,7 @@ class HalfTheTractions(bk.ConstantCollocation):
 @pytest.mark.parametrize(
     ("wrong", "message"),
     [
-        (NoDataclass(), "NoDataclass is no dataclass"),
+        (NoDataclass(), "NoDataclass is not a dataclass"),
         (UnlikeItsCopy(), "UnlikeItsCopy does not equal its copy"),
         (Nameless(), "Nameless.method is empty"),
         (Vague(), "Vague.is_symmetric is None, not a bool"),

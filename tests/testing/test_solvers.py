@@ -101,7 +101,7 @@ class NoDataclass:
         (WritesOnItsInput(), "step changes the iterate|gives two answers|ends with"),
         (ThrowsDice(), "gives two answers to one question|is not a function"),
         (KnowsMetres(), "instead of . in other units"),
-        (NoDataclass(), "NoDataclass is no dataclass"),
+        (NoDataclass(), "NoDataclass is not a dataclass"),
         (Wrapped(max_steps=0), "Wrapped.max_steps is 0"),
     ],
     ids=lambda value: type(value).__name__,

@@ -55,7 +55,7 @@ class DenseBody(LinearBody):
     motions : (n_motions, n_contact, 2) array, optional
         Rigid motions that only contact holds; none by default.
     following_tangents : FollowingTangents, optional
-        Nodes whose tangential displacement is no unknown; none by default.
+        Nodes whose tangential displacement is not an unknown; none by default.
     modulus : float, optional [Pa]
         E' of the material: force per displacement of one node. By default the median of the diagonal normal
         stiffnesses, of those that are more than round-off.
@@ -109,7 +109,7 @@ class DenseBody(LinearBody):
 
     @cached_property
     def tangent_follows(self) -> BoolArray:
-        """(n_contact,) bool array: where the tangential displacement is no unknown."""
+        """(n_contact,) bool array: where the tangential displacement is not an unknown."""
         follows = np.zeros(self.n_contact, bool)
         if self.following_tangents is not None:
             follows[self.following_tangents.nodes] = True
@@ -192,7 +192,7 @@ class DenseBody(LinearBody):
         Notes
         -----
         The first number is the residual of ``weights * t = stiffness @ u - load`` (and of tangents that do not follow),
-        so it also detects states that are no response of this body. Round-off is what the stiffness makes
+        so it also detects states that are not responses of this body. Round-off is what the stiffness makes
         of the rigid part of the displacements, and that of the sums.
         """
         contact = (self.weights[:, None] * state.traction).ravel()

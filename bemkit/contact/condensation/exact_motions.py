@@ -7,7 +7,7 @@ import numpy as np
 from bemkit.arrays import FloatArray
 
 _ROUND_OFF = 1e-6
-"""A larger share is no round-off: it stays, and the certificate measures it."""
+"""A larger share is not round-off: it stays, and the certificate measures it."""
 
 
 def resisting_none(stiffness: FloatArray, motions: FloatArray) -> FloatArray:

@@ -60,7 +60,7 @@ class NodeCoupling:
         ----------
         relative : (2 n_contact, n) sparse array
         tangent_follows : (n_contact,) bool array
-            Tangents that are no unknowns.
+            Tangents that are not unknowns.
         """
         n_contact, n = relative.shape[0] // 2, relative.shape[1]
         row = np.repeat(np.arange(2 * n_contact), np.diff(relative.indptr))

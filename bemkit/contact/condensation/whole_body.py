@@ -123,9 +123,9 @@ class WholeBody:
 
         Notes
         -----
-        Prescribed displacements would cause any forces on a clamped body, so that its condensed load is no measure:
-        those at hand are. Their round-off is that of the terms whose differences they are, small ones in thin bodies
-        and in those that move far.
+        Prescribed displacements would cause any forces on a clamped body, so the condensed load is too large a measure;
+        the forces at hand are the measure. Their round-off is that of the terms whose differences they are: the forces
+        are small differences in thin bodies and in those that move far.
         """
         displacement, force = self.fields(retained)
         largest = float(np.abs(displacement).max())

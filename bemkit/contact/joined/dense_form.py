@@ -61,7 +61,7 @@ class RelativeStiffness:
     -----
     With the flexibility G of the members, their motions R and the coupling B the unknowns p (nodal forces) and a
     (motions) solve ``B G B^T p + B R a = w - o - B G f`` and ``R^T B^T p = -R^T f``; the inverse of this matrix holds
-    the stiffness of w. The rows of tangents that follow are no equations.
+    the stiffness of w. The rows of tangents that follow are not equations.
     """
 
     def __init__(self, joined: CoupledMembers) -> None:

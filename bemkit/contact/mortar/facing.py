@@ -58,7 +58,7 @@ def find_facing(
     distance : float [m]
         Largest distance or overlap of sides that face each other.
     owners : sequence of int, optional
-        The body of each side; sides of one body are no pair. By default each side is a body of its own.
+        The body of each side; sides of one body are not a pair. By default each side is a body of its own.
     has_friction : bool
         Whether friction acts between them.
 

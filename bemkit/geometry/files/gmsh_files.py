@@ -125,7 +125,7 @@ def read_geometry(path: Path, only: Sequence[str], corner_angle: float) -> tuple
     for k, (points, name) in enumerate(sampled):
         own = plane[k * _N_SAMPLES : k * _N_SAMPLES + len(points)]
         strokes += _strokes(own, name, corner_angle)
-    notes = ["its curves that are no lines and arcs are splines through 129 of their points"]
+    notes = ["its curves that are not lines and arcs are splines through 129 of their points"]
     is_free = any(type(stroke.side).__name__ == "SplineTo" for stroke in strokes)
     return strokes, notes if is_free else []
 

@@ -190,7 +190,7 @@ class DrawingFile(ShapeFile):
             strokes, unit = read_svg(path, self.only)
             notes = []
         else:
-            raise GeometryError("it is no drawing that bemkit reads: give .dxf or .svg, or write kind = 'mesh'")
+            raise GeometryError("it is not a drawing that bemkit reads: give .dxf or .svg, or write kind = 'mesh'")
         if self.tolerance is not None and strokes:
             return Drawn(strokes, notes, unit, self.tolerance / extent(strokes))
         return Drawn(strokes, notes, unit, GAP)

@@ -55,7 +55,7 @@ def read_svg(path: Path, only: Sequence[str] = ()) -> tuple[list[Stroke], str]:
             document = Document(str(path))
             paths = document.paths()
     except (ParseError, ValueError, KeyError, IndexError, TypeError, AttributeError, AssertionError) as error:
-        raise GeometryError(f"it cannot be read ({printable(str(error))}): save it as plain SVG anew") from error
+        raise GeometryError(f"it cannot be read ({printable(str(error))}): save it again as plain SVG") from error
     root = document.root
     factor, height, unit = _frame(root)
     parents = {child: parent for parent in root.iter() for child in parent}

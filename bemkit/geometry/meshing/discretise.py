@@ -246,8 +246,8 @@ def _share_of_half(n_elements: int, half: Division, symmetry: Symmetry) -> int:
     share, n_pieces = -(-n_elements // symmetry.n_images), len(half.pieces)
     if share < n_pieces:
         raise GeometryError(
-            f"discretise: n_elements is {n_elements}, of which the symmetry leaves {share} for {n_pieces} pieces "
-            f"(sides cut where parts end): give at least {n_pieces * symmetry.n_images}"
+            f"discretise: n_elements is {n_elements}: symmetry leaves {share} elements for {n_pieces} pieces of "
+            f"the boundary (parts divide sides): give at least {n_pieces * symmetry.n_images}"
         )
     return share
 

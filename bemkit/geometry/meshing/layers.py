@@ -254,13 +254,13 @@ def _owners(base: Division, division: Division) -> IntArray:
 
 
 def _at_cut(base: Division, division: Division) -> BoolArray:
-    """Return (2, n_pieces) whether the start and the end of each piece are no ends of a piece of the base."""
+    """Return (2, n_pieces) whether the start and the end of each piece are not ends of a piece of the base."""
     ends = {(piece.side, end) for piece in base.pieces for end in piece.span}
     return np.array([[(piece.side, piece.span[end]) not in ends for piece in division.pieces] for end in (0, 1)], bool)
 
 
 def _inside_sides(division: Division) -> BoolArray:
-    """Return (2, n_pieces) whether the start and the end of each piece are no ends of a side."""
+    """Return (2, n_pieces) whether the start and the end of each piece are not ends of a side."""
     return np.array([[piece.span[end] not in (0.0, 1.0) for piece in division.pieces] for end in (0, 1)], bool)
 
 

@@ -20,14 +20,14 @@ class KnownLoads:
     Parameters
     ----------
     has_loads : (n_elements,) bool array
-        The elements; what is given on others counts for nothing.
+        The elements; values on others are ignored.
     expected : iterable of (n_elements, 4) arrays
         Loads that will act one after another, with others between them; if eight do not make all of them, none.
 
     Attributes
     ----------
     each : (n_elements, 4, n_loads) array
-        The loads: those expected or, as soon as another one acts that is no sum of them, the one that acts.
+        The loads: those expected or, as soon as another one acts that is not a sum of them, the one that acts.
     shares : (n_loads,) array
         Those of the loads in the sum.
     """

@@ -131,7 +131,7 @@ class HierarchicalSystem:
         Parameters
         ----------
         known : ElementLaws
-            Of all elements, by `laws`; what is given there counts for nothing.
+            Of all elements, by `laws`; values there are ignored.
         moved : (n_moved,) array
             Directions 2 * element + direction that `known` holds fast.
         elements : (n,) array

@@ -124,7 +124,7 @@ class DenseLU:
     def __init__(self, matrix: FloatArray, name: str) -> None:
         from scipy.linalg.lapack import dgecon, dgetrf, dlange
 
-        # columns belong to elements: on graded meshes their sizes differ by the grading, which is no singularity
+        # columns belong to elements: on graded meshes their sizes differ by the grading, which is not a singularity
         sizes = np.maximum(matrix.max(axis=0, initial=0.0), -matrix.min(axis=0, initial=0.0))
         self._column_sizes = np.where(sizes > 0.0, sizes, 1.0)
         matrix /= self._column_sizes

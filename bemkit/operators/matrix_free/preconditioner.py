@@ -63,7 +63,7 @@ class Preconditioner:
         elements : StraightElements
         material : Material
         laws : CompactLaws
-            What is given counts for nothing.
+            Given values are ignored.
         frame : (n_elements, 2, 2) array
             Rows are the directions of the conditions of each element.
 

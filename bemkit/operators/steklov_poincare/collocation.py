@@ -119,7 +119,7 @@ class MixedSystem:
     those of the double layer there, else those of the single layer with the other sign. Columns that are multiplied by
     zero are neither computed nor stored: those of tractions on free directions without a load, and of displacements in
     directions that are held at rest. Columns of given data are multiplied by them at once and not stored either; loads
-    that are no multiple of the one before take another sweep over the pairs.
+    that are not multiples of the one before take another sweep over the pairs.
 
     Resultants of the tractions and reciprocities come after the displacement equations, which have one more unknown for
     each of these: an error.

@@ -109,7 +109,7 @@ def choose_collocation_solver(
     ----------
     requested : LinearSolver, Hierarchical or Automatic
     case : BodyCase
-        Its linear solver counts for nothing.
+        Its linear solver is not used.
     memory : float [bytes]
         Of the computer.
     hindrance : str, optional

@@ -240,7 +240,7 @@ def collocation_needs(case: BodyCase, *, takes_slopes: bool) -> BodyNeeds:
 
 
 def _different_loads(case: BodyCase) -> list[GivenData]:
-    """Return the given data of the load steps that are no multiple of those before."""
+    """Return the given data of the load steps that are not multiples of those before."""
     found: list[GivenData] = []
     for data in case.loads:
         if not found or data.factor_of(found[-1]) is None:

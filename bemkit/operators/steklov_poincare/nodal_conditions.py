@@ -25,7 +25,7 @@ FREE_MOTION_TOLERANCE = 1e-6
 from the origin numbers hold the normals along a straight side to about 1e-7; and a support that resists a motion only
 with a million times the load holds nothing."""
 _LEAST_TURN = 1e-9
-"""Difference of a rigid motion between nodes, by its size, that is no round-off."""
+"""Difference of a rigid motion between nodes, by its size, that is not round-off."""
 _FACTOR_TOLERANCE = 4.0 * np.finfo(float).eps
 """Relative difference of two loads that the product with a load factor may leave."""
 

@@ -125,7 +125,7 @@ def all_runs(
     Raises
     ------
     StudyError
-        If nothing is left to run, two runs have one key, the scene has no contact, or a size is no size of a
+        If nothing is left to run, two runs have one key, the scene has no contact, or a size is not a size of a
         mesh.
     """
     if not scene.contact_parts:

@@ -253,5 +253,5 @@ class AssemblySimilarity:
 def _number(field: object) -> float:
     """Return a field that is a number."""
     if not isinstance(field, int | float):
-        raise InputError(f"{field!r} is no number: give one, fields are not turned")
+        raise InputError(f"{field!r} is not a number: give one, fields are not turned")
     return float(field)

@@ -113,7 +113,7 @@ def all_rows(vary: Mapping[str, Sequence[float]]) -> tuple[tuple[Key, ...], list
 
 def _finite(value: object, name: str) -> float:
     if isinstance(value, bool | str) or not isinstance(value, int | float | np.number) or not math.isfinite(value):
-        raise StudyError(f"{name}: {value!r} is no finite number: give numbers")
+        raise StudyError(f"{name}: {value!r} is not a finite number: give numbers")
     return float(value)
 
 
@@ -121,7 +121,7 @@ def _number(text: str, whole: str) -> float:
     try:
         return float(text)
     except ValueError:
-        raise StudyError(f"vary is {whole!r}: {text.strip()!r} is no number: give numbers such as 0.5") from None
+        raise StudyError(f"vary is {whole!r}: {text.strip()!r} is not a number: give numbers such as 0.5") from None
 
 
 def with_values(scene: Scene | Assembly, values: Mapping[Key, float]) -> Scene | Assembly:

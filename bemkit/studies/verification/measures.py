@@ -111,7 +111,7 @@ def _brazilian_disc() -> Rows:
     along, across = (float(values[0]) for values in BrazilianDisc(3.0, np.radians(10.0)).stresses(np.zeros(1)))
 
     def stress(axis: int) -> Measure:
-        """Return what evaluates a stress beside the centre."""
+        """Return a function that evaluates a stress beside the centre."""
         return lambda solution: float(interior_fields(solution).stress(np.array([[-1e-9, -1e-9]]))[0, axis, axis])
 
     return {"compression": (stress(1), along), "tension": (stress(0), across)}

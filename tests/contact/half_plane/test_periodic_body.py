@@ -168,7 +168,7 @@ def test_a_state_that_is_no_response_is_out_of_balance() -> None:
         ({"parts": (bk.Part("zone", bk.Pressure(1.0)),), "law": bk.Frictionless()}, "is in contact: give one an"),
         ({"discretisation": bk.Galerkin(2)}, "tractions on a half-plane are constant on each element"),
         ({"discretisation": bk.ConstantCollocation()}, "tractions on a half-plane are constant on each element"),
-        ({"shape": bk.Rectangle(1.0, 1.0)}, "the body is no half-plane"),
+        ({"shape": bk.Rectangle(1.0, 1.0)}, "the body is not a half-plane"),
     ],
 )
 def test_what_it_cannot_do_is_named(changes: dict[str, object], message: str) -> None:

@@ -276,7 +276,7 @@ def test_wrong_elements(elements: list[int]) -> None:
 
 
 def test_a_short_cover_in_the_middle_of_an_element() -> None:
-    """The node next to it takes it alone, however short it is beside an element, as long as it is no sliver."""
+    """The node next to it takes it alone, however short it is beside an element, as long as it is not a sliver."""
     narrow = block((0.6, -1.0), (0.61, 0.0), 1, 2)
     one, two = side_of(block((0.0, 0.0), (1.0, 1.0), 1, 2), 6, "bottom"), side_of(narrow, 1, "top")
     coupling = couple(one, two)

@@ -210,12 +210,12 @@ def test_svg_curves_in_units_of_the_picture(tmp_path) -> None:
 
 @needs_svgpathtools
 def test_svg_that_is_none(tmp_path) -> None:
-    with pytest.raises(GeometryError, match=r"part.svg: it cannot be read \(.*\): save it as plain SVG anew"):
+    with pytest.raises(GeometryError, match=r"part.svg: it cannot be read \(.*\): save it again as plain SVG"):
         read(tmp_path, "part.svg", "hello")
 
 
 def test_other_drawings(tmp_path) -> None:
-    with pytest.raises(GeometryError, match=r"part.dwg: it is no drawing that bemkit reads: give .dxf or .svg"):
+    with pytest.raises(GeometryError, match=r"part.dwg: it is not a drawing that bemkit reads: give .dxf or .svg"):
         read(tmp_path, "part.dwg", "")
 
 

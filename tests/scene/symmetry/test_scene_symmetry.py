@@ -124,7 +124,7 @@ def test_a_narrow_difference_is_seen_on_the_elements() -> None:
         ),
         (
             square(symmetry=HALF, mesh=bk.MeshOptions(elements=4)),
-            "n_elements is 4, of which the symmetry leaves 2 for 3 pieces .* give at least 6",
+            "n_elements is 4: symmetry leaves 2 elements for 3 pieces .* give at least 6",
         ),
     ],
 )

@@ -107,7 +107,7 @@ def test_changed_settings_and_other_scenes_are_not_mixed(
 def test_files_of_others_stay(tmp_path: Path) -> None:
     path = tmp_path / "rows.jsonl"
     path.write_text("my thesis")
-    assert "is no complete file of the format" in str(call(*FAST, "-o", path).exception)
+    assert "is not a complete file of the format" in str(call(*FAST, "-o", path).exception)
     assert path.read_text() == "my thesis"
 
 
@@ -185,7 +185,9 @@ def test_a_label_that_is_missing_is_noticed(tmp_path: Path) -> None:
     list(FILE.keep(path, iter(rows), {}, labels))
     assert repr(FILE.read(path)) == repr((labels, rows))
     path.write_text(path.read_text().replace('"grading": "x", ', ""))
-    with pytest.raises(RowFileError, match="is no complete file of the format 'bemkit-study 3': choose another name"):
+    with pytest.raises(
+        RowFileError, match="is not a complete file of the format 'bemkit-study 3': choose another name"
+    ):
         FILE.read(path)
 
 

@@ -65,7 +65,7 @@ def test_a_damaged_line_and_a_foreign_file_are_refused(tmp_path: Path) -> None:
     content = path.read_text()
     for damaged in ("my thesis\n", content.replace('"meshes"', '"mashes"'), content.replace("{", "[", 2), ""):
         path.write_text(damaged)
-        with pytest.raises(RowFileError, match=r"rows\.jsonl: is no complete file of the format 'bemkit-study 3'"):
+        with pytest.raises(RowFileError, match=r"rows\.jsonl: is not a complete file of the format 'bemkit-study 3'"):
             FILE.read(path)
     path.write_text(content.replace("bemkit-study 3", "bemkit-study 2"))
     with pytest.raises(RowFileError, match="has the format 'bemkit-study 2', not 'bemkit-study 3': delete it first"):

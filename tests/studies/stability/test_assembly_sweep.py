@@ -142,7 +142,7 @@ def test_what_has_no_similar_assembly_is_refused(sheared):
             {"rigid": (dataclasses.replace(punch, obstacle=bk.SignedDistance(bk.Expression("x + y"))),)},
             "obstacle is SignedDistance",
         ),
-        ({"law": bk.SlipWeakening(bk.Expression("0.3 + 0 * x"), 0.2, 1e-3)}, "is no number: give one"),
+        ({"law": bk.SlipWeakening(bk.Expression("0.3 + 0 * x"), 0.2, 1e-3)}, "is not a number: give one"),
     ):
         with pytest.raises(InputError, match=words):
             ASSEMBLY_TWIN.apply(dataclasses.replace(sheared, **changes))

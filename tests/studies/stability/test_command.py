@@ -83,7 +83,7 @@ def test_bad_input_is_one_line(arguments: tuple[str, ...], message: str) -> None
 def test_files_of_others_and_of_other_scenes_stay(swept: bytes, tmp_path: Path) -> None:
     path = tmp_path / "rows.jsonl"
     path.write_text("my thesis")
-    assert "is no complete file of the format" in str(call(*FAST, "-o", path).exception)
+    assert "is not a complete file of the format" in str(call(*FAST, "-o", path).exception)
     assert path.read_text() == "my thesis"
     path.write_bytes(swept)
     other = call("stability", "paper-2", "--elements", "32", "--axis", "sliding", "-q", "-o", path)

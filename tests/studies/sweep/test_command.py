@@ -124,7 +124,7 @@ def test_tasks_of_a_group_travel_together() -> None:
         (("--vary", f"{FRICTION}=1", "--vary", f"{FRICTION}=2"), "is given twice: give all its values at once"),
         (("--vary", f"{FRICTION}=1", "--jobs", "2", "--on", "tcp://x:1"), "give one of them"),
         (("--vary", f"{FRICTION}=1", "--show", "energy"), "--over and --show go with figures: add --plot DIR"),
-        (("--vary", f"{FRICTION}=1", "--plot", "x", "--show", "energi"), "'energi' is no column of numbers"),
+        (("--vary", f"{FRICTION}=1", "--plot", "x", "--show", "energi"), "'energi' is not a column of numbers"),
         (("--vary", f"{FRICTION}=1", "--csv", "-", "--json", "-"), "two outputs go to the same file"),
     ],
 )
@@ -137,7 +137,7 @@ def test_wrong_words_are_named_before_anything_is_computed(arguments: tuple[str,
 def test_files_of_others_stay(tmp_path: Path) -> None:
     path = tmp_path / "table.jsonl"
     path.write_text("my thesis")
-    assert "is no complete file of the format" in str(call(*FAST, "--vary", f"{FRICTION}=1", "-o", path).exception)
+    assert "is not a complete file of the format" in str(call(*FAST, "--vary", f"{FRICTION}=1", "-o", path).exception)
     assert path.read_text() == "my thesis"
 
 

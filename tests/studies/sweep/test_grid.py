@@ -45,7 +45,7 @@ def test_numbers_of_several_bodies_are_changed() -> None:
         (SCENE, "law.friction_coeficient", r"law\.friction_coeficient: unknown key: .*did you mean 'friction_coeff"),
         (SCENE, "parts.top_load.condition.y", r"parts\.top_load: unknown key: .*did you mean 'top-load'"),
         (SCENE, "parts.wall.condition.x", "there are no keys here"),
-        (SCENE, "mesh.elements.x", "mesh.elements is no table"),
+        (SCENE, "mesh.elements.x", "mesh.elements is not a table"),
         (SCENE, "law", "law is a table: vary one number of it, such as law.friction_coefficient"),
         (SCENE, "parts.wall.condition", "is a table: there is no number in it"),
         (SCENE, "shape.corner", r"shape\.corner is a list: vary one number of it, such as shape\.corner\[0\]"),
@@ -111,7 +111,7 @@ def test_words_of_the_command_line() -> None:
         ("law", "give KEY=FIRST:LAST:COUNT or KEY=VALUE,VALUE,..."),
         ("a=0:1", "give a range as FIRST:LAST:COUNT"),
         ("a=0:1:0", "give a range as FIRST:LAST:COUNT"),
-        ("a=0,x", "'x' is no number: give numbers such as 0.5"),
+        ("a=0,x", "'x' is not a number: give numbers such as 0.5"),
     ],
 )
 def test_wrong_words_are_named(text: str, message: str) -> None:
@@ -124,8 +124,8 @@ def test_wrong_words_are_named(text: str, message: str) -> None:
     [
         ({}, "vary is empty"),
         ({"a": []}, "a: there are no values"),
-        ({"a": [1.0, float("nan")]}, "a: nan is no finite number"),
-        ({"a": ["1"]}, "a: '1' is no finite number"),
+        ({"a": [1.0, float("nan")]}, "a: nan is not a finite number"),
+        ({"a": ["1"]}, "a: '1' is not a finite number"),
         ({"a": [1.0, 1]}, "a: 1 is given twice: remove one"),
         ({"a": range(400), "b": range(400)}, "there are 160000 rows: give fewer values"),
     ],
