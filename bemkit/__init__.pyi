@@ -79,6 +79,7 @@ from bemkit.results.interior import interior_fields as interior_fields
 from bemkit.results.result_file import read_result as read_result
 from bemkit.results.result_file import write_result as write_result
 from bemkit.results.solution import Solution as Solution
+from bemkit.runs.collapse import coulomb_load_factor as coulomb_load_factor
 from bemkit.runs.collapse import largest_load_factor as largest_load_factor
 from bemkit.runs.critical_friction import CriticalFriction as CriticalFriction
 from bemkit.runs.critical_friction import critical_friction as critical_friction

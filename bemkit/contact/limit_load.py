@@ -11,7 +11,7 @@ from bemkit.arrays import FloatArray
 from bemkit.contact.conditions import RigidMotions, largest_components, scaled_motions
 from bemkit.contact.solvability import contact_forces, with_met_nodes
 
-_WITHOUT_BOUND = 1e6
+WITHOUT_BOUND = 1e6
 """Multiple of all other forces above which the load that contact holds counts as unbounded."""
 
 
@@ -73,12 +73,12 @@ def _programme(
     works, bounds = contact_forces(motions, resistance, slope)
     balance = sparse.hstack([works, sparse.csc_array(growing[:, None])], format="csc")
     cost = np.append(np.zeros(works.shape[1]), -1.0)
-    bounds = np.vstack([bounds, [-_WITHOUT_BOUND, _WITHOUT_BOUND]])
+    bounds = np.vstack([bounds, [-WITHOUT_BOUND, WITHOUT_BOUND]])
     result = linprog(  # type: ignore[call-overload]  # the stubs know no sparse arrays
         cost, A_eq=balance, b_eq=-constant, bounds=bounds, method="highs"
     )
     if result.x is None:
         return None, None
-    if result.x[-1] > 0.5 * _WITHOUT_BOUND:
+    if result.x[-1] > 0.5 * WITHOUT_BOUND:
         return np.inf, None
     return float(result.x[-1]), -np.asarray(result.eqlin.marginals, dtype=float)

@@ -5,7 +5,10 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from scipy.sparse import csr_array
 
+from bemkit.arrays import FloatArray
+from bemkit.contact.coulomb_limit import CoulombLimit, coulomb_limit
 from bemkit.contact.limit_load import largest_factor
 from bemkit.errors import InputError
 from bemkit.model.placed import Meshes, place
@@ -13,6 +16,8 @@ from bemkit.model.rigid_blocks import friction_of, joints_of, loads_of, relative
 from bemkit.runs.steps import UnsolvableSceneError
 from bemkit.scene.assembly import Assembly
 from bemkit.scene.load_history import load_steps, with_scaled_loads
+
+_UNSOLVABLE = "no contact tractions can balance the constant load, at any load factor"
 
 
 def largest_load_factor(assembly: Assembly, *, meshes: Meshes = None) -> float:
@@ -43,6 +48,47 @@ def largest_load_factor(assembly: Assembly, *, meshes: Meshes = None) -> float:
     joints have forces at the ends of elements. Of Coulomb friction this is a bound from above, see
     `bemkit.contact.limit_load.largest_factor`; a mesh holds less by the share of a joint that its last nodes take.
     """
+    motions, constant, growing, friction = _limit_analysis(assembly, meshes)
+    factor = largest_factor(motions, constant, growing, friction)
+    if factor is None:
+        raise UnsolvableSceneError(_UNSOLVABLE)
+    return factor
+
+
+def coulomb_load_factor(assembly: Assembly, *, meshes: Meshes = None) -> CoulombLimit:
+    """Return load factors at which an assembly with Coulomb friction, which does not dilate, collapses.
+
+    Parameters
+    ----------
+    assembly : Assembly
+    meshes : mapping of str to BoundaryMesh, optional
+        Both as for `largest_load_factor`.
+
+    Returns
+    -------
+    CoulombLimit
+        All infinite if supports and contacts hold any multiple.
+
+    Raises
+    ------
+    UnsolvableSceneError
+        If no factor at all leaves a load that can be balanced.
+    InputError
+        If friction has a cap, or no state of collapse was found.
+    """
+    motions, constant, growing, friction = _limit_analysis(assembly, meshes)
+    if len(friction) > 1:
+        raise InputError("a friction law has a cap: the collapse with Coulomb friction needs laws without one")
+    found = coulomb_limit(motions, constant, growing, *friction[0])
+    if found is None:
+        raise UnsolvableSceneError(_UNSOLVABLE)
+    return found
+
+
+def _limit_analysis(
+    assembly: Assembly, meshes: Meshes
+) -> tuple[csr_array, FloatArray, FloatArray, list[tuple[FloatArray, FloatArray]]]:
+    """Return relative motions, the work of the constant and of the growing load on them, and friction."""
     assembly = load_steps(replace(assembly, load_factors=(1.0,)))[-1]
     bodies, unloaded = place(assembly, meshes), with_scaled_loads(assembly, 0.0)
     joints = tuple(joints_of(assembly, bodies))
@@ -58,7 +104,4 @@ def largest_load_factor(assembly: Assembly, *, meshes: Meshes = None) -> float:
     constant = loads_of(at_rest)
     growing = loads_of(rigid_blocks(assembly, bodies)) - constant
     typical = float(np.abs(constant).sum()) or float(np.abs(growing).sum()) or 1.0
-    factor = largest_factor(relative_motions(at_rest, joints), constant, growing, friction_of(joints, typical))
-    if factor is None:
-        raise UnsolvableSceneError("no contact tractions can balance the constant load, at any load factor")
-    return factor
+    return relative_motions(at_rest, joints), constant, growing, friction_of(joints, typical)

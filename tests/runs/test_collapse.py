@@ -127,6 +127,45 @@ def test_walls_of_ferris_and_tin_loi_have_their_associative_factors(factor: floa
     assert bk.largest_load_factor(assembly_of(blocks, 0.65, 4)) == pytest.approx(factor, rel=2e-3)
 
 
+COULOMB = {0.643: 0.640, 0.580: 0.563, 0.404: 0.356, 0.332: 0.264, 0.240: 0.215}
+"""Coulomb factors of the same walls by their associative ones [FerrisTinLoi2001]."""
+
+
+@pytest.mark.parametrize(("factor", "expected"), slow_except(COULOMB.items(), (0.643, 0.640), (0.332, 0.264)))
+def test_the_coulomb_factor_of_ferris_and_tin_loi_is_bracketed(factor: float, expected: float) -> None:
+    found = bk.coulomb_load_factor(assembly_of(courses(FERRIS_AND_TIN_LOI[factor], 4.0, 1.75), 0.65, 4))
+    assert found.factor == pytest.approx(expected, abs=6e-4)  # three printed digits
+    assert found.associative == pytest.approx(factor, abs=6e-4)
+    assert 0.98 * found.factor <= found.held < found.factor  # at most 2 % wide
+    assert 0.98 * found.factor <= found.smallest <= found.factor < found.associative
+
+
+def test_coulomb_and_associative_factors_agree_where_one_motion_is_possible() -> None:
+    """Two columns that slide or tip alone, and a block with cohesion 0.3 on a length of 2."""
+    for name, expected in (("column that slides", 0.3), ("column that tips", 0.2)):
+        blocks, friction, _ = OWN[name]
+        found = bk.coulomb_load_factor(assembly_of(blocks, friction, 4))
+        assert found.factor == pytest.approx(expected, rel=1e-6)  # accuracy of linear programmes
+        assert found.smallest == pytest.approx(expected, rel=1e-6)
+        assert found.held == pytest.approx(0.99 * expected, rel=1e-5)
+    block = assembly_of(np.array([[0.0, 0.0, 2.0, 1.0]]), 0.0, 7, push=True)
+    found = bk.coulomb_load_factor(replace(block, law=bk.CohesiveCoulomb(0.4, 0.3)))
+    assert found.factor == pytest.approx(1.4, rel=1e-6)
+
+
+def test_coulomb_factors_without_bound_and_what_is_refused(monkeypatch) -> None:
+    block = assembly_of(np.array([[0.0, 0.0, 2.0, 1.0]]), 0.5, 4)
+    assert bk.coulomb_load_factor(replace(block, bodies=(replace(block.bodies[0], body_forces=()),))).factor == np.inf
+    with pytest.raises(bk.InputError, match="a friction law has a cap: "):
+        bk.coulomb_load_factor(replace(block, law=bk.CohesiveCoulomb(0.9, 0.0, 0.25)))
+    rising = (bk.Gravity(1.0, (0.0, 1.0), is_constant=True), bk.Gravity(1.0, (1.0, 0.0)))
+    with pytest.raises(bk.InputError, match="no contact tractions can balance the constant load"):
+        bk.coulomb_load_factor(replace(block, bodies=(replace(block.bodies[0], body_forces=rising),)))
+    monkeypatch.setattr("bemkit.contact.coulomb_limit._N_STEPS", 0)
+    with pytest.raises(bk.InputError, match="no state of collapse was found: compare largest_load_factor"):
+        bk.coulomb_load_factor(block)
+
+
 def test_a_block_that_overhangs_a_table_tips_about_its_edge() -> None:
     """A load on the right end of a block whose middle is 0.3 inside of the edge, between two nodes."""
     table = bk.PolygonalObstacle(((-2.0, 0.0), (1.3, 0.0), (1.3, -1.0), (-2.0, -1.0)))

@@ -1,0 +1,246 @@
+"""Load factors at which rigid bodies in contact with Coulomb friction, which does not dilate, may collapse."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy import sparse
+from scipy.optimize import linprog
+from scipy.sparse import csc_array
+
+from bemkit.arrays import FloatArray
+from bemkit.contact.conditions import RigidMotions, largest_components, scaled_motions
+from bemkit.contact.limit_load import WITHOUT_BOUND, largest_factor
+from bemkit.contact.solvability import with_met_nodes
+from bemkit.errors import InputError
+
+_N_STEPS = 60
+"""Most linear programmes with given friction bounds; walls of 30 to 60 blocks take 10 to 50."""
+_SHARE = 0.6
+"""Share of the last normal forces in the next ones: without the mean, states of equal factors alternate."""
+_STEADY, _N_STEADY = 1e-5, 6
+"""Relative change of the factor, and number of steps in turn without a larger one, after which the iteration ends."""
+_MOVES = 1e-7
+"""Velocity relative to the largest one, above which it is no round-off of linear programming."""
+_BELOW = (0.01, 0.02, 0.05, 0.1, 0.2)
+"""Shares below the factor at which a state of forces that holds is sought."""
+_HOLDS = 1e-6
+"""Relative growth of the factor that shows that no motion begins, above the tolerance of linear programming."""
+
+_ANY_FACTOR = np.array([[-WITHOUT_BOUND, WITHOUT_BOUND]])
+
+
+@dataclass(frozen=True)
+class CoulombLimit:
+    """Load factors of collapse with Coulomb friction.
+
+    With friction that does not dilate, contact forces at a factor are not unique, and whether a motion begins depends
+    on them. So factors of collapse fill intervals, and none of these numbers is a lower bound of all of them.
+
+    Parameters
+    ----------
+    held : float
+        At this factor a state of forces is known from which the growing load begins no motion: the same friction bounds
+        hold more. It is 1 % below `factor` for walls of dozens of blocks, minus infinity if no state was found.
+    factor : float
+        At this factor a state of forces is known from which a motion begins: forces in balance and in the cones of
+        friction, and a motion that nowhere penetrates, opens only joints without pressure and slides only against full
+        friction. It is the limit of the iteration, and agrees
+        with factors in the literature.
+    smallest : float
+        The smallest factor at which such a state was found: an upper bound of the smallest factor of collapse.
+    associative : float
+        No state of forces at all exists above this factor.
+    """
+
+    held: float
+    factor: float
+    smallest: float
+    associative: float
+
+
+def coulomb_limit(
+    motions: RigidMotions, constant: FloatArray, growing: FloatArray, cohesion: FloatArray, slope: FloatArray
+) -> CoulombLimit | None:
+    """Return load factors of collapse; the parameters are those of `bemkit.contact.limit_load.largest_factor`.
+
+    Parameters
+    ----------
+    motions : (n_motions, 2 n) array or sparse array
+    constant, growing : (n_motions,) arrays [N]
+    cohesion, slope : (n,) arrays [N], [-]
+
+    Returns
+    -------
+    CoulombLimit or None
+        None if no factor at all balances the loads.
+
+    Notes
+    -----
+    Linear programmes in turn: friction bounds are given by the normal forces of the programmes before, so that sliding
+    does not dilate [FerrisTinLoi2001]. Each yields a motion. The forces of collapse of that motion form a convex set,
+    and two further programmes find its smallest and largest factor; every factor between has a state of collapse. A
+    state holds if the same friction bounds balance a larger factor.
+    """
+    associative = largest_factor(motions, constant, growing, [(cohesion, slope)])
+    if associative is None:
+        return None
+    if not np.isfinite(associative):
+        return CoulombLimit(np.inf, np.inf, np.inf, associative)
+    unit = largest_components(motions)
+    unit = np.where(unit > 0.0, unit, 1.0)  # what touches nothing
+    scaled, constant, growing = scaled_motions(motions, unit), constant / unit, growing / unit
+    size = float(np.abs(growing).max())
+    scale = float(np.abs(constant).max()) or size
+
+    def programme(slopes: FloatArray) -> tuple[CoulombLimit, FloatArray | None]:
+        points = np.flatnonzero(np.isfinite(slopes))
+        columns = sparse.csc_array(scaled)
+        blocks = _Blocks(
+            columns[:, 2 * points],
+            columns[:, 2 * points + 1],
+            constant / scale,
+            growing / size,
+            cohesion[points] / scale,
+            slopes[points],
+        )
+        return _limit(blocks)
+
+    found = with_met_nodes(scaled, cohesion / scale, slope, programme)
+    if np.isnan(found.factor):
+        raise InputError("no state of collapse was found: compare largest_load_factor, a bound from above")
+    held, factor, smallest = (scale / size * value for value in (found.held, found.factor, found.smallest))
+    return CoulombLimit(held, factor, smallest, associative)
+
+
+@dataclass(frozen=True, eq=False)
+class _Blocks:
+    """Dimensionless loads (m,) on m motions, and works (m, n) of unit forces, outward and along n points, on them."""
+
+    normal: csc_array
+    tangential: csc_array
+    constant: FloatArray
+    growing: FloatArray
+    cohesion: FloatArray
+    slope: FloatArray
+
+    def bound(self, pressing: FloatArray) -> FloatArray:
+        """Return the friction bounds (n,) of pressing forces (n,)."""
+        return self.cohesion + self.slope * pressing
+
+    @property
+    def load_column(self) -> csc_array:
+        """The growing load as the last column of the equations of balance."""
+        return sparse.csc_array(self.growing[:, None])
+
+
+def _limit(blocks: _Blocks) -> tuple[CoulombLimit, FloatArray | None]:
+    """Return the factors, without dimension, and the velocities of the last collapse; nan and None if there is none."""
+    none = CoulombLimit(np.nan, np.nan, np.nan, np.nan), None
+    pressing = _pressing_forces_at_the_limit(blocks)
+    if pressing is None:
+        return none
+    factor, smallest, velocities, n_steady = np.nan, np.inf, None, 0
+    for _ in range(_N_STEPS):
+        found = _largest_with_bound(blocks, blocks.bound(pressing))
+        if found is None:
+            break
+        last, (value, forces, motion) = factor, found
+        lowest, highest = _factors_of_collapse(blocks, motion)
+        smallest = min(smallest, lowest)
+        if lowest <= highest:
+            factor, velocities = min(max(value, lowest), highest), motion
+        n_steady = n_steady + 1 if abs(factor - last) <= _STEADY * abs(factor) else 0
+        if n_steady == _N_STEADY:
+            break
+        pressing = (1.0 - _SHARE) * pressing + _SHARE * forces
+    if velocities is None:
+        return none
+    below = (float(factor - share * abs(factor)) for share in _BELOW)
+    held = next((each for each in below if _holds(blocks, each, pressing)), -np.inf)
+    return CoulombLimit(held, factor, smallest, np.nan), velocities
+
+
+def _least(
+    cost: FloatArray,
+    balance: csc_array,
+    right: FloatArray,
+    limits: FloatArray,
+    below: tuple[csc_array | None, FloatArray | None] = (None, None),
+) -> Any:
+    """Return the result of a linear programme with equations, limits (n, 2), and perhaps inequalities."""
+    return linprog(  # type: ignore[call-overload]  # the stubs know no sparse arrays
+        cost, A_ub=below[0], b_ub=below[1], A_eq=balance, b_eq=right, bounds=limits, method="highs"
+    )
+
+
+def _pressing_forces_at_the_limit(blocks: _Blocks) -> FloatArray | None:
+    """Return the pressing forces (n,) that balance the largest factor when sliding dilates; None if none do."""
+    n, wedged = blocks.slope.size, blocks.tangential @ sparse.diags_array(blocks.slope)
+    edges = [wedged - blocks.normal, -wedged - blocks.normal]
+    balance = sparse.hstack([*edges, blocks.tangential, blocks.load_column], format="csc")
+    limits = np.vstack([np.tile([0.0, np.inf], (2 * n, 1)), blocks.cohesion[:, None] * [-1.0, 1.0], _ANY_FACTOR])
+    result = _least(np.append(np.zeros(3 * n), -1.0), balance, -blocks.constant, limits)
+    return None if result.x is None else np.asarray(result.x[:n] + result.x[n : 2 * n])
+
+
+def _largest_with_bound(blocks: _Blocks, bound: FloatArray) -> tuple[float, FloatArray, FloatArray] | None:
+    """Return the largest factor with given friction bounds (n,), its pressing forces (n,) and its motion (m,)."""
+    balance = sparse.hstack([-blocks.normal, blocks.tangential, blocks.load_column], format="csc")
+    limits = np.vstack([np.tile([0.0, np.inf], (bound.size, 1)), bound[:, None] * [-1.0, 1.0], _ANY_FACTOR])
+    result = _least(np.append(np.zeros(2 * bound.size), -1.0), balance, -blocks.constant, limits)
+    if result.x is None:
+        return None
+    return float(result.x[-1]), result.x[: bound.size], -np.asarray(result.eqlin.marginals, dtype=float)
+
+
+def _factors_of_collapse(blocks: _Blocks, motion: FloatArray) -> tuple[float, float]:
+    """Return the smallest and the largest factor under which a motion (m,) begins; (inf, -inf) if under none.
+
+    Points that open carry no pressure; at points that slide friction is full and opposes sliding.
+    """
+    opening, sliding = motion @ blocks.normal, motion @ blocks.tangential
+    least = _MOVES * float(max(np.abs(opening).max(), np.abs(sliding).max()))
+    if opening.max() > least or motion @ blocks.growing <= 0.0:
+        return np.inf, -np.inf
+    is_closed, slides = opening >= -least, np.abs(sliding) > least
+    sense = np.where(slides, -np.sign(sliding), 0.0)
+    wedged = blocks.tangential @ sparse.diags_array(blocks.slope)
+    chosen, at_rest = np.flatnonzero(is_closed & slides), np.flatnonzero(is_closed & ~slides)
+    full = wedged[:, chosen] @ sparse.diags_array(sense[chosen]) - blocks.normal[:, chosen]
+    edges = [sign * wedged[:, at_rest] - blocks.normal[:, at_rest] for sign in (1.0, -1.0)]
+    balance = sparse.hstack([full, *edges, blocks.tangential[:, at_rest], blocks.load_column], format="csc")
+    cohesion = blocks.cohesion[at_rest, None] * [-1.0, 1.0]
+    limits = np.vstack([np.tile([0.0, np.inf], (chosen.size + 2 * at_rest.size, 1)), cohesion, _ANY_FACTOR])
+    right = -blocks.constant - blocks.tangential @ (sense * blocks.cohesion)
+    results = [_least(np.append(np.zeros(len(limits) - 1), sign), balance, right, limits) for sign in (1.0, -1.0)]
+    if any(result.x is None for result in results):
+        return np.inf, -np.inf
+    return float(results[0].x[-1]), float(results[1].x[-1])
+
+
+def _pressing_forces_near(blocks: _Blocks, factor: float, wanted: FloatArray) -> FloatArray | None:
+    """Return the pressing forces (n,) of a state in balance that differs least in sum from those wanted, or None."""
+    n, unit = wanted.size, sparse.eye_array(wanted.size)
+    balance = sparse.hstack([-blocks.normal, blocks.normal, blocks.tangential], format="csc")
+    wedge = sparse.diags_array(blocks.slope)
+    rows: list[Any] = [sparse.hstack([-wedge, wedge, sign * unit]) for sign in (1.0, -1.0)]
+    limits = np.zeros((3 * n, 2))
+    limits[:n, 1], limits[n : 2 * n, 1], limits[2 * n :] = np.inf, wanted, (-np.inf, np.inf)
+    result = _least(
+        np.append(np.ones(2 * n), np.zeros(n)),
+        balance,
+        blocks.normal @ wanted - blocks.constant - factor * blocks.growing,
+        limits,
+        (sparse.vstack(rows, format="csc"), np.tile(blocks.bound(wanted), 2)),
+    )
+    return None if result.x is None else np.asarray(wanted + result.x[:n] - result.x[n : 2 * n])
+
+
+def _holds(blocks: _Blocks, factor: float, wanted: FloatArray) -> bool:
+    """Return whether a state of forces at a factor, near pressing forces (n,), lets no motion begin."""
+    pressing = _pressing_forces_near(blocks, factor, wanted)
+    found = None if pressing is None else _largest_with_bound(blocks, blocks.bound(pressing))
+    return found is not None and found[0] > factor + _HOLDS * max(abs(factor), 1.0)
