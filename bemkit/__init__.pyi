@@ -100,6 +100,7 @@ from bemkit.scene.body_forces import Heating as Heating
 from bemkit.scene.body_forces import Rotation as Rotation
 from bemkit.scene.conditions import Clamped as Clamped
 from bemkit.scene.conditions import Contact as Contact
+from bemkit.scene.conditions import Force as Force
 from bemkit.scene.conditions import Free as Free
 from bemkit.scene.conditions import Part as Part
 from bemkit.scene.conditions import PrescribedDisplacement as PrescribedDisplacement

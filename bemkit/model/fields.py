@@ -15,7 +15,7 @@ from bemkit.operators.half_plane.surface import SurfaceElasticity
 from bemkit.operators.rigid_modes import without_motion
 from bemkit.operators.steklov_poincare import SteklovPoincare
 from bemkit.operators.steklov_poincare.forces_inside import HeavyElasticity
-from bemkit.scene.conditions import Free, Pressure, Traction
+from bemkit.scene.conditions import Free, Load
 from bemkit.scene.scene import Scene
 
 _MORE_POINTS = 4
@@ -68,7 +68,7 @@ def insert_loads(
     is_free = np.ones(mesh.n_elements, bool)
     for part, elements in scene.parts_on(mesh):
         is_free[elements] = isinstance(part.condition, Free) and part.name not in touching
-        if isinstance(part.condition, Traction | Pressure):
+        if isinstance(part.condition, Load):
             points, normals = mesh.points(elements, xi), mesh.normals_at(elements, xi)
             values = part.condition.at(points.reshape(-1, 2), normals.reshape(-1, 2)).reshape(points.shape)
             traction[elements] = np.einsum("lq,eqc->elc", projection, values)

@@ -31,7 +31,7 @@ from bemkit.operators.steklov_poincare.nodal_conditions import (
     integrate_traction,
     supported,
 )
-from bemkit.scene.conditions import Clamped, Part, PrescribedDisplacement, Pressure, Roller, Traction
+from bemkit.scene.conditions import Clamped, Load, Part, PrescribedDisplacement, Roller
 from bemkit.scene.discretisation import Discretisation
 from bemkit.scene.scene import Scene
 
@@ -82,12 +82,12 @@ def nodal_forces(scene: Scene, mesh: BoundaryMesh, space: BoundarySpace, units: 
     """Return the (n_nodes, 2) dimensionless forces of all loads on the nodes of a space on the unit mesh."""
     force = np.zeros((space.n_dofs // 2, 2))
     for part, elements in scene.parts_on(mesh):
-        if isinstance(part.condition, Traction | Pressure):
+        if isinstance(part.condition, Load):
             force += integrate_traction(space, elements, dimensionless_load(part.condition, units))
     return force
 
 
-def dimensionless_load(load: Traction | Pressure, units: Units) -> TractionField:
+def dimensionless_load(load: Load, units: Units) -> TractionField:
     """Return a load as a function of dimensionless points."""
 
     def field(points: FloatArray, normals: FloatArray) -> FloatArray:

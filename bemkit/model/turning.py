@@ -19,7 +19,7 @@ from bemkit.geometry.vectors import cross, norms
 from bemkit.model.model import Model
 from bemkit.model.placed import PlacedBody
 from bemkit.model.prepared import Prepared
-from bemkit.scene.conditions import Clamped, PrescribedDisplacement, Pressure, Roller, Traction
+from bemkit.scene.conditions import Clamped, Load, PrescribedDisplacement, Roller
 from bemkit.scene.unit_names import amount
 from bemkit.solvers.base import ContactSolution, Status
 
@@ -118,7 +118,7 @@ def _moment(body: PlacedBody, centre: FloatArray) -> tuple[float, float]:
     mesh, (xi, weights) = body.mesh, gauss_legendre(_N_POINTS)
     moment = size = 0.0
     for part, elements in body.scene.parts_on(mesh):
-        if isinstance(part.condition, Traction | Pressure):
+        if isinstance(part.condition, Load):
             points, normals = mesh.points(elements, xi), mesh.normals_at(elements, xi)
             load = part.condition.at(points.reshape(-1, 2), normals.reshape(-1, 2)).reshape(points.shape)
             shares = mesh.jacobian(elements, xi) * weights

@@ -11,7 +11,7 @@ from bemkit.contact.obstacle import measure_contact
 from bemkit.errors import InputError
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.vectors import LARGEST, SMALLEST
-from bemkit.scene.conditions import Contact, PrescribedDisplacement, Pressure, Traction
+from bemkit.scene.conditions import Contact, Load, PrescribedDisplacement
 from bemkit.scene.scene import Scene
 
 _FARTHEST = 1e7
@@ -92,7 +92,7 @@ def largest_sizes(scene: Scene, mesh: BoundaryMesh, length: float) -> tuple[floa
     for part, elements in scene.parts_on(mesh):
         points = mesh.points(elements, places).reshape(-1, 2)
         normals = np.repeat(mesh.normals[elements], places.size, axis=0)
-        if isinstance(part.condition, Traction | Pressure):
+        if isinstance(part.condition, Load):
             loads.append(float(np.abs(part.condition.at(points, normals)).max()))
         elif isinstance(part.condition, PrescribedDisplacement):
             motions.append(float(np.abs(part.condition.at(points)).max()))

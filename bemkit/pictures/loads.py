@@ -9,7 +9,7 @@ from bemkit.pictures.drawing import VERMILION, Axes
 from bemkit.pictures.plane import Stations, draw_arrows, stations
 from bemkit.pictures.shown import Shown, ShownBody
 from bemkit.scene.body_forces import Gravity
-from bemkit.scene.conditions import Pressure, Traction
+from bemkit.scene.conditions import Load
 
 _SPACING, _LONGEST = 0.04, 0.1
 """Distance of arrows, and length of the longest, in sizes of the picture."""
@@ -30,7 +30,7 @@ def draw_loads(axes: Axes, shown: Shown, factor: float) -> FloatArray:
     loaded: list[tuple[Stations, FloatArray]] = []
     for body in shown.bodies:
         for part, elements in body.parts:
-            if isinstance(part.condition, Traction | Pressure):
+            if isinstance(part.condition, Load):
                 places = stations(body, elements, _SPACING * shown.size, factor)
                 loaded.append((places, part.condition.at(places.points, places.normals)))
     largest = max((float(np.hypot(*load.T).max()) for _, load in loaded), default=0.0)

@@ -12,7 +12,7 @@ from bemkit.arrays import BoolArray, FloatArray, read_only
 from bemkit.errors import InputError
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.spaces import ConstantSpace
-from bemkit.scene.conditions import Clamped, PrescribedDisplacement, Pressure, Roller, Traction
+from bemkit.scene.conditions import Clamped, Load, PrescribedDisplacement, Roller
 from bemkit.scene.scene import Scene
 
 if TYPE_CHECKING:
@@ -242,7 +242,7 @@ class SolvedBody:
     def _is_loaded(self) -> BoolArray:
         loaded = np.zeros(self.mesh.n_elements, dtype=bool)
         for part in self.scene.parts:
-            loaded[self.mesh.part(part.name)] = isinstance(part.condition, Traction | Pressure)
+            loaded[self.mesh.part(part.name)] = isinstance(part.condition, Load)
         return loaded
 
     @cached_property

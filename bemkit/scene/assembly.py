@@ -15,7 +15,7 @@ from bemkit.formulas import choices, closest
 from bemkit.geometry.symmetry import Symmetry
 from bemkit.operators.linear.solvers import Automatic, LinearSolverChoice
 from bemkit.scene.body import Body, check_place, lines_across
-from bemkit.scene.conditions import Contact, Free, Part
+from bemkit.scene.conditions import Contact, Force, Free, Part
 from bemkit.scene.discretisation import Discretisation, Galerkin
 from bemkit.scene.mesh_options import MeshOptions
 from bemkit.scene.objects import check_objects
@@ -337,7 +337,7 @@ class Assembly(Stated):
         """Return the scene of one placed body, in which sides in contact are free parts.
 
         Its shape is in the coordinates of the body; loads, given displacements and obstacles are those in its place.
-        Copies share one scene, and so do bodies that are made of the same objects.
+        Copies without moments share one scene, and so do bodies that are made of the same objects.
         """
         stated = (body.shape, body.mesh, body.discretisation, *body.parts, None, *body.body_forces)
         key = (
@@ -345,6 +345,9 @@ class Assembly(Stated):
             body.material,
             self.touching_parts(body),
             lines_across(body, self.symmetry),
+            body.placement
+            if any(isinstance(part.condition, Force) and part.condition.moment for part in body.parts)
+            else None,
         )
         if key not in self._scenes:
             self._scenes[key] = self._new_scene(body)
@@ -352,8 +355,9 @@ class Assembly(Stated):
 
     def _new_scene(self, body: Body) -> Scene:
         named = {part.name for part in body.parts}
+        own = tuple(part.on(body.shape.outline(), body.placement) for part in body.parts)
         facing = [body.contact_part(name) for name in self.touching_parts(body)]
-        parts: tuple[Part, ...] = (*body.parts, *(part for part in facing if part.name not in named))
+        parts: tuple[Part, ...] = (*own, *(part for part in facing if part.name not in named))
         touches_obstacle = any(isinstance(part.condition, Contact) for part in parts)
         try:
             return Scene(

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import TypeAlias
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import ClassVar, TypeAlias, cast
 
 import numpy as np
 
@@ -13,7 +15,9 @@ from bemkit.contact.laws import FrictionLaw
 from bemkit.contact.obstacle import Obstacle
 from bemkit.errors import InputError
 from bemkit.formulas import Expression, ScalarField, check_field, evaluate_field
-from bemkit.geometry.outline import Selection
+from bemkit.geometry.meshing.division import quadrature
+from bemkit.geometry.outline import Outline, Selection
+from bemkit.geometry.placement import Placement
 from bemkit.geometry.vectors import turned_left
 from bemkit.scene.objects import check_objects
 
@@ -70,8 +74,16 @@ class PrescribedDisplacement:
         return self.x, self.y
 
 
+class Load:
+    """A condition that gives the traction."""
+
+    def at(self, points: FloatArray, normals: FloatArray) -> FloatArray:
+        """Return the traction at (n, 2) points [m] with unit normals as an (n, 2) array [Pa]."""
+        raise NotImplementedError
+
+
 @dataclass(frozen=True)
-class Traction:
+class Traction(Load):
     """A load per area in the directions x and y.
 
     Parameters
@@ -97,7 +109,7 @@ class Traction:
 
 
 @dataclass(frozen=True)
-class Pressure:
+class Pressure(Load):
     """A load against the outward normal, and optionally along the boundary.
 
     Parameters
@@ -124,6 +136,71 @@ class Pressure:
         """Evaluate the traction at (n, 2) points [m] with unit normals as an (n, 2) array [Pa]."""
         pressure = evaluate_field(self.pressure, points)[:, None]
         return evaluate_field(self.shear, points)[:, None] * turned_left(normals) - pressure * normals
+
+
+@dataclass(frozen=True)
+class Force(Load):
+    """A resultant force and moment of tractions that are uniform, or grow linearly from the middle of the part.
+
+    The traction is ``F / L + M J (x - c) / I`` with the length L of the part, its middle c, the second moment
+    ``I`` of the length about it, and J a quarter turn anticlockwise.
+
+    Parameters
+    ----------
+    x, y : float [N/m]
+        The force on the whole part, per unit of thickness.
+    moment : float [N m/m]
+        About the middle of the part, anticlockwise.
+
+    Raises
+    ------
+    ValueError
+        If one is not a finite number.
+    """
+
+    x: float = 0.0
+    y: float = 0.0
+    moment: float = 0.0
+    _part: ClassVar[tuple[float, FloatArray, float] | None] = None
+
+    def __post_init__(self) -> None:
+        for name in ("x", "y", "moment"):
+            value = getattr(self, name)
+            if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+                raise InputError(f"{name} is {value!r}: give a finite number, the resultant on the whole part")
+
+    @property
+    def is_placed(self) -> bool:
+        """Whether the part is known."""
+        return self._part is not None
+
+    def as_traction(self) -> Traction:
+        """Return the tractions as functions of the coordinates."""
+        return Traction(partial(self._component, 0), partial(self._component, 1))
+
+    def _component(self, axis: int, x: FloatArray, y: FloatArray) -> FloatArray:
+        points = np.column_stack([x, y])
+        return self.at(points, points)[:, axis]
+
+    def on(self, length: float, middle: FloatArray, second_moment: float) -> Force:
+        """Return the force on a part of a length [m], middle (2,) [m] and second moment of its length [m^3]."""
+        placed = Force(self.x, self.y, self.moment)
+        object.__setattr__(placed, "_part", (length, middle, second_moment))
+        return placed
+
+    def at(self, points: FloatArray, normals: FloatArray) -> FloatArray:
+        """Evaluate the traction at (n, 2) points [m] as an (n, 2) array [Pa]; the normals do not matter.
+
+        Raises
+        ------
+        InputError
+            If the force is not yet on a part of a scene.
+        """
+        if self._part is None:
+            raise InputError(f"{self} acts on no part: take the condition of a part of a scene")
+        length, middle, second_moment = self._part
+        turning = self.moment / second_moment * turned_left(points - middle)
+        return np.asarray(np.array([self.x, self.y]) / length + turning)
 
 
 @dataclass(frozen=True)
@@ -154,7 +231,7 @@ class Contact:
         check_objects(self)
 
 
-Condition: TypeAlias = Clamped | Roller | PrescribedDisplacement | Traction | Pressure | Contact | Free
+Condition: TypeAlias = Clamped | Roller | PrescribedDisplacement | Traction | Pressure | Force | Contact | Free
 
 
 def with_fields(
@@ -166,6 +243,8 @@ def with_fields(
             return Traction(load(x), load(y))
         case Pressure(pressure, shear):
             return Pressure(load(pressure), load(shear))
+        case Force(x, y, moment):
+            return Force(*(cast(float, load(value)) for value in (x, y, moment)))
         case PrescribedDisplacement(x, y):
             return PrescribedDisplacement(*(None if value is None else motion(value) for value in (x, y)))
     return condition
@@ -210,3 +289,19 @@ class Part:
     def selection(self) -> Selection:
         """The piece of the outline that the part covers."""
         return Selection(sides=self.sides, where=self.where)
+
+    def on(self, outline: Outline, placement: Placement) -> Part:
+        """Return the part with its resultant force, if it has one, spread over its piece of a placed outline.
+
+        Raises
+        ------
+        GeometryError
+            If the part is empty.
+        """
+        if not isinstance(self.condition, Force) or self.condition.is_placed:
+            return self
+        points, lengths = quadrature(outline, self.name, self.selection)
+        points, length = placement.forward(points), float(lengths.sum())
+        middle = lengths @ points / length
+        second_moment = float(lengths @ np.sum((points - middle) ** 2, axis=1))
+        return replace(self, condition=self.condition.on(length, middle, second_moment))

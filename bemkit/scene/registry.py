@@ -196,6 +196,7 @@ CONDITIONS = Registry(
         "displacement": "bemkit.scene.conditions:PrescribedDisplacement",
         "traction": "bemkit.scene.conditions:Traction",
         "pressure": "bemkit.scene.conditions:Pressure",
+        "force": "bemkit.scene.conditions:Force",
         "contact": "bemkit.scene.conditions:Contact",
         "free": "bemkit.scene.conditions:Free",
     },

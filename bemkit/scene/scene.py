@@ -23,6 +23,7 @@ from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.meshing.discretise import discretise
 from bemkit.geometry.meshing.division import divide
 from bemkit.geometry.outline import Outline, Selection
+from bemkit.geometry.placement import Placement
 from bemkit.geometry.shapes import Shape
 from bemkit.geometry.symmetry import Symmetry
 from bemkit.operators.linear.solvers import Automatic, LinearSolverChoice
@@ -135,6 +136,7 @@ class Scene(Stated):
             for side in part.sides:
                 if side not in names:
                     raise InputError(f"part {part.name!r}: unknown side {side!r}: the sides are {choices(side, names)}")
+        object.__setattr__(self, "parts", tuple(part.on(outline, Placement()) for part in self.parts))
 
     def _check_without_contact(self) -> None:
         for name, default in (("law", Frictionless()), ("solver", Fallbacks())):

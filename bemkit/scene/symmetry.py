@@ -24,7 +24,7 @@ from bemkit.geometry.shapes import Shape
 from bemkit.geometry.symmetry import Symmetry
 from bemkit.operators.material import Material
 from bemkit.scene.body_forces import BodyForce, Heating
-from bemkit.scene.conditions import Clamped, Contact, Part, PrescribedDisplacement, Pressure, Roller, Traction
+from bemkit.scene.conditions import Clamped, Contact, Load, Part, PrescribedDisplacement, Roller
 
 _PER_PIECE = 4
 """Elements of each piece of the boundary in the coarse mesh on which images are looked for."""
@@ -278,7 +278,7 @@ def _acting(scene: SymmetricScene, part: Part | None, samples: _Samples) -> tupl
             bounds = _bounds(scene.laws[part.name], points, scene.material.plane_modulus)
             gap, direction = measure_contact(obstacle, points, normals)
             return "in contact", {"gap": gap[:, None], "direction of contact": direction, **bounds}
-        case Traction() | Pressure() as load:
+        case Load() as load:
             return "free or loaded", {"traction": load.at(points, normals)}
         case PrescribedDisplacement() as motion:
             axes = " and ".join(name for name, is_given in zip("xy", motion.is_prescribed, strict=True) if is_given)

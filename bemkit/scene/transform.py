@@ -17,7 +17,7 @@ from bemkit.geometry.outline import Outline, Side
 from bemkit.geometry.shapes import CheckedShape, Shape
 from bemkit.geometry.symmetry import Symmetry
 from bemkit.scene.body_forces import BodyForce, Gravity, Heating, Rotation
-from bemkit.scene.conditions import Condition, Contact, Part, Pressure, Region, Traction, with_fields
+from bemkit.scene.conditions import Condition, Contact, Force, Part, Pressure, Region, Traction, with_fields
 from bemkit.scene.plane_motion import FarField
 from bemkit.scene.scene import Scene
 
@@ -209,6 +209,8 @@ def with_turned_loads(scene: Scene, angle: float) -> Scene:
         match condition:
             case Traction(x, y):
                 return Traction(_combined(x, cosine, y, -sine), _combined(x, sine, y, cosine))
+            case Force():
+                return turned(condition.as_traction())
             case Pressure(pressure, shear):  # the load is -pressure n + shear t, and t is n turned by 90 degrees
                 return Pressure(_combined(pressure, cosine, shear, sine), _combined(shear, cosine, pressure, -sine))
         return condition
@@ -274,7 +276,7 @@ def _transformed_condition(condition: Condition, affine: AffineMap, stress: floa
         own = None if condition.law is None else TransformedLaw(condition.law, 1.0 / stress, affine)
         return Contact(TransformedObstacle(condition.obstacle, affine, displacement), own)
     return with_fields(
-        condition,
+        condition.as_traction() if isinstance(condition, Force) else condition,
         lambda load: TransformedField(load, affine, stress),
         lambda motion: TransformedField(motion, affine, displacement),
     )

@@ -11,10 +11,13 @@ from bemkit.geometry.errors import GeometryError, format_point
 from bemkit.geometry.loops import following_in_loops
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.outline import N_SAMPLES, Outline, Selection, Side, breakpoints, merge_breakpoints
+from bemkit.geometry.quadrature import gauss_legendre
 from bemkit.geometry.symmetry import Symmetry
 from bemkit.geometry.vectors import norms
 
 _INNER = np.array([0.25, 0.5, 0.75])
+_N_PANELS, _N_POINTS = 64, 6
+"""Panels and points of integrals: twelve digits for arcs, and for splines, which have a bounded third derivative."""
 
 
 @dataclass(frozen=True)
@@ -205,6 +208,27 @@ def divide(outline: Outline, parts: Mapping[str, Selection]) -> Division:
         if not any(piece.part == name for piece in pieces):
             raise GeometryError(_empty_part_message(name, selection, outline))
     return Division(outline, tuple(pieces), tuple(parts))
+
+
+def quadrature(outline: Outline, name: str, selection: Selection) -> tuple[FloatArray, FloatArray]:
+    """Return points (n, 2) [m] and weights (n,) [m] that integrate over a part along the outline.
+
+    Raises
+    ------
+    GeometryError
+        If the part is empty or names an unknown side.
+    """
+    xi, weights = gauss_legendre(_N_POINTS)
+    points, lengths = [], []
+    for piece in divide(outline, {name: selection}).pieces:
+        if piece.part == name:
+            ends = np.linspace(*piece.span, _N_PANELS + 1)
+            half = 0.5 * np.diff(ends)[:, None]
+            s = (0.5 * (ends[1:] + ends[:-1])[:, None] + half * xi).ravel()
+            curve = outline.sides[piece.side].curve
+            points.append(curve.point(s))
+            lengths.append((half * weights).ravel() * norms(curve.derivative(s)))
+    return np.concatenate(points), np.concatenate(lengths)
 
 
 def _cut(number: int, side: Side, parts: Mapping[str, Selection]) -> list[Piece]:

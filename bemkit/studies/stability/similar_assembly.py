@@ -18,7 +18,7 @@ from bemkit.geometry.shapes import Disk, ExteriorOf, PlateWithHole, Polygon, Rec
 from bemkit.scene.assembly import Assembly, ContactPair
 from bemkit.scene.body import Body
 from bemkit.scene.body_forces import BodyForce, Gravity, Rotation
-from bemkit.scene.conditions import Condition, Contact, Part, PrescribedDisplacement, Pressure, Traction
+from bemkit.scene.conditions import Condition, Contact, Force, Part, PrescribedDisplacement, Pressure, Traction
 from bemkit.scene.copies import CircleCopies, Copies, GridCopies, ListedCopies
 from bemkit.scene.load_history import with_changed_steps
 from bemkit.scene.plane_motion import RigidBody
@@ -207,6 +207,9 @@ class AssemblySimilarity:
                 return Traction(*self._vector(_number(x), _number(y), self.stress))
             case Pressure(pressure, shear):
                 return Pressure(self.stress * _number(pressure), self.stress * _number(shear))
+            case Force(x, y, moment):
+                force = self.stress * self.length
+                return Force(*self._vector(x, y, force), force * self.length * moment)
             case PrescribedDisplacement(x, y) if x is not None and y is not None:
                 return PrescribedDisplacement(*self._vector(_number(x), _number(y), self.length))
             case PrescribedDisplacement(x, y) if self.turn == 0.0:

@@ -11,7 +11,7 @@ import numpy as np
 from bemkit.arrays import FloatArray, IntArray
 from bemkit.geometry.spaces import element_nodes
 from bemkit.results.solution import Solution
-from bemkit.scene.conditions import Clamped, Contact, PrescribedDisplacement, Pressure, Roller, Traction
+from bemkit.scene.conditions import Clamped, Contact, Load, PrescribedDisplacement, Roller
 
 CONTACT_LIMIT = 1e-6
 """Largest violation of contact, friction, supports and equilibrium in a right answer. Solvers stop at 1e-9 of a
@@ -134,7 +134,7 @@ def _tractions(solution: Solution, points: FloatArray, normals: FloatArray) -> F
     traction = np.zeros_like(points)
     for part in solution.scene.parts:
         elements = solution.mesh.part(part.name)
-        if isinstance(part.condition, Traction | Pressure):
+        if isinstance(part.condition, Load):
             load = part.condition.at(points[elements].reshape(-1, 2), normals[elements].reshape(-1, 2))
             traction[elements] = load.reshape(traction[elements].shape)
         elif not isinstance(part.condition, Contact):
