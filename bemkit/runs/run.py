@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from bemkit.contact.solvability import find_unsolvable_load
 from bemkit.errors import BemkitError, InputError
+from bemkit.interrupts import interruptible
 from bemkit.model.placed import Meshes
 from bemkit.operators.linear.threads import blas_threads_for
 from bemkit.plan.plan import few_on, make_plan
@@ -39,6 +40,7 @@ class LoadHistoryError(InputError):
     """A load history was given where only a single load is possible."""
 
 
+@interruptible()
 def run(
     scene: Stated,
     *,

@@ -13,6 +13,7 @@ from bemkit.contact.certificate import Certificate, certify
 from bemkit.contact.problem import ContactProblem, ContactState, SingularResponse
 from bemkit.contact.solvability import find_long_travel, find_unsolvable_load, needs_contact
 from bemkit.errors import InputError, NoResultError
+from bemkit.interrupts import interruptible, raise_missed_interrupt
 from bemkit.solvers.active_sets import ActiveSets, NodeStatus, contact_sets
 from bemkit.solvers.newton import FloatingResponse, consistent_state, untouched_response, with_least_slip
 
@@ -193,6 +194,7 @@ class ContactFailure(NoResultError):  # noqa: N818 - an outcome of the mathemati
         self.solution = solution
 
 
+@interruptible()
 def solve(
     problem: ContactProblem,
     solver: ContactSolver,
@@ -276,6 +278,7 @@ class _Run:
             sets = contact_sets(self.problem, iterate.state)
             history = [self._record(iterate, sets, 0, float("inf"), 0)]
             while (status := self._status(iterate, history)) is None:
+                raise_missed_interrupt()
                 try:
                     following = self.solver.step(self.problem, iterate)
                 except SingularResponse as error:
@@ -357,12 +360,7 @@ class _Run:
         return Status.MAX_STEPS if history[-1].step >= self.max_steps else None
 
     def _solution(
-        self,
-        iterate: Iterate,
-        status: Status,
-        sets: ActiveSets,
-        certificate: Certificate,
-        history: list[StepRecord],
+        self, iterate: Iterate, status: Status, sets: ActiveSets, certificate: Certificate, history: list[StepRecord]
     ) -> ContactSolution:
         last = history[-1]
         worst = f"worst certificate entry {certificate.worst:.1e} after {last.step} steps"

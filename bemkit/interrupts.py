@@ -1,0 +1,50 @@
+"""Ctrl-C that nothing swallows."""
+
+from __future__ import annotations
+
+import signal
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from types import FrameType
+
+
+class _Remembering:
+    """Handler of SIGINT that raises like Python's own and keeps in mind that it did.
+
+    Python prints and drops an exception that is raised inside a callback of a weak reference or a finalizer.
+    """
+
+    def __init__(self) -> None:
+        self.has_come = False
+
+    def __call__(self, number: int, frame: FrameType | None) -> None:
+        self.has_come = True
+        signal.default_int_handler(number, frame)
+
+
+@contextmanager
+def interruptible() -> Iterator[None]:
+    """Let Ctrl-C end a ``with`` statement, or as a decorator a function, wherever it falls.
+
+    It raises KeyboardInterrupt at once. If that was swallowed, `raise_missed_interrupt` raises it again, at the latest
+    the end of the statement. Only in the main thread, and only in place of Python's own handler, which returns
+    afterwards.
+    """
+    is_main = threading.current_thread() is threading.main_thread()
+    if not is_main or signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
+        yield
+        return
+    signal.signal(signal.SIGINT, _Remembering())
+    try:
+        yield
+        raise_missed_interrupt()
+    finally:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+def raise_missed_interrupt() -> None:
+    """Raise KeyboardInterrupt if one was swallowed since `interruptible` began."""
+    handler = signal.getsignal(signal.SIGINT)
+    if isinstance(handler, _Remembering) and handler.has_come and threading.current_thread() is threading.main_thread():
+        raise KeyboardInterrupt
