@@ -83,14 +83,10 @@ from bemkit.runs.collapse import coulomb_load_factor as coulomb_load_factor
 from bemkit.runs.collapse import largest_load_factor as largest_load_factor
 from bemkit.runs.critical_friction import CriticalFriction as CriticalFriction
 from bemkit.runs.critical_friction import critical_friction as critical_friction
+from bemkit.runs.distinct_solutions import distinct_solutions as distinct_solutions
 from bemkit.runs.first_yield import FirstYield as FirstYield
 from bemkit.runs.first_yield import first_yield as first_yield
-from bemkit.runs.history import run_history as run_history
-from bemkit.runs.nested import run_cascade as run_cascade
-from bemkit.runs.run import FailedRun as FailedRun
 from bemkit.runs.run import run as run
-from bemkit.runs.run import run_all as run_all
-from bemkit.runs.run import run_probe as run_probe
 from bemkit.scene.assembly import Assembly as Assembly
 from bemkit.scene.assembly import ContactPair as ContactPair
 from bemkit.scene.assembly import Touching as Touching

@@ -62,7 +62,7 @@ def assembled(assembly: bk.Assembly) -> None:
         now = f"{time.process_time():8.1f} s  ({time.perf_counter() - begin:7.1f} s)"
         print(f"{now}  step {record.step}: {words} {record.message}", flush=True)
 
-    for solution in bk.run_history([assembly], callback=shown):
+    for solution in bk.run([assembly], callback=shown):
         stages = ", ".join(f"{name} {seconds:.1f} s" for name, seconds in solution.timings.items())
         print(f"{solution!r}\n  {solution.linear_solves} responses: {stages}")
     memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6

@@ -92,7 +92,7 @@ def main() -> None:
     compiled.loaded()  # compiles now, not within a measurement
     clock = time.process_time()
     scene = rough_block(options.contact)
-    steps = bk.run_history([scene])
+    steps = bk.run([scene])
     seconds = time.process_time() - clock
     print(f"{steps[0].contact.n_contact} contact elements of {steps[0].mesh.n_elements}, {seconds:.0f} CPU seconds")
     print("pressure  touching  Persson  of it sticking  steps  largest violation")

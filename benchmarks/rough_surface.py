@@ -12,7 +12,6 @@ import argparse
 import time
 
 import bemkit as bk
-from bemkit.runs.nested import run_cascade
 
 
 def rough_surface(n_elements: int, mean_pressure: float = 0.02) -> bk.Scene:
@@ -44,7 +43,7 @@ def main() -> None:
 
             cold = str(run_on_mesh(scene).linear_solves)
         begin, busy = time.perf_counter(), time.process_time()
-        solution = run_cascade(scene, coarsest=1024)[-1]
+        solution = bk.run(scene, coarsest=1024)
         wall, processor = time.perf_counter() - begin, time.process_time() - busy
         worst = "not converged" if not solution.is_converged else f"{solution.certificate.worst:.1e}"
         print(

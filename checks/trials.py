@@ -15,7 +15,6 @@ from typing import Any
 from bemkit.errors import BemkitError
 from bemkit.results.assembly_solution import AssemblySolution
 from bemkit.results.solution import Solution
-from bemkit.runs.history import run_history
 from bemkit.runs.run import run
 from bemkit.scene.assembly import Assembly
 from bemkit.scene.scene import Scene
@@ -97,7 +96,7 @@ def solved_steps(
 ) -> Sequence[Solution] | Sequence[AssemblySolution]:
     """Solve the scenes of a case; one solution for each load step."""
     scenes: Any = case.scenes
-    return [run(scenes[0])] if len(scenes) == 1 and scenes[0].n_steps == 1 else run_history(scenes)
+    return [run(scenes[0])] if len(scenes) == 1 and scenes[0].n_steps == 1 else run(scenes)
 
 
 def judge(steps: Iterable[Solution] | Iterable[AssemblySolution]) -> tuple[Outcome, str, str]:

@@ -23,6 +23,9 @@ if TYPE_CHECKING:
     from bemkit.scene.scene import Scene
     from bemkit.solvers.base import StepRecord
 
+_COARSEST = 40
+"""Elements of the coarsest mesh of `--cascade`, at least."""
+
 
 @click.command()
 @click.argument("scene")
@@ -119,12 +122,8 @@ def _solve(
 ) -> Solution | AssemblySolution:
     from bemkit.runs.run import run as solve_scene
 
-    if cascade:
-        from bemkit.runs.nested import run_cascade
-
-        solution: Solution | AssemblySolution = run_cascade(scene, callback=callback)[-1]
-        return solution
-    solution = solve_scene(scene, file=history_file, callback=callback)
+    file, coarsest = (None, _COARSEST) if cascade else (history_file, None)
+    solution: Solution | AssemblySolution = solve_scene(scene, coarsest=coarsest, file=file, callback=callback)
     return solution
 
 

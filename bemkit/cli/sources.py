@@ -9,7 +9,6 @@ from typing import Any
 from bemkit.errors import InputError, concerning
 from bemkit.pictures.shown import Result
 from bemkit.results.result_file import read_result
-from bemkit.runs.history import run_history
 from bemkit.runs.run import run
 from bemkit.scene.toml import load_scene
 from bemkit.solvers.base import StepRecord
@@ -36,5 +35,5 @@ def solved_steps(source: str, callback: Callable[[StepRecord], None] | None) -> 
         return [solution.at_step(1 + k) for k in range(len(solution.loading.steps))]
     scene: Any = load_scene(source)
     with concerning(source):
-        steps: Sequence[Result] = run_history([scene], callback=callback)
+        steps: Sequence[Result] = run([scene], callback=callback)
     return steps

@@ -143,7 +143,7 @@ def errors(
 def solutions(scene: str, starts: int, elements: int | None, json_file: str | None) -> int:
     """Look for several solutions of SCENE from several starts."""
     with shown_progress(quiet=False):
-        from bemkit.runs.run import run_probe
+        from bemkit.runs.distinct_solutions import distinct_solutions
         from bemkit.scene.toml import load_single_body, with_overrides
 
         def as_json(found: Sequence[Solution]) -> str:
@@ -153,7 +153,7 @@ def solutions(scene: str, starts: int, elements: int | None, json_file: str | No
         summaries.check()
         chosen = with_overrides(load_single_body(scene), elements=elements)
         with concerning(scene):
-            found = run_probe(chosen, n_starts=starts)
+            found = distinct_solutions(chosen, n_starts=starts)
     summaries.write(found)
     if json_file != STDOUT:
         _print_solutions(found, starts)

@@ -10,7 +10,7 @@ from bemkit.errors import InputError
 from bemkit.plan import make_plan
 from bemkit.runs.density import DensityMeshes
 from bemkit.runs.earlier_steps import EarlierSteps
-from bemkit.runs.history import run_on_mesh
+from bemkit.runs.history import guess_from, run_on_mesh
 from bemkit.runs.hp import LayeredMeshes
 from bemkit.runs.mesh_sequence import Level, MeshSequence
 from bemkit.runs.refinement import refined, required_accuracy
@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 def run_adaptive(
     scene: Stated,
     *,
+    start: Any = None,
     callback: Callable[[StepRecord], None] | None = None,
     done: Any = None,
     finished: Callable[[Any], None] | None = None,
@@ -45,6 +46,8 @@ def run_adaptive(
     ----------
     scene : Scene or Assembly
         With `MeshOptions.accuracy`.
+    start : Solution or AssemblySolution, optional
+        Of the first mesh; as for `bemkit.run`.
     callback : callable, optional
         Receives a record of every step on every mesh.
     done, finished : optional
@@ -67,7 +70,7 @@ def run_adaptive(
         If the scene has no accuracy, degrees shall rise in a load history, or for the reasons of `bemkit.run`.
     """
     level: Level[Any] = Level.first(cast(Any, scene))
-    refinement = _Refinement(_rule(level), callback, EarlierSteps(done, finished), executor)
+    refinement = _Refinement(_rule(level), start, callback, EarlierSteps(done, finished), executor)
     return refined(level, refinement, scene.mesh)
 
 
@@ -88,6 +91,7 @@ class _Refinement:
     """How the meshes of a level are solved, judged and refined."""
 
     meshes: MeshSequence[Any]
+    start: Any
     callback: Callable[[StepRecord], None] | None
     earlier: EarlierSteps[Any]
     executor: Executor | None
@@ -100,7 +104,9 @@ class _Refinement:
             if solution.is_converged:
                 return solution
         earlier = self.earlier.on(level)
-        return joined(*solved_history([scene], level.meshes, self.callback, *earlier, executor=self.executor))
+        guess = guess_from(scene, self.start) if start is None else None
+        steps = solved_history([scene], level.meshes, self.callback, *earlier, guess=guess, executor=self.executor)
+        return joined(*steps)
 
     def error(self, solution: Any) -> float:
         """Return the estimated error; infinite without an estimate."""

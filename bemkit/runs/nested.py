@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from bemkit.contact.body import ContactState
 from bemkit.errors import BemkitError, InputError
 from bemkit.model.model import Model
 from bemkit.plan import check_elements
 from bemkit.results.solved_problem import SolvedProblem
-from bemkit.runs.adaptive import run_adaptive
 from bemkit.runs.steps import joined, solved_history
 from bemkit.runs.warm_start import state_on, take_sticking_state
 from bemkit.scene.scene import Scene
@@ -19,13 +18,21 @@ from bemkit.scene.steps import Stated
 from bemkit.scene.toml import with_overrides
 from bemkit.solvers.base import StepRecord
 
+if TYPE_CHECKING:
+    from concurrent.futures import Executor
+
 
 class CascadeError(InputError):
     """A scene that cannot be solved on one mesh after the other."""
 
 
-def run_cascade(
-    scene: Stated, *, coarsest: int = 40, ratio: int = 2, callback: Callable[[StepRecord], None] | None = None
+def run_nested(
+    scene: Stated,
+    *,
+    coarsest: int = 40,
+    ratio: int = 2,
+    callback: Callable[[StepRecord], None] | None = None,
+    executor: Executor | None = None,
 ) -> tuple[Any, ...]:
     """Solve a scene on meshes of growing size, ending with its own.
 
@@ -34,14 +41,16 @@ def run_cascade(
 
     Parameters
     ----------
-    scene : Scene
-        With a single load factor.
+    scene : Scene or Assembly
+        With a single load factor, without an accuracy.
     coarsest : int
         The number of elements is halved as long as it stays at least this large.
     ratio : int
         By what the number of elements is divided instead of two.
     callback : callable, optional
         Receives a record of every step on every mesh.
+    executor : Executor, optional
+        As for `bemkit.run`.
 
     Returns
     -------
@@ -64,8 +73,6 @@ def run_cascade(
         raise CascadeError("no part is in contact: one mesh is enough, where there is nothing to iterate")
     if scene.n_steps > 1:
         raise CascadeError(f"a load history of {scene.n_steps} steps cannot cascade: run it on one mesh")
-    if scene.mesh.accuracy is not None:
-        return run_adaptive(scene, callback=callback)
     check_elements(scene)
     counts = [scene.mesh.n_elements]
     while counts[-1] // ratio >= coarsest:
@@ -75,7 +82,7 @@ def run_cascade(
         is_last = count == counts[0]
         level = scene if is_last else with_overrides(scene, elements=count)
         try:
-            solutions.append(joined(*solved_history([level], callback=callback, guess=levels.start)))
+            solutions.append(joined(*solved_history([level], callback=callback, guess=levels.start, executor=executor)))
         except BemkitError:
             if is_last:  # a coarse mesh may be too coarse for the scene
                 raise

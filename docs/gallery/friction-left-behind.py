@@ -34,7 +34,7 @@ figure = Figure(figsize=(7.0, 4.0), layout="constrained")
 axes = figure.subplots()
 for name, solution in zip(
     ("only weight", "pushed", "let go"),
-    bk.run_history([pushed(0.0), pushed(0.6), pushed(0.0)]),
+    bk.run([pushed(0.0), pushed(0.6), pushed(0.0)]),
     strict=True,
 ):
     axes.plot(solution.contact.x, solution.contact.sigma_t, label=f"{name}: sum {abs(solution.force_tangential):.3f}")

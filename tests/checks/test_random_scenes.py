@@ -140,7 +140,7 @@ def test_a_wrong_success_is_called_wrong() -> None:
 
 def test_friction_that_gives_back_and_work_that_is_missing_are_wrong() -> None:
     loop = bk.load_scene("friction-loop")
-    steps = bk.run_history([dataclasses.replace(loop, mesh=bk.MeshOptions(elements=40), steps=loop.steps[:1])])
+    steps = bk.run([dataclasses.replace(loop, mesh=bk.MeshOptions(elements=40), steps=loop.steps[:1])])
     assert judge(steps)[0] in (Outcome.SUCCESS, Outcome.WARNED)
     for changes, message in (
         ({"dissipation": -1e-9}, "friction gave back"),
@@ -159,7 +159,7 @@ def test_friction_that_gives_back_and_work_that_is_missing_are_wrong() -> None:
 
 def test_round_off_of_a_body_that_only_moves_is_no_missing_work() -> None:
     loop = bk.load_scene("friction-loop")
-    (step, *_) = bk.run_history([dataclasses.replace(loop, mesh=bk.MeshOptions(elements=40), steps=loop.steps[:1])])
+    (step, *_) = bk.run([dataclasses.replace(loop, mesh=bk.MeshOptions(elements=40), steps=loop.steps[:1])])
     assert step.loading is not None
     last = step.loading.steps[-1]
     size = step.scene.material.plane_modulus * float(np.abs(step.boundary.displacement).max()) ** 2

@@ -155,7 +155,7 @@ def test_a_state_that_does_not_follow_is_out_of_balance() -> None:
 
 def test_a_history_may_begin_without_friction() -> None:
     scene = held(block())
-    smooth, rough = bk.run_history([scene, replace(scene, law=bk.Coulomb(0.3))])
+    smooth, rough = bk.run([scene, replace(scene, law=bk.Coulomb(0.3))])
     assert smooth.is_converged
     assert rough.is_converged
     assert not smooth.contact.sigma_t.any()

@@ -212,7 +212,7 @@ def test_two_equal_bodies_sheared_after_pressing_as_cattaneo_and_mindlin_say() -
         mesh=bk.MeshOptions(elements=700),
     )
     sheared = replace(scene, far=bk.FarField(force_y=1.0, force_x=shear, turn=0.0))
-    pressed_state, solution = bk.run_history([scene, sheared])
+    pressed_state, solution = bk.run([scene, sheared])
     assert solution.is_converged
     # pressing alone causes no friction between equal bodies
     assert np.abs(pressed_state.contact.sigma_t).max() < 1e-9

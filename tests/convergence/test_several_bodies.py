@@ -143,7 +143,7 @@ def test_cylinders_pressed_then_sheared_are_those_of_cattaneo_and_mindlin() -> N
     fitted = bk.run(sheared(0.0008, bk.MeshOptions(accuracy=0.004)))
     meshes = {name: body.mesh for name, body in fitted.bodies.items()}
     options = bk.MeshOptions(elements=100)  # not used: the meshes are given
-    pressed, solution = bk.run_history([sheared(0.0, options), sheared(0.0008, options)], meshes=meshes)
+    pressed, solution = bk.run([sheared(0.0, options), sheared(0.0008, options)], mesh=meshes)
     (contact,) = solution.contacts
     press, shear = contact.force_normal, abs(contact.force_tangential)
     half_width = np.sqrt(4.0 * press / np.pi)  # R = 1/2, E* = 1/2

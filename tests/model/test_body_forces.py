@@ -313,7 +313,7 @@ def test_load_steps_factor_once_and_keep_what_is_constant() -> None:
     given = block(parts=(FLOOR, WALLS, push), load_factors=(0.5, 1.0, 2.0))
     for constant, expected in ((False, (1.0, 2.0, 4.0)), (True, (1.5, 2.0, 3.0))):
         weight = dataclasses.replace(WEIGHT, is_constant=constant)
-        steps = bk.run_history([dataclasses.replace(given, body_forces=(weight,))])
+        steps = bk.run([dataclasses.replace(given, body_forces=(weight,))])
         for step, force in zip(steps, expected, strict=True):
             assert step.force_normal == pytest.approx(force, rel=1e-12)
         assert len(steps[-1].work.factorisations) == len(steps[0].work.factorisations)
@@ -330,7 +330,7 @@ def test_collocation_sweeps_again_for_other_forces() -> None:
         discretisation=bk.ConstantCollocation(),
         body_forces=(dataclasses.replace(WEIGHT, is_constant=True),),
     )
-    steps = bk.run_history([given])
+    steps = bk.run([given])
     assert [step.force_normal for step in steps] == pytest.approx([1.5, 3.0], rel=1e-12)
     assert bk.run(given).work == bk.make_plan(given, given.build_mesh()).work
 

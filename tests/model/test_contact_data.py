@@ -199,7 +199,7 @@ def test_obstacles_may_turn_their_directions_from_step_to_step() -> None:
         press = bk.Part("press", bk.PrescribedDisplacement(x=0.0, y=-0.01), sides=("top",))
         return block(bk.Part("seat", bk.Contact(circle), sides=("bottom",)), press)
 
-    first, second = bk.run_history([seat(0.3), seat(0.6)])
+    first, second = bk.run([seat(0.3), seat(0.6)])
     alone = bk.run(seat(0.6))
     assert first.is_converged
     np.testing.assert_allclose(second.contact.sigma_n, alone.contact.sigma_n, atol=1e-9 * 1e4)  # E, certificate

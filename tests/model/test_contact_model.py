@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
@@ -118,35 +119,29 @@ def test_a_body_in_contact_all_round(discretisation: object) -> None:
 
 
 def test_several_scenes_can_run_on_an_executor() -> None:
-    from concurrent.futures import ThreadPoolExecutor
-
     block = dataclasses.replace(scene(), mesh=bk.MeshOptions(40))
     scenes = [dataclasses.replace(block, law=bk.Coulomb(s)) for s in (0.1, 0.3)]
     with ThreadPoolExecutor(2) as pool:
-        parallel = bk.run_all(scenes, pool)
-    in_turn = bk.run_all(scenes)
+        parallel = list(pool.map(bk.run, scenes))
+    in_turn = [bk.run(each) for each in scenes]
     assert [s.force_tangential for s in parallel] == pytest.approx([s.force_tangential for s in in_turn], rel=1e-13)
     assert parallel[0].force_tangential != pytest.approx(parallel[1].force_tangential)
 
 
 def test_an_impossible_scene_among_others_fails_alone() -> None:
-    from concurrent.futures import ThreadPoolExecutor
-
     block = dataclasses.replace(scene(), mesh=bk.MeshOptions(40))
     lifted = dataclasses.replace(block, parts=(*block.parts[:2], bk.Part("top", bk.Traction(y=0.05), sides=("top",))))
     stopped = dataclasses.replace(
         block, discretisation=bk.ConstantCollocation(), mesh=bk.MeshOptions(240), linear_solver=bk.MatrixFree(1e-10, 1)
     )
     with ThreadPoolExecutor(2) as pool:
-        for found in (bk.run_all([block, lifted, stopped, block]), bk.run_all([block, lifted, stopped, block], pool)):
-            assert [each.is_converged for each in found] == [True, False, False, True]
-            first, second = found[1:3]
-            assert isinstance(first, bk.FailedRun)
-            assert isinstance(second, bk.FailedRun)
-            assert first.scene == lifted
-            assert "the load" in str(first.error)
-            assert isinstance(second.error, bk.NoResultError)
-            assert "1 steps of GMRES leave" in str(second.error)
+        first, second, third, fourth = [pool.submit(bk.run, each) for each in (block, lifted, stopped, block)]
+        assert first.result().is_converged
+        with pytest.raises(bk.BemkitError, match="the load"):
+            second.result()
+        with pytest.raises(bk.NoResultError, match="1 steps of GMRES leave"):
+            third.result()
+        assert fourth.result().is_converged
 
 
 def test_a_body_that_nothing_holds_is_an_error_with_a_remedy() -> None:

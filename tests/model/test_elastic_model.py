@@ -23,9 +23,8 @@ from bemkit.pictures import draw_boundary_traction, save_pictures
 from bemkit.results.result_file import read_result, write_result
 from bemkit.results.solution import Solution
 from bemkit.results.tables import to_csv, to_json
-from bemkit.runs.history import run_history
-from bemkit.runs.nested import CascadeError, run_cascade
-from bemkit.runs.run import run_probe
+from bemkit.runs.distinct_solutions import distinct_solutions
+from bemkit.runs.nested import CascadeError, run_nested
 from bemkit.scene.discretisation import Discretisation
 from bemkit.scene.scene import NoContactError
 from bemkit.scene.toml import SceneError, scene_from_toml, scene_to_toml
@@ -242,7 +241,7 @@ def test_load_factors_are_solved_one_after_the_other() -> None:
     np.testing.assert_allclose(twice.boundary.displacement, 2.0 * single.boundary.displacement, rtol=1e-10, atol=1e-12)
     assert twice.linear_solves == len(records) == 2
     moved = bk.Part("wall", bk.PrescribedDisplacement(x=0.1, y=0.0), ("left",))
-    first, second = run_history(
+    first, second = bk.run(
         [
             replace(scene, parts=(moved, scene.parts[1])),
             replace(scene, parts=(bk.Part("wall", bk.PrescribedDisplacement(x=0.0, y=0.0), ("left",)), scene.parts[1])),
@@ -292,9 +291,9 @@ def test_friction_is_refused_in_files() -> None:
 
 def test_questions_about_contact_are_refused(bent: Solution) -> None:
     with pytest.raises(CascadeError, match="no part is in contact: one mesh is enough"):
-        run_cascade(bending())
+        run_nested(bending())
     with pytest.raises(NoContactError, match="no part is in contact: the solution is the only one"):
-        run_probe(bending())
+        distinct_solutions(bending())
     with pytest.raises(NoContactError, match="start is given, but no part is in contact"):
         bk.run(bending(), start=bent)
     with pytest.raises(StabilityError, match="the scene has no contact, which this suite is about"):

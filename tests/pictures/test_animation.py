@@ -22,7 +22,7 @@ FACTORS = (0.3, 0.6, 1.0)
 @pytest.fixture(scope="module")
 def steps() -> tuple[bk.Solution, ...]:
     scene = with_overrides(bk.load_scene("paper-1"), elements=40, discretisation="linear")
-    return bk.run_history([dataclasses.replace(scene, load_factors=FACTORS)])
+    return bk.run([dataclasses.replace(scene, load_factors=FACTORS)])
 
 
 def test_no_step_is_refused() -> None:

@@ -16,7 +16,7 @@ from bemkit.model.prepared import prepare
 from bemkit.operators.linear.solvers import ChosenLinearSolver, DenseCholesky
 from bemkit.plan import check_elements
 from bemkit.plan import plan as plan_module
-from bemkit.runs.nested import run_cascade
+from bemkit.runs.nested import run_nested
 from tests.scenes import Perforated, paper, squeezed
 
 run = importlib.import_module("bemkit.runs.run")
@@ -142,10 +142,10 @@ def test_large_compressed_scenes_begin_on_coarser_meshes(monkeypatch: pytest.Mon
     records, meshes = [], []
 
     def kept(*arguments: object, **options: object) -> tuple[bk.Solution, ...]:
-        meshes.extend(run_cascade(*arguments, **options))  # type: ignore[arg-type]
+        meshes.extend(run_nested(*arguments, **options))  # type: ignore[arg-type]
         return tuple(meshes)
 
-    monkeypatch.setattr("bemkit.runs.nested.run_cascade", kept)
+    monkeypatch.setattr("bemkit.runs.nested.run_nested", kept)
     solution = bk.run(scene, callback=records.append)
     assert solution.mesh.n_elements == 1000
     assert solution.is_converged
@@ -157,7 +157,7 @@ def test_large_compressed_scenes_begin_on_coarser_meshes(monkeypatch: pytest.Mon
 
 def test_a_ratio_of_meshes_below_two_is_refused() -> None:
     with pytest.raises(ValueError, match="ratio = 1: give a whole number from 2 on"):
-        run_cascade(scene_of(400), ratio=1)
+        run_nested(scene_of(400), ratio=1)
 
 
 def test_a_body_of_many_sides_takes_no_mesh_that_is_too_coarse_for_it(monkeypatch: pytest.MonkeyPatch) -> None:

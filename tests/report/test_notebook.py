@@ -42,7 +42,7 @@ def test_results_scenes_and_plans_show_a_table_and_a_picture() -> None:
 
 def test_load_steps_show_a_table_of_the_first_and_last_and_the_friction_loop(without: Callable[..., None]) -> None:
     scene = dataclasses.replace(with_overrides(bk.load_scene("paper-1"), elements=24), load_factors=(0.5, 1.0))
-    steps = bk.run_history([scene])
+    steps = bk.run([scene])
     few = Page(steps._repr_html_())
     assert "Load steps" in few.texts
     assert len(few.of("tr")) == 1 + 2

@@ -27,7 +27,7 @@ def test_without_contact_nothing_is_said_of_it() -> None:
 
 def test_load_steps_show_themselves_in_a_line_and_are_a_tuple() -> None:
     scene = dataclasses.replace(bk.load_scene("paper-1"), mesh=bk.MeshOptions(elements=40), load_factors=(0.5, 1.0))
-    steps = bk.run_history([scene])
+    steps = bk.run([scene])
     title = "Square on a rigid foundation, paper Example 1"
     assert repr(steps) == f"SolvedSteps('{title}': 2 steps, the last one converged)"
     assert isinstance(steps, tuple)

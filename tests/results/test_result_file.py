@@ -20,7 +20,6 @@ from bemkit.contact.laws import Coulomb
 from bemkit.hdf5 import Reader
 from bemkit.results.result_file import OutputFileError, ResultFileError, read_result, write_result
 from bemkit.results.solution import Solution
-from bemkit.runs.history import run_history
 from bemkit.runs.run import run
 from bemkit.scene.conditions import Part, Traction
 from bemkit.scene.toml import SceneError, load_scene, scene_from_toml, scene_to_toml, with_overrides
@@ -93,7 +92,7 @@ def test_a_failed_solution_comes_back_as_failed(tmp_path: Path, solution: Soluti
 
 def test_scenes_that_follow_each_other_come_back(tmp_path: Path, solution: Solution) -> None:
     scenes = [dataclasses.replace(solution.scene, law=Coulomb(friction)) for friction in (0.3, 0.4)]
-    first, last = run_history(scenes)
+    first, last = run(scenes)
     write_result(tmp_path / "r.h5", last)
     again = read_result(tmp_path / "r.h5")
     assert isinstance(again, Solution)

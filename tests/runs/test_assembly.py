@@ -338,7 +338,7 @@ def test_steps_follow_each_other_and_slip_is_remembered() -> None:
         sides = tuple(replace(part, condition=bk.Traction(0.0, np.sign(part.condition.y) * shear)) for part in free)
         return replace(pressed, bodies=(pressed.bodies[0], replace(upper, parts=(load, *sides))))
 
-    steps = bk.run_history([under(0.0), under(0.1), under(SHEAR)])
+    steps = bk.run([under(0.0), under(0.1), under(SHEAR)])
     assert [step.is_converged for step in steps] == [True] * 3
     assert steps[0].contacts[0].force_tangential == pytest.approx(0.0, abs=1e-12)
     assert steps[1].contacts[0].force_tangential == pytest.approx(-0.1, rel=1e-10)
@@ -395,8 +395,8 @@ def test_what_goes_with_one_body_alone_is_refused() -> None:
         bk.run(patch(1), mesh=bk.discretise(bk.Rectangle(1.0, 1.0).outline(), n_elements=8))  # type: ignore[call-overload]
     with pytest.raises(bk.InputError, match="mesh names 'cake': the bodies are "):
         bk.run(patch(1), mesh={"cake": bk.discretise(bk.Rectangle(1.0, 1.0).outline(), n_elements=8)})
-    with pytest.raises(bk.InputError, match="scenes is empty"):
-        bk.run_history([])
+    with pytest.raises(bk.InputError, match="scene is an empty sequence"):
+        bk.run([])
     with pytest.raises(bk.InputError, match="no two bodies are in contact: list contacts"):
         bk.run(replace(patch(1), contacts=()))
 

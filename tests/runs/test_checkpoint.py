@@ -275,5 +275,5 @@ def test_results_without_steps_say_so() -> None:
 
 
 def test_a_file_goes_with_no_mesh_of_its_own(tmp_path: Path) -> None:
-    with pytest.raises(bk.InputError, match="file is given with a mesh or a start"):
+    with pytest.raises(bk.InputError, match="file is given with a mesh, a start or coarsest"):
         bk.run(SHORTER, file=tmp_path / "a.h5", start=bk.run(SHORTER))

@@ -12,7 +12,8 @@ import pytest
 import bemkit as bk
 from bemkit.cli.main import main
 from bemkit.runs.critical_friction import NoSlidingStateError
-from bemkit.runs.run import LoadHistoryError, run_probe
+from bemkit.runs.distinct_solutions import distinct_solutions
+from bemkit.runs.run import LoadHistoryError
 from bemkit.runs.steps import UnsolvableSceneError
 from bemkit.scene.load_history import with_scaled_loads
 from bemkit.scene.scene import NoContactError
@@ -72,12 +73,12 @@ def test_a_leg_has_three_solutions_above_and_one_below() -> None:
     assert found.n_contact == 6  # all nodes of the foot
     assert found.backward == pytest.approx(1.0051, abs=1e-4)
     assert (found.forward, found.smallest) == (math.inf, found.backward)
-    assert len(run_probe(LEG)) == 3
+    assert len(distinct_solutions(LEG)) == 3
     # on the corner alone it loses uniqueness at 0.8575, which is the least of all sets at one end of the foot
     for degrees in (30.0, 48.0, 60.0):
-        assert len(run_probe(with_friction(0.85, degrees))) == 1
-    assert len(run_probe(with_friction(0.93, 50.0))) == 3
-    assert len(run_probe(with_friction(1.02, 48.0))) == 3
+        assert len(distinct_solutions(with_friction(0.85, degrees))) == 1
+    assert len(distinct_solutions(with_friction(0.93, 50.0))) == 3
+    assert len(distinct_solutions(with_friction(1.02, 48.0))) == 3
 
 
 def test_one_of_several_bodies_is_as_critical_as_alone() -> None:

@@ -23,7 +23,7 @@ def check_up_to_collapse(assembly: bk.Assembly, expected: float, moved: str, wei
     limit = bk.largest_load_factor(assembly)
     assert limit == pytest.approx(expected, rel=1e-6)  # accuracy of linear programmes
     factors = tuple(limit * share for share in (0.0, 0.5, 0.74, 0.86, 0.98, 1.02))
-    *steps, beyond = bk.run_history([replace(assembly, load_factors=factors)])
+    *steps, beyond = bk.run([replace(assembly, load_factors=factors)])
     assert [step.is_converged for step in steps] == [True] * 5
     for factor, step in zip(factors, steps, strict=False):
         floors = [one for one in step.contacts if one.name.endswith(".floor")]
@@ -56,7 +56,7 @@ def test_a_load_history_is_one_scene_and_one_result(tmp_path) -> None:  # type: 
     factors = (0.0, 2.0, 4.0)
     assembly = replace(wall(2, 2, push=True), load_factors=tuple(0.5 * factor for factor in factors))
     assert bk.scene_from_toml(bk.scene_to_toml(assembly)) == assembly
-    steps = bk.run_history([assembly])
+    steps = bk.run([assembly])
     solution = bk.run(assembly)
     assert solution.is_converged
     assert solution.message.startswith("load step 3 of 3: ")
@@ -94,7 +94,7 @@ def test_a_jump_that_stalls_is_gone_in_halves() -> None:
     impatient = bk.SemismoothNewton(max_steps=5)
     assembly = replace(wall(3, 4, push=True), load_factors=(0.0, 4.6))
     assembly = replace(assembly, solver=impatient)
-    first, second = bk.run_history([assembly])
+    first, second = bk.run([assembly])
     assert second.is_converged
     assert "increments in its place led there" in second.message
     remarks = [record.message for record in second.history]
@@ -111,7 +111,7 @@ def test_a_step_out_of_reach_says_how_far_it_came(monkeypatch) -> None:  # type:
     monkeypatch.setattr(load_path, "MOST_HALVINGS", 2)
     hopeless = bk.Fallbacks((bk.SemismoothNewton(max_steps=2),))
     assembly = replace(wall(3, 4, push=True), load_factors=(0.0, 4.6), solver=hopeless)
-    first, second = bk.run_history([assembly])
+    first, second = bk.run([assembly])
     assert first.is_converged
     assert second.status is Status.LOAD_NOT_REACHED
     assert second.status.value in second.message
@@ -123,7 +123,7 @@ def test_a_step_out_of_reach_says_how_far_it_came(monkeypatch) -> None:  # type:
 
 def test_steps_of_other_bodies_are_refused() -> None:
     with pytest.raises(bk.InputError, match=r"the bodies are .*, and those of the step before .*: change numbers"):
-        bk.run_history([wall(2, 2, push=True), wall(2, 3, push=True)])
+        bk.run([wall(2, 2, push=True), wall(2, 3, push=True)])
 
 
 def test_what_has_no_largest_factor_says_so() -> None:

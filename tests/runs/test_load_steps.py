@@ -304,7 +304,7 @@ def test_histories_of_bodies_with_an_accuracy() -> None:
 
 def test_the_worst_step_guides_the_mesh() -> None:
     """Errors are the largest of all steps on every element, measured by the largest energy."""
-    steps = bk.run_history([replace(LOOP, steps=(LOOP.steps[0], replace(LOOP.steps[1], increments=3)))])
+    steps = bk.run([replace(LOOP, steps=(LOOP.steps[0], replace(LOOP.steps[1], increments=3)))])
     guide, errors = StepErrors(steps), np.array([step.element_errors for step in steps])
     unit = max(step.error_unit for step in steps)
     assert guide.unit == unit

@@ -11,7 +11,9 @@ import pytest
 
 import bemkit as bk
 from bemkit.cli.main import main
-from bemkit.runs.run import UnsolvableSceneError, run_probe
+from bemkit.runs.adaptive import run_adaptive
+from bemkit.runs.distinct_solutions import distinct_solutions
+from bemkit.runs.run import UnsolvableSceneError
 from bemkit.scene.toml import scene_to_toml
 from tests.scene.test_load_history import block
 
@@ -38,11 +40,11 @@ def leg(friction: float) -> bk.Scene:
 
 
 def test_a_leg_with_high_friction_has_two_answers() -> None:
-    found = run_probe(leg(3.0))
+    found = distinct_solutions(leg(3.0))
     assert len(found) == 2
     assert all(solution.is_converged and solution.certificate.worst <= 1e-9 for solution in found)
     assert sorted(solution.force_normal > 0.0 for solution in found) == [False, True]
-    assert len(run_probe(leg(0.3))) == 1
+    assert len(distinct_solutions(leg(0.3))) == 1
     # each is a solution of its own when it is the start
     for solution in found:
         again = bk.run(leg(3.0), start=solution)
@@ -51,17 +53,25 @@ def test_a_leg_with_high_friction_has_two_answers() -> None:
 
 def test_a_probe_takes_the_mesh_that_an_accuracy_needs() -> None:
     scene = dataclasses.replace(leg(0.3), mesh=bk.MeshOptions(accuracy=0.1))
-    (found,) = run_probe(scene)
+    (found,) = distinct_solutions(scene)
     assert found.mesh.n_elements == bk.run(scene).mesh.n_elements
+
+
+def test_a_start_chooses_the_solution_of_the_first_of_adaptive_meshes() -> None:
+    scene = dataclasses.replace(leg(3.0), mesh=bk.MeshOptions(accuracy=0.1))
+    for start in distinct_solutions(leg(3.0)):
+        first, *_ = run_adaptive(scene, start=start)
+        assert first.mesh.n_elements != start.mesh.n_elements
+        assert (first.force_normal > 0.0) == (start.force_normal > 0.0)
 
 
 def test_refusals() -> None:
     with pytest.raises(ValueError, match="a load history of 2 steps cannot be probed"):
-        run_probe(dataclasses.replace(leg(1.0), load_factors=(0.5, 1.0)))
+        distinct_solutions(dataclasses.replace(leg(1.0), load_factors=(0.5, 1.0)))
     with pytest.raises(ValueError, match="n_starts = -1"):
-        run_probe(leg(1.0), n_starts=-1)
+        distinct_solutions(leg(1.0), n_starts=-1)
     with pytest.raises(UnsolvableSceneError, match="slides the body to the right"):
-        run_probe(block(push=0.6))
+        distinct_solutions(block(push=0.6))
 
 
 def call(*arguments: str) -> int:
@@ -105,6 +115,6 @@ def test_the_command_says_how_many(tmp_path: Path, capsys: pytest.CaptureFixture
 
 def test_a_single_load_factor_scales_the_load() -> None:
     scene = block()
-    (found,) = run_probe(dataclasses.replace(scene, load_factors=(2.0,)), n_starts=1)
-    (single,) = run_probe(scene, n_starts=1)
+    (found,) = distinct_solutions(dataclasses.replace(scene, load_factors=(2.0,)), n_starts=1)
+    (single,) = distinct_solutions(scene, n_starts=1)
     assert found.force_normal == pytest.approx(2.0 * single.force_normal, rel=1e-9)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,9 +13,10 @@ import bemkit as bk
 from bemkit.cli.main import main
 from bemkit.model.model import build_model
 from bemkit.model.prepared import prepare
-from bemkit.runs.nested import run_cascade
+from bemkit.runs.nested import run_nested
 from bemkit.runs.warm_start import state_on
 from bemkit.solvers.active_sets import contact_sets
+from bemkit.solvers.base import StepRecord
 from tests.scene.test_load_history import block
 from tests.slow import slow_except
 
@@ -31,7 +33,7 @@ def example(number: int, discretisation: str, elements: int) -> bk.Scene:
 @pytest.mark.parametrize("discretisation", slow_except(DISCRETISATIONS, "constant"))
 def test_the_finest_mesh_costs_two_solves(number: int, discretisation: str) -> None:
     scene = example(number, discretisation, 320)
-    levels = run_cascade(scene)
+    levels = run_nested(scene)
     assert [level.mesh.n_elements for level in levels] == [40, 80, 160, 320]
     assert all(level.is_converged for level in levels)
     assert levels[-1].linear_solves <= 2
@@ -44,7 +46,7 @@ def test_the_finest_mesh_costs_two_solves(number: int, discretisation: str) -> N
 @pytest.mark.slow
 @pytest.mark.parametrize(("number", "discretisation"), [(1, "constant"), (2, "constant"), (2, "linear")])
 def test_solves_do_not_grow_with_the_mesh(number: int, discretisation: str) -> None:
-    levels = run_cascade(example(number, discretisation, 2560), coarsest=320)
+    levels = run_nested(example(number, discretisation, 2560), coarsest=320)
     assert [level.mesh.n_elements for level in levels] == [320, 640, 1280, 2560]
     assert max(level.linear_solves for level in levels[1:]) <= 2
 
@@ -77,7 +79,7 @@ def test_starts_need_the_same_parts() -> None:
 
 def test_a_mesh_that_fails_is_no_start() -> None:
     scene = dataclasses.replace(example(1, "linear", 160), solver=bk.SemismoothNewton(max_steps=1))
-    levels = run_cascade(scene)
+    levels = run_nested(scene)
     assert not levels[-1].is_converged
     # all of them start cold
     for level in levels:
@@ -95,7 +97,7 @@ def test_refusals(options: dict[str, object], message: str) -> None:
         scene = dataclasses.replace(scene, load_factors=(0.5, 1.0))
         options = {}
     with pytest.raises(ValueError, match=message):
-        run_cascade(scene, **options)  # type: ignore[arg-type]
+        run_nested(scene, **options)  # type: ignore[arg-type]
 
 
 def test_the_command_line_cascades(capsys: pytest.CaptureFixture[str]) -> None:
@@ -107,3 +109,22 @@ def test_the_command_line_cascades(capsys: pytest.CaptureFixture[str]) -> None:
         spent.append(json.loads(capsys.readouterr().out))
     assert spent[1]["linear_solves"] <= 2 < spent[0]["linear_solves"]
     assert spent[1]["force_tangential"] == pytest.approx(spent[0]["force_tangential"], rel=1e-9)
+
+
+def test_nested_meshes_are_an_option_of_run() -> None:
+    scene = example(1, "linear", 160)
+    records: list[StepRecord] = []
+    solution = bk.run(scene, coarsest=40, callback=records.append)
+    assert solution.linear_solves <= 2 < bk.run(scene).linear_solves
+    assert len(records) > len(solution.history)  # those of the coarser meshes, too
+    with pytest.raises(ValueError, match="coarsest is given with a mesh or a start: nested meshes have their own"):
+        bk.run(scene, coarsest=40, start=solution)
+    with pytest.raises(ValueError, match="an accuracy is given with coarsest: its meshes start from each other"):
+        bk.run(dataclasses.replace(scene, mesh=bk.MeshOptions(accuracy=0.1)), coarsest=40)
+    with pytest.raises(ValueError, match="coarsest is given with a sequence of scenes: nested meshes take a single"):
+        bk.run([scene], coarsest=40)
+
+
+def test_a_sequence_has_no_file(tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match="file is given with a sequence of scenes: a file holds one scene"):
+        bk.run([block()], file=tmp_path / "r.h5")

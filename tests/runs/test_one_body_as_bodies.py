@@ -49,7 +49,7 @@ def as_bodies(scene: bk.Scene) -> bk.Assembly:
 
 
 def probed(scene: Any) -> Any:
-    solutions = bk.run_probe(scene)
+    solutions = bk.distinct_solutions(scene)
     assert len(solutions) == 1
     return solutions[0]
 
@@ -76,12 +76,12 @@ FEATURES: dict[str, tuple[bk.Scene, Callable[[Any], Any]]] = {
     "collocation": (replace(PAPER, discretisation=bk.ConstantCollocation()), bk.run),
     "start values": (PAPER, started),
     "probe": (PAPER, probed),
-    "cascade": (PAPER, lambda scene: bk.run_cascade(scene, coarsest=12)[-1]),
+    "cascade": (PAPER, lambda scene: bk.run(scene, coarsest=12)),
     "mesh": (PAPER, on_a_mesh),
     "executor": (PAPER, elsewhere),
     "load factors": (replace(PAPER, load_factors=(0.5, 1.0, 0.2)), bk.run),
     "steps": (replace(PAPER, steps=STEPS), bk.run),
-    "scenes in turn": (PAPER, lambda scene: bk.run_history([scene, scene])[-1]),
+    "scenes in turn": (PAPER, lambda scene: bk.run([scene, scene])[-1]),
     "friction at held nodes": (HELD, bk.run),
     "body forces": (bk.load_scene("gravity-column"), bk.run),
     "symmetry": (

@@ -327,7 +327,7 @@ def test_a_side_between_an_elastic_and_a_rigid_body_passes_on_both_tractions() -
 def test_steps_of_motions_and_forces_follow_each_other() -> None:
     """Down by force, sideways by motion, and back beyond the start: friction remembers."""
     steps = [replace(driven(x=x), law=SOME) for x in (0.0, 1e-3, 1e-2, -1e-2)]
-    solutions = bk.run_history(steps)
+    solutions = bk.run(steps)
     assert [one.is_converged for one in solutions] == [True] * 4
     forces = [one.rigid["punch"].force_x for one in solutions]
     assert abs(forces[0]) < 1e-12
@@ -335,14 +335,14 @@ def test_steps_of_motions_and_forces_follow_each_other() -> None:
     # all slips one way, then the other
     assert (forces[2], forces[3]) == pytest.approx((0.3 * FORCE, -0.3 * FORCE), rel=1e-10)
     assert [one.rigid["punch"].force_y for one in solutions] == pytest.approx([-FORCE] * 4, rel=1e-10)
-    pushed = bk.run_history([driven(), driven(force_y=-2.0 * FORCE)])
+    pushed = bk.run([driven(), driven(force_y=-2.0 * FORCE)])
     assert pushed[1].rigid["punch"].y == pytest.approx(2.0 * pushed[0].rigid["punch"].y, rel=1e-10)
     with pytest.raises(bk.InputError, match="rigid body 'punch' changes its shape, its place or what is given of it"):
-        bk.run_history([driven(), driven(force_y=None, y=-1e-3)])
+        bk.run([driven(), driven(force_y=None, y=-1e-3)])
     more, pair = bk.RigidBody(name="more", obstacle=bk.HalfPlane()), bk.ContactPair(("block.left", "more"))
     longer = replace(PRESSED, rigid=(PUNCH, more), contacts=(*PRESSED.contacts, pair))
     with pytest.raises(bk.InputError, match="rigid body 'more' changes its shape"):
-        bk.run_history([driven(), longer])
+        bk.run([driven(), longer])
 
 
 def test_load_factors_scale_motions_and_forces() -> None:

@@ -114,7 +114,7 @@ def test_a_mesh_that_is_accurate_enough_is_the_best_one() -> None:
         def error(self, solution: bk.Solution) -> float:
             return 1e-3 if solution is coarse else 5e-3
 
-    refinement = Refinement(DensityMeshes(accuracy=1e-2), None, EarlierSteps(), None)
+    refinement = Refinement(DensityMeshes(accuracy=1e-2), None, None, EarlierSteps(), None)
     assert _best_last((coarse, fine), "", 1e-2, refinement)[-1].n_elements == fine.n_elements
     assert _best_last((coarse, fine), "an obstacle", 1e-2, refinement)[-1].n_elements == coarse.n_elements
 
@@ -255,7 +255,7 @@ def test_scene_files_hold_the_accuracy() -> None:
 def test_the_time_of_the_next_mesh_follows_from_the_plans() -> None:
     """Ten times the elements take longer, but not a thousand times: small meshes cost more than dense algebra."""
     meshes = DensityMeshes(accuracy=1e-3)
-    refinement = _Refinement(meshes, None, EarlierSteps(), None)
+    refinement = _Refinement(meshes, None, None, EarlierSteps(), None)
     level = Level.first(paper(1, bk.Galerkin(1), bk.MeshOptions(accuracy=1e-3)))
     solution = bk.run(level.scene, mesh=level.partition.mesh)
     assert refinement.expected_seconds(level, solution, 1.0) == pytest.approx(1.0)

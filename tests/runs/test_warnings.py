@@ -26,7 +26,6 @@ from bemkit.results.solution import Solution
 from bemkit.results.tables import to_json
 from bemkit.results.warnings import FEWEST_NODES, find_warnings
 from bemkit.runs.adaptive import run_adaptive
-from bemkit.runs.history import run_history
 from bemkit.runs.run import run
 from bemkit.scene.conditions import Clamped, Contact, Part, PrescribedDisplacement, Traction
 from bemkit.scene.discretisation import Galerkin
@@ -274,7 +273,7 @@ def test_a_failed_solve_has_the_warnings_of_its_plan_alone(solution: Solution) -
 
 def test_a_load_history_keeps_the_warnings_of_all_its_steps() -> None:
     scene = bowl(load_factors=(1.0, 30.0))
-    steps = run_history([scene])
+    steps = run([scene])
     assert steps[0].warnings
     # warnings that differ in numbers alone are said once, as of the last step
     assert set(run(scene).warnings) == set(without_duplicates((*steps[1].warnings, *steps[0].warnings)))

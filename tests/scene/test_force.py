@@ -99,7 +99,7 @@ def test_the_file_keeps_the_force_and_takes_units_and_steps() -> None:
     read = bk.scene_from_toml(units + text.replace("y = -4.0", 'y = "-4 kN/m"'))
     assert [part.condition for part in read.parts][1] == FORCE
     stepped = replace(scene, steps=(bk.Step(1.0, {"parts.load.condition.y": "-2 * t"}), bk.Step(2.0)))
-    values = [reaction_of(step)[1] for step in bk.run_history([stepped])]
+    values = [reaction_of(step)[1] for step in bk.run([stepped])]
     assert values == pytest.approx([2.0, 2.0], rel=1e-12)
 
 

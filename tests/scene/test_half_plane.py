@@ -61,7 +61,7 @@ def test_a_hundred_thousand_elements_fit_where_there_is_no_matrix() -> None:
 @pytest.mark.parametrize("n_steps", [1, 3])
 def test_loads_far_away_follow_the_load_factors(n_steps: int) -> None:
     factors = tuple((np.arange(n_steps) + 1.0) / n_steps)
-    solutions = bk.run_history([replace(PUNCH, load_factors=factors)])
+    solutions = bk.run([replace(PUNCH, load_factors=factors)])
     np.testing.assert_allclose([step.force_normal for step in solutions], np.array(factors) * 0.05)
     steps = load_steps(replace(PUNCH, load_factors=(0.5, 2.0)))
     assert [step.far for step in steps] == [
@@ -69,13 +69,13 @@ def test_loads_far_away_follow_the_load_factors(n_steps: int) -> None:
         bk.FarField(force_x=0.02, force_y=0.1, turn=0.0),
     ]
     with pytest.raises(bk.InputError, match="far drives other motions: change numbers only"):
-        bk.run_history([PUNCH, replace(PUNCH, far=bk.FarField(force_y=0.05))])
+        bk.run([PUNCH, replace(PUNCH, far=bk.FarField(force_y=0.05))])
 
 
 def test_a_load_step_under_another_load_is_that_of_a_run_of_its_own() -> None:
     harder = replace(PUNCH, law=bk.Frictionless(), far=bk.FarField(force_x=0.0, force_y=0.1, turn=0.0, x=None))
     softer = replace(harder, far=bk.FarField(force_x=0.0, force_y=0.03, turn=0.0))
-    _, second = bk.run_history([harder, softer])
+    _, second = bk.run([harder, softer])
     alone = run_on_mesh(softer)
     np.testing.assert_allclose(second.contact.sigma_n, alone.contact.sigma_n, atol=1e-9)
     np.testing.assert_allclose(second.contact.u_n, alone.contact.u_n, atol=1e-9)
@@ -86,7 +86,7 @@ def test_steps_change_what_acts_far_away(scene: bk.Scene) -> None:
     assert scene.far is not None
     sheared = bk.Step(2.0, {"far.force_x": "0.002 * (t - 1)"}, increments=2)
     pressed = replace(scene, far=replace(scene.far, force_x=0.0))
-    history = bk.run_history([replace(pressed, steps=(bk.Step(1.0), sheared))])
+    history = bk.run([replace(pressed, steps=(bk.Step(1.0), sheared))])
     assert all(step.is_converged for step in history)
     np.testing.assert_allclose([-step.contacts[0].force_x for step in history], [0.0, 0.001, 0.002], atol=1e-12)
 

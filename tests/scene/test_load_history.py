@@ -14,7 +14,6 @@ from bemkit.model.model import build_model
 from bemkit.model.prepared import prepare
 from bemkit.operators.steklov_poincare.collocation import CollocationElasticity
 from bemkit.operators.steklov_poincare.galerkin import GalerkinElasticity
-from bemkit.runs.history import run_history
 from bemkit.runs.steps import UnsolvableSceneError
 from bemkit.scene.load_history import load_steps, with_scaled_loads
 
@@ -99,7 +98,7 @@ def test_proportional_frictionless_loading_does_not_depend_on_the_steps() -> Non
 def test_friction_remembers() -> None:
     """Pushed and let go again: slip leaves a displacement and tractions that the static law knows nothing of."""
     scene = block(push=0.38)
-    pushed, released = run_history([scene, dataclasses.replace(scene, parts=block(push=0.0).parts)])
+    pushed, released = bk.run([scene, dataclasses.replace(scene, parts=block(push=0.0).parts)])
     never = bk.run(block(push=0.0))
     slips = np.array(pushed.contact.status_words()) == "slip"
     assert slips.any()
@@ -118,7 +117,7 @@ def test_friction_remembers() -> None:
 def test_an_elastic_step_back_and_forth_changes_nothing() -> None:
     """Without slip in between, unloading to the same load returns to the same state."""
     rough = bk.Coulomb(100.0)
-    there, _, back = run_history([block(push=0.3, law=rough), block(push=0.25, law=rough), block(push=0.3, law=rough)])
+    there, _, back = bk.run([block(push=0.3, law=rough), block(push=0.25, law=rough), block(push=0.3, law=rough)])
     np.testing.assert_allclose(back.contact.sigma_t, there.contact.sigma_t, atol=1e-9)
 
 
@@ -143,7 +142,7 @@ def test_the_body_is_assembled_once_and_loads_are_exact(
     for one, other in zip(moved.boundary_fields(state)[0], fresh.boundary_fields(state)[0], strict=True):
         np.testing.assert_allclose(one, other, rtol=1e-9, atol=1e-9 * np.max(np.abs(other)))
     calls.clear()
-    run_history([first, second, first])
+    bk.run([first, second, first])
     assert len(calls) == 1
 
 
@@ -167,7 +166,7 @@ def test_the_summary_covers_all_steps() -> None:
     records: list[Any] = []
     factors = (0.25, 0.5, 1.0)
     whole = bk.run(block(load_factors=factors), callback=records.append)
-    steps = run_history([block(load_factors=factors)])
+    steps = bk.run([block(load_factors=factors)])
     assert whole.linear_solves == sum(step.linear_solves for step in steps) == whole.history[-1].linear_solves
     assert len(whole.history) == len(records)
     assert [record.step for record in whole.history] == list(range(len(records)))
@@ -184,7 +183,7 @@ def test_the_summary_covers_all_steps() -> None:
 def test_a_step_that_fails_ends_the_history() -> None:
     impatient = bk.SemismoothNewton(max_steps=1)
     easy, hard = (block(push=push, solver=impatient) for push in (0.1, 0.39))
-    steps = run_history([easy, hard, easy])
+    steps = bk.run([easy, hard, easy])
     assert [step.status for step in steps] == [bk.Status.CONVERGED, bk.Status.LOAD_NOT_REACHED]
     whole = bk.run(dataclasses.replace(hard, load_factors=(0.5, 1.0, 0.0)))
     assert whole.status is bk.Status.MAX_STEPS  # the first step is not reached in increments
@@ -207,9 +206,9 @@ def test_a_step_that_fails_ends_the_history() -> None:
 )
 def test_only_numbers_may_change(other: bk.Scene, message: str) -> None:
     with pytest.raises(ValueError, match=message):
-        run_history([block(), other])
+        bk.run([block(), other])
 
 
 def test_no_scene_is_an_error() -> None:
-    with pytest.raises(ValueError, match="scenes is empty"):
-        run_history([])
+    with pytest.raises(ValueError, match="scene is an empty sequence"):
+        bk.run([])

@@ -158,7 +158,7 @@ def test_the_time_is_known_in_steps_alone() -> None:
 def test_times_of_scenes_that_follow_each_other_increase() -> None:
     first, second = (replace(SCENE, steps=(bk.Step(time),)) for time in (2.0, 1.0))
     with pytest.raises(bk.InputError, match="step 2: time is 1 after 2: give times that increase"):
-        bk.run_history([first, second])
+        bk.run([first, second])
 
 
 def test_places_name_what_does_not_fit() -> None:

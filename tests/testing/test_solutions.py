@@ -55,7 +55,7 @@ def test_fields_of_another_material_need_a_warning(solution) -> None:
 
 def test_work_that_is_missing_in_a_load_step_is_named() -> None:
     loop = bk.load_scene("friction-loop")
-    (step, *_) = bk.run_history([replace(loop, mesh=bk.MeshOptions(elements=40), steps=loop.steps[:1])])
+    (step, *_) = bk.run([replace(loop, mesh=bk.MeshOptions(elements=40), steps=loop.steps[:1])])
     check_solution(step)
     last = step.loading.steps[-1]
     wrong = replace(last, work=replace(last.work, external_work=1.0))

@@ -12,7 +12,6 @@ import numpy as np
 from bemkit.contact.laws import Coulomb
 from bemkit.results.assembly_solution import AssemblySolution
 from bemkit.results.solution import Solution
-from bemkit.runs.history import run_history
 from bemkit.runs.run import run
 from bemkit.runs.steps import UnsolvableSceneError
 from bemkit.scene.assembly import Assembly
@@ -60,7 +59,7 @@ def _pressed_then_sheared(scene: Assembly) -> Solve:
         fitted = run(with_overrides(under(0.0008), accuracy=accuracy))
         meshes = {name: body.mesh for name, body in fitted.bodies.items()}
         steps = [with_overrides(under(shift), elements=100) for shift in (0.0, 0.0008)]
-        return run_history(steps, mesh=meshes)[-1]
+        return run(steps, mesh=meshes)[-1]
 
     return solve
 

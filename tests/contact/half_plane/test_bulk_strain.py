@@ -38,7 +38,7 @@ def specimen(strain: float, n_elements: int = 1500, **changes: object) -> bk.Sce
 def test_the_stick_zone_is_shifted_by_bulk_stress(share: float) -> None:
     """By a sigma / (2 s p0); its half-width is that without bulk stress, a sqrt(1 - Q / (s P))."""
     stress = 2.0 * share * FRICTION * PRESSURE
-    _, last = bk.run_history([specimen(stress / MODULUS)])
+    _, last = bk.run([specimen(stress / MODULUS)])
     assert last.is_converged, last.message
     outer = np.array([place.x for place in last.transitions])[[0, -1]]
     stick = [place.x for place in last.transitions if abs(abs(place.x) - HALF_WIDTH) > 0.05 * HALF_WIDTH]
@@ -50,7 +50,7 @@ def test_the_stick_zone_is_shifted_by_bulk_stress(share: float) -> None:
 
 
 def test_fields_below_contain_the_bulk_stress() -> None:
-    *_, last = bk.run_history([specimen(0.01, 200)])
+    *_, last = bk.run([specimen(0.01, 200)])
     fields = bk.interior_fields(last)
     deep = np.array([[0.3, -1e5 * HALF_WIDTH], [-20.0, -2e5 * HALF_WIDTH]])
     np.testing.assert_allclose(fields.stress(deep)[:, 0, 0], 0.01 * MODULUS, rtol=1e-4)

@@ -151,9 +151,9 @@ def test_later_scenes_of_a_history_must_be_symmetric_too() -> None:
     first = square(symmetry=HALF)
     second = changed(first, "left load", bk.Traction(x=bk.Expression("y**2 * (1 - y)**2")))
     with pytest.raises(AsymmetricSceneError, match="the traction is"):
-        bk.run_history([first, second])
+        bk.run([first, second])
     with pytest.raises(ValueError, match=r"symmetry is None: keep x = 0.5"):
-        bk.run_history([first, replace(first, symmetry=None)])
+        bk.run([first, replace(first, symmetry=None)])
 
 
 def test_images_need_symmetric_local_nodes() -> None:

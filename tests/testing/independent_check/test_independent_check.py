@@ -162,7 +162,7 @@ def test_numbers_that_are_none_are_seen() -> None:
 
 def test_slip_counts_from_the_step_before() -> None:
     scene = dataclasses.replace(small_paper_scene(1), load_factors=(1.0, 0.5))
-    first, second = bk.run_history([scene])
+    first, second = bk.run([scene])
     assert violations_of_body(first).is_good
     assert violations_of_body(second, first).is_good
     assert violations_of_body(second).is_good  # which step it is it says itself
@@ -177,7 +177,7 @@ def test_round_off_of_a_large_step_is_no_slip_in_a_small_one() -> None:
     shape = bk.Sector(0.5, 0.0, 263.0, centre=(0.44, -1.71))
     options = {"law": bk.Tresca(1e-3), "load_factors": (1.0, 0.0), "solver": bk.LemkePivoting()}
     scene = block(arc, held, pulled, shape=shape, **options)
-    first, second = bk.run_history([scene])
+    first, second = bk.run([scene])
     assert set(first.contact.status_words() + second.contact.status_words()) == {"separated"}
     assert violations_of_body(first).is_good
     assert violations_of_body(second, first).is_good
@@ -187,7 +187,7 @@ def test_round_off_of_a_large_step_is_no_slip_in_a_small_one() -> None:
 def test_tractions_that_a_large_step_leaves_are_measured_by_its_own(share: float, is_good: bool) -> None:
     """After unloading nothing is left but round-off of what was there, which may be tension here and there."""
     load = bk.Part("load", bk.Traction(y=-1.0), sides=("top",))
-    first, second = bk.run_history([block(FLOOR, load, load_factors=(1.0, 0.0))])
+    first, second = bk.run([block(FLOOR, load, load_factors=(1.0, 0.0))])
     assert not second.contact.sigma_n.any()
     left = share * np.abs(first.contact.sigma_n).max() * (-1.0) ** np.arange(second.contact.n_contact)
     second = dataclasses.replace(second, contact=dataclasses.replace(second.contact, sigma_n=left))

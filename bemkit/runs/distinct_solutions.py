@@ -1,0 +1,62 @@
+"""Distinct solutions of one scene, found from several starts."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from bemkit.contact.solvability import find_unsolvable_load
+from bemkit.model.placed import Meshes
+from bemkit.operators.linear.threads import blas_threads_for
+from bemkit.runs.run import LoadHistoryError, UnsolvableSceneError, on_its_meshes
+from bemkit.runs.solution_of import solution_of
+from bemkit.runs.steps import built, checked, explained, planned
+from bemkit.scene.load_history import load_steps
+from bemkit.scene.scene import NoContactError, Scene
+from bemkit.scene.steps import Stated, check_stated
+from bemkit.solvers.multistart import probe
+from bemkit.stopwatch import Stage
+
+
+def distinct_solutions(scene: Stated, *, n_starts: int = 8, mesh: Meshes = None) -> tuple[Any, ...]:
+    """Solve a scene from several starts and return the distinct solutions.
+
+    With Coulomb friction a scene may have more than one solution; which of them `run` returns depends on its start.
+
+    Parameters
+    ----------
+    scene : Scene or Assembly
+        With a single load. With an accuracy, on the meshes that it needs.
+    n_starts : int
+        Starts: all nodes sticking, open, slipping forward, slipping backward, then random choices (always the same).
+    mesh : BoundaryMesh or mapping of str to BoundaryMesh, optional
+        As for `run`.
+
+    Returns
+    -------
+    tuple of Solution or of AssemblySolution
+        In the order found, each certified; empty if no start leads to a solution. A single one does not prove that
+        there is no other.
+
+    Raises
+    ------
+    UnsolvableSceneError, ValueError
+        As for `run`; also if the scene has a load history or `n_starts` is negative.
+    """
+    check_stated(scene)
+    if isinstance(scene, Scene) and not scene.contact_parts:
+        raise NoContactError("no part is in contact: the solution is the only one, which run returns")
+    if scene.n_steps > 1:
+        raise LoadHistoryError(f"a load history of {scene.n_steps} steps cannot be probed: give one load")
+    if mesh is None:
+        scene, mesh = on_its_meshes(scene)
+    (prepared,), plan, clock = planned(load_steps(scene), mesh)
+    with blas_threads_for(prepared.largest_matrix):
+        model, clock = built(prepared, clock)
+        load = find_unsolvable_load(model.problem)
+        if load is not None:
+            raise UnsolvableSceneError(explained(model, load))
+        clock = clock.closed(Stage.CONDENSE)
+        results = probe(model.problem, scene.solver, n_starts=n_starts)
+        results = tuple(checked(model, result) for result in results)
+        clock = clock.closed(Stage.SOLVE)
+        return tuple(solution_of(model, result, plan, clock) for result in results if result.is_converged)
