@@ -78,11 +78,7 @@ def cantilevers_loss(friction: float, pressure: float, load: float, slenderness:
     Notes
     -----
     8 s p L^3 (F0 - F_s) / (E h^2) with h = 1. The beams slip where 3 F / (4 h) exceeds s p, everywhere at once, at
-    F_s = 4 s p h / 3.
-
-    References
-    ----------
-    [GoodmanKlumpp1956]
+    F_s = 4 s p h / 3, and then bend separately. [SpringfieldJoshi1989] treat beams on supports.
     """
     least = 4.0 * friction * pressure / 3.0
     if load <= least:

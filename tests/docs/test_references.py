@@ -12,7 +12,8 @@ from bemkit.results.citations import PACKAGE, entries
 from tests.docs.pages import DOCS, read
 
 KEY = re.compile(r"\[([A-Z][A-Za-z]+(?:18|19|20)\d\d)\]")
-CITED = {key for path in Path(bemkit.__file__).parent.rglob("*.py") for key in KEY.findall(path.read_text("utf-8"))}
+FOLDERS = (Path(bemkit.__file__).parent, Path(__file__).parent.parent)
+CITED = {key for folder in FOLDERS for path in folder.rglob("*.py") for key in KEY.findall(path.read_text("utf-8"))}
 
 
 @pytest.mark.parametrize("key", sorted(CITED))

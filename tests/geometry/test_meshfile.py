@@ -232,15 +232,21 @@ SQUARE = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"points": np.zeros(4)}, "its points are not finite coordinates"),
-        ({"points": np.where(SQUARE > 0.5, np.nan, SQUARE)}, "its points are not finite coordinates"),
-        ({"points": [["a", "b"]]}, "its points are not finite coordinates"),
-        ({"lines": np.array([[0, 1], [1, 9]])}, "its cells do not join its 4 points"),
-        ({"lines": np.array([[0, -1]])}, "its cells do not join"),
-        ({"lines": np.array([0, 1, 2])}, "its cells do not join"),
-        ({"cell_sets": {"top\x1b[31m": [[0]]}}, r"the group 'top\\x1b\[31m' has a name that is not printable"),
-        ({"cell_sets": {"top": [[7]]}}, "its groups cannot be read"),
-        ({"cell_sets": {"top": [["x"]]}}, "its groups cannot be read"),
+        ({"points": np.zeros(4)}, "its points are not finite coordinates.*: export it again"),
+        (
+            {"points": np.where(SQUARE > 0.5, np.nan, SQUARE)},
+            "its points are not finite coordinates.*: export it again",
+        ),
+        ({"points": [["a", "b"]]}, "its points are not finite coordinates.*: export it again"),
+        ({"lines": np.array([[0, 1], [1, 9]])}, "its cells do not join its 4 points.*: write it anew"),
+        ({"lines": np.array([[0, -1]])}, "its cells do not join.*: write it anew"),
+        ({"lines": np.array([0, 1, 2])}, "its cells do not join.*: write it anew"),
+        (
+            {"cell_sets": {"top\x1b[31m": [[0]]}},
+            r"the group 'top\\x1b\[31m' has a name that is not printable.*: write it anew",
+        ),
+        ({"cell_sets": {"top": [[7]]}}, "its groups cannot be read.*: export it again"),
+        ({"cell_sets": {"top": [["x"]]}}, "its groups cannot be read.*: export it again"),
     ],
 )
 def test_contents_that_make_no_sense_are_named(
@@ -254,9 +260,7 @@ def test_contents_that_make_no_sense_are_named(
         cell_sets=content["cell_sets"],
     )
     monkeypatch.setattr(meshio, "read", lambda path: stored)
-    with pytest.raises(
-        GeometryError, match=rf"x\.msh: it is damaged: .*{message}.*: (write it anew|export it again)"
-    ) as caught:
+    with pytest.raises(GeometryError, match=rf"x\.msh: it is damaged: .*{message}$") as caught:
         read_mesh(tmp_path / "x.msh")
     assert str(caught.value).isprintable()
 

@@ -1,4 +1,4 @@
-"""A cylinder on a specimen under bulk stress: the stick zone moves as [HillsNowell1994] say."""
+"""A cylinder under bulk stress: the stick zone moves, see Hills and Nowell, Mechanics of Fretting Fatigue."""
 
 from __future__ import annotations
 
