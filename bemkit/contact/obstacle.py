@@ -84,21 +84,33 @@ def measure_contact(obstacle: Obstacle, points: FloatArray, normals: FloatArray)
     Raises
     ------
     InputError
-        If an obstacle of one's own returns arrays of other shapes; the message names the obstacle.
+        If a method of an obstacle of one's own takes other arguments, or returns an array of another shape; the message
+        names the obstacle.
     """
-    gap = _measured(obstacle, "gap", obstacle.gap(points, normals), points.shape[:1])
+    gap = _measured(obstacle, "gap", points, normals, points.shape[:1])
     if not isinstance(obstacle, DirectedObstacle):
         return gap, normals
-    direction = _measured(obstacle, "approach", obstacle.approach(points, normals), points.shape)
+    direction = _measured(obstacle, "approach", points, normals, points.shape)
     return np.where(np.sum(direction * normals, axis=1) > FACING_TOLERANCE, gap, np.inf), direction
 
 
-def _measured(obstacle: Obstacle, method: str, values: object, shape: tuple[int, ...]) -> FloatArray:
+def _measured(
+    obstacle: Obstacle, name: str, points: FloatArray, normals: FloatArray, shape: tuple[int, ...]
+) -> FloatArray:
+    full_name = f"{type(obstacle).__name__}.{name}"
+    try:
+        values = getattr(obstacle, name)(points, normals)
+    except TypeError as error:
+        if error.__traceback__ is None or error.__traceback__.tb_next is not None:  # raised inside the method
+            raise
+        raise InputError(
+            f"{full_name} cannot be called with two arrays ({error}): define {name}(self, points, normals) for arrays "
+            f"of the shape (n, 2), which returns the shape {'(n,)' if len(shape) == 1 else '(n, 2)'}"
+        ) from error
     found = np.asarray(values, dtype=float)
     if found.shape != shape:
         raise InputError(
-            f"{type(obstacle).__name__}.{method} returned an array of the shape {found.shape}: "
-            f"return the shape {shape} for {shape[0]} points"
+            f"{full_name} returned an array of the shape {found.shape}: return the shape {shape} for {shape[0]} points"
         )
     return found
 

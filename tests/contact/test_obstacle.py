@@ -19,6 +19,7 @@ from bemkit.contact.obstacle import (
     measure_contact,
 )
 from bemkit.contact.polygon import PolygonalObstacle
+from bemkit.errors import InputError
 from bemkit.formulas import Expression
 from bemkit.testing.independent_check.nodes import distance_to
 
@@ -269,3 +270,16 @@ def test_arrays_of_an_obstacle_of_ones_own_have_the_shapes_of_the_points() -> No
         measure_contact(Misshapen(np.zeros(3), normals), points, normals)
     with pytest.raises(ValueError, match=r"Misshapen.approach returned an array of the shape \(2,\): return the shape"):
         measure_contact(Misshapen(np.zeros(2), np.array([0.0, -1.0])), points, normals)
+
+
+class OnePoint(Misshapen):
+    def gap(self, x: np.ndarray) -> object:  # type: ignore[override]
+        return x[:, 1]
+
+
+def test_methods_of_an_obstacle_of_ones_own_take_points_and_normals() -> None:
+    points = np.zeros((2, 2))
+    with pytest.raises(
+        InputError, match=r"OnePoint.gap cannot be called .*: define gap\(self, points, normals\) .* \(n,\)$"
+    ):
+        measure_contact(OnePoint(0.0, 0.0), points, points)
