@@ -157,7 +157,14 @@ def _ordered(
     sides = []
     for body, part in pair.elastic_parts:
         number = numbers[body]
-        sides.append((number, part, ContactSide(bodies[number].space, bodies[number].mesh.part(part))))
+        elements = bodies[number].mesh.part(part)
+        if not elements.size:
+            raise InputError(
+                f"contact {pair.name!r}: the side '{body}.{part}' lies beyond the symmetry line "
+                f"({bodies[number].mesh.symmetry}), where images replace all contacts: remove the contact, or name the "
+                "image of the side"
+            )
+        sides.append((number, part, ContactSide(bodies[number].space, elements)))
     one, two = sides
     if pair.multipliers_on is None:
         is_first = is_non_mortar(one[2], two[2], has_friction=not law.is_frictionless)

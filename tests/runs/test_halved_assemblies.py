@@ -229,3 +229,11 @@ def test_what_is_not_symmetric_is_refused() -> None:
         bk.run(blocks(bodies=bodies, mesh=bk.MeshOptions(accuracy=0.1)))
     with pytest.raises(AsymmetricSceneError, match="its law is not symmetric about x = 0"):
         bk.run(blocks(law=bk.Coulomb(bk.Expression("0.3 + 0.1 * x"))))
+
+
+def test_a_contact_beyond_the_line_is_refused_by_its_name() -> None:
+    pad = bk.Part("pad", bk.Free(), ("top",), where=lambda x, y: x > 0.2)
+    plate = moved(0, parts=(bk.Part("base", bk.Clamped(), ("bottom",)), pad))
+    half = blocks(bodies=plate, contacts=(bk.ContactPair(("upper.bottom", "lower.pad")),))
+    with pytest.raises(InputError, match=r"the side 'lower.pad' lies beyond .* \(x = 0\)"):
+        bk.run(half)
