@@ -81,6 +81,7 @@ from bemkit.results.result_file import write_result as write_result
 from bemkit.results.solution import Solution as Solution
 from bemkit.runs.collapse import coulomb_load_factor as coulomb_load_factor
 from bemkit.runs.collapse import largest_load_factor as largest_load_factor
+from bemkit.runs.collapse import thrust as thrust
 from bemkit.runs.critical_friction import CriticalFriction as CriticalFriction
 from bemkit.runs.critical_friction import critical_friction as critical_friction
 from bemkit.runs.distinct_solutions import distinct_solutions as distinct_solutions

@@ -23,6 +23,7 @@ from bemkit.version import __version__
 
 _COMMANDS = {
     "cite": ("listings", "Print the references of the methods of a scene or a result."),
+    "collapse": ("collapse", "Find collapse factors and thrust of walls and arches of rigid blocks."),
     "critical-friction": (
         "critical_friction",
         "Find the friction coefficient above which sliding states may not be unique.",

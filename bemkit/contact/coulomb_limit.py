@@ -218,7 +218,8 @@ def _factors_of_collapse(blocks: _Blocks, motion: FloatArray) -> tuple[float, fl
     results = [_least(np.append(np.zeros(len(limits) - 1), sign), balance, right, limits) for sign in (1.0, -1.0)]
     if any(result.x is None for result in results):
         return np.inf, -np.inf
-    return float(results[0].x[-1]), float(results[1].x[-1])
+    first, last = (float(result.x[-1]) for result in results)
+    return min(first, last), max(first, last)  # they may differ by round-off only
 
 
 def _pressing_forces_near(blocks: _Blocks, factor: float, wanted: FloatArray) -> FloatArray | None:

@@ -10,9 +10,13 @@ import numpy as np
 from bemkit.arrays import FloatArray
 from bemkit.contact.conditions import RigidMotions, largest_components, scaled_motions
 from bemkit.contact.solvability import contact_forces, with_met_nodes
+from bemkit.errors import InputError
 
 WITHOUT_BOUND = 1e6
 """Multiple of all other forces above which the load that contact holds counts as unbounded."""
+
+_UNBOUNDED = 3
+"""Status of a linear programme of `scipy.optimize.linprog`."""
 
 
 def largest_factor(
@@ -82,3 +86,60 @@ def _programme(
     if result.x[-1] > 0.5 * WITHOUT_BOUND:
         return np.inf, None
     return float(result.x[-1]), -np.asarray(result.eqlin.marginals, dtype=float)
+
+
+def least_force(
+    motions: RigidMotions,
+    load: FloatArray,
+    direction: FloatArray,
+    cohesion: FloatArray,
+    slope: FloatArray,
+) -> tuple[FloatArray, FloatArray] | None:
+    """Return the contact forces in balance with a load of which a given combination is smallest.
+
+    Parameters
+    ----------
+    motions : (n_motions, 2 n) sparse array
+        As for `largest_factor`.
+    load : (n_motions,) array [N]
+    direction : (2 n,) array [-]
+        The combination of normal and tangential forces, such as a component of the reaction of a support.
+    cohesion, slope : (n,) arrays [N], [-]
+
+    Returns
+    -------
+    forces : (n, 2) array [N]
+        Normal, negative where pressed, and tangential.
+    velocities : (n_motions,) array
+        The motions when the support yields by one against the combination. Where several states are smallest,
+        one of the mechanisms.
+    None
+        If no forces balance the load.
+
+    Raises
+    ------
+    InputError
+        If friction holds any force.
+    """
+    from scipy import sparse
+    from scipy.optimize import linprog
+
+    unit = largest_components(motions)
+    unit = np.where(unit > 0.0, unit, 1.0)  # what touches nothing
+    scale = float(np.abs(load / unit).max()) or 1.0
+    simple, bounds = contact_forces(sparse.eye_array(2 * slope.size, format="csr"), cohesion / scale, slope)
+    result = linprog(  # type: ignore[call-overload]  # the stubs know no sparse arrays
+        direction @ simple,
+        A_eq=scaled_motions(motions, unit) @ simple,
+        b_eq=-load / unit / scale,
+        bounds=bounds,
+        method="highs",
+    )
+    if result.status == _UNBOUNDED:
+        raise InputError(
+            "friction wedges the bodies, so that the force has no bound: choose another contact or direction"
+        )
+    if result.x is None:
+        return None
+    forces = scale * (simple @ result.x).reshape(-1, 2)
+    return forces, -np.asarray(result.eqlin.marginals, dtype=float) / unit

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -34,6 +34,8 @@ _SAMPLES = np.linspace(-1.0, 1.0, 9)
 """Local points of an element at which the obstacle is tested."""
 _N_HALVINGS = 50
 """To the end of a joint between two samples."""
+_NO_FORCE = 1e-9
+"""Share of the largest force below which it is round-off."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,6 +47,8 @@ class Joint:
 
     Parameters
     ----------
+    name : str
+        Of the contact in results.
     body, other : int
         The blocks on both sides: rigid bodies count on after the elastic ones, and a fixed obstacle is -1.
     points, touched : (n, 2) arrays [m]
@@ -57,6 +61,7 @@ class Joint:
         At these points.
     """
 
+    name: str
     body: int
     other: int
     points: FloatArray
@@ -89,6 +94,49 @@ class Block:
     def at(self, points: FloatArray) -> FloatArray:
         """Return the velocities (n, 2, k) of points (n, 2) [m]."""
         return np.asarray(rigid_motions(points, self.centre, self.length) @ self.motions)
+
+
+@dataclass(frozen=True, eq=False)
+class JointForces:
+    """Forces between rigid blocks, in balance with their loads.
+
+    Parameters
+    ----------
+    value : float [N/m]
+        The component of the force on a contact that is smallest or largest.
+    points, forces : (n, 2) arrays [m], [N/m]
+        Where forces act on bodies, and these forces, in the coordinates of the scene.
+    pressing : (n,) array [N/m]
+        Their components normal to the joints, not negative.
+    joints : (n,) array
+        The joint of each point, by its position in `names`.
+    names : tuple of str
+        The contacts.
+    blocks : (n_joints, 2) array
+        The bodies on both sides, by their position in `bodies`; -1 is a fixed obstacle.
+    bodies : tuple of str
+    settlement : mapping of str to (float, float, float)
+        Motion of each body that moves when the support of the contact yields by a unit length [m]: displacements of its
+        middle, and rotation [1/m].
+    """
+
+    value: float
+    points: FloatArray
+    forces: FloatArray
+    pressing: FloatArray
+    joints: IntArray
+    names: tuple[str, ...]
+    blocks: IntArray
+    bodies: tuple[str, ...]
+    settlement: Mapping[str, tuple[float, float, float]]
+
+    def resultant(self, joint: int) -> tuple[FloatArray, FloatArray] | None:
+        """Return the centre of pressure (2,) [m] of a joint and its force (2,) [N/m]; None if nothing presses it."""
+        chosen = self.joints == joint
+        pressing = self.pressing[chosen]
+        if pressing.sum() <= _NO_FORCE * self.pressing.max(initial=0.0):
+            return None
+        return pressing @ self.points[chosen] / pressing.sum(), self.forces[chosen].sum(axis=0)
 
 
 def rigid_blocks(assembly: Assembly, bodies: Sequence[PlacedBody]) -> tuple[Block, ...]:
@@ -164,12 +212,13 @@ def joints_of(assembly: Assembly, bodies: Sequence[PlacedBody]) -> Iterator[Join
             yield _joint_of_sides(assembly, pair, bodies, parts)
         else:
             obstacle, partner = assembly.rigid_body_of(pair).obstacle, names.index(pair.rigid_body)
-            yield from _on_obstacle(bodies[parts[0][0]], parts[0], partner, obstacle, assembly.law_of(pair))
+            yield from _on_obstacle(pair.name, bodies[parts[0][0]], parts[0], partner, obstacle, assembly.law_of(pair))
     for number, body in enumerate(bodies):
         for part in body.scene.parts:
             if isinstance(part.condition, Contact):
                 law = body.scene.laws[part.name]
-                yield from _on_obstacle(body, (number, part.name), -1, part.condition.obstacle, law)
+                name = body.contact_title(part.name)
+                yield from _on_obstacle(name, body, (number, part.name), -1, part.condition.obstacle, law)
 
 
 def _joint_of_sides(
@@ -188,11 +237,11 @@ def _joint_of_sides(
     check_overlap(pair, float(depth[deepest]), points[deepest], min(side.mesh.diameter, other.mesh.diameter))
     law = assembly.law_of(pair).at(points)
     (body, _), (partner, _) = parts
-    return Joint(body, partner, points, points + gap, normals, ends.weights.ravel(), law)
+    return Joint(pair.name, body, partner, points, points + gap, normals, ends.weights.ravel(), law)
 
 
 def _on_obstacle(
-    body: PlacedBody, part: tuple[int, str], other: int, obstacle: Obstacle, law: FrictionLaw
+    name: str, body: PlacedBody, part: tuple[int, str], other: int, obstacle: Obstacle, law: FrictionLaw
 ) -> Iterator[Joint]:
     """Yield the joint of a part, given by the number of its body and its name, and an obstacle; none if they miss."""
     mesh, elements = body.mesh, body.mesh.part(part[1])
@@ -220,4 +269,4 @@ def _on_obstacle(
     lengths = 0.5 * (ends[:, 1:] - ends[:, :1]) * mesh.jacobian(elements[row], ends)
     if row.size:
         touched = points + gap[:, None] * directions
-        yield Joint(part[0], other, points, touched, directions, lengths.ravel(), law.at(points))
+        yield Joint(name, part[0], other, points, touched, directions, lengths.ravel(), law.at(points))

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import bemkit as bk
+from bemkit.scene.toml import shipped_files
 from tests.runs.rigid_limit import collapse_factor, courses
 from tests.slow import slow_except
 
@@ -216,3 +217,10 @@ def test_a_rigid_punch_slides_off_under_what_friction_holds() -> None:
     assert bk.largest_load_factor(assembly) == np.inf  # all of its load grows, and friction 0.3 holds 0.003
     heavier = replace(punch, force_x=0.0031)
     assert bk.largest_load_factor(replace(assembly, rigid=(heavier,))) == pytest.approx(0.0, abs=1e-6)
+
+
+def test_round_off_between_equal_factors_of_collapse_is_no_contradiction() -> None:
+    """The uppermost course of the wall of bemkit new, three blocks of 0.08 m^2, pushed by 0.8 kN."""
+    wall = bk.scene_from_toml(shipped_files("new")["wall"].read_text("utf-8"))
+    found = bk.coulomb_load_factor(wall)
+    assert found.factor == pytest.approx(0.6 * 3 * 0.08 * 1.8 * 9.81 / 0.8, rel=1e-6)
