@@ -40,8 +40,9 @@ class ContactPair:
     Parameters
     ----------
     sides : (str, str)
-        Each ``"body.part"``, or ``"body.side"`` by the name of a side of its shape; one of them may be the name of a
-        `RigidBody`. Two sides of one body may touch, too, as in a split ring.
+        Each ``"body.part"``, ``"body.side"`` by the name of a side or group of its shape, ``"body.side, side"``, or
+        ``"body.*"`` for its whole boundary; one of them may be the name of a `RigidBody`. Two sides of one body may
+        touch, too, as in a split ring.
     law : FrictionLaw, optional
         By default that of the assembly.
     gap : float [m]
@@ -322,8 +323,9 @@ class Assembly(Stated):
         listed = self.listed_parts(body.name)
         if self.touching is None:
             return listed
-        taken = {side for part in body.parts for side in part.sides} | set(listed)
-        whole = any(not part.sides for part in body.parts)
+        parts = (*body.parts, *(body.contact_part(name) for name in listed))
+        taken = {side for part in parts for side in part.sides}
+        whole = any(not part.sides for part in parts)
         free = [part.name for part in body.parts if isinstance(part.condition, Free)]
         sides = [] if whole else [name for name, group in self._side_names(body) if not {name, group} & taken]
         return tuple(dict.fromkeys([*listed, *free, *sides]))

@@ -25,6 +25,7 @@ from bemkit.scene.steps import check_names
 _ALONG = np.linspace(0.0, 1.0, 33)
 """Parameters of curves at which the extent of a body is taken."""
 _NAME = "the body name {name!r} does not do: give printable text without a dot"
+_ALL_SIDES = "*"
 _ON_LINE = 1e-9
 """Share of its size by which a body that ends on a symmetry line may cross it by round-off."""
 
@@ -99,7 +100,7 @@ class Body:
             yield replace(self, name=f"{self.name}-{suffix}", placement=place.after(self.placement), copies=None)
 
     def contact_part(self, name: str) -> Part:
-        """Return the part or side that a contact names.
+        """Return the part that a contact names: a part, sides of the shape with commas between them, or ``*``, all.
 
         Raises
         ------
@@ -112,11 +113,12 @@ class Body:
                     kind = type(part.condition).__name__
                     raise InputError(f"part {self.name}.{name} is {kind}: a part in contact with a body must be free")
                 return part
-        sides = self.shape.outline().selectable_names
-        if name not in sides:
-            known = [*(part.name for part in self.parts), *sides]
-            raise InputError(f"body {self.name!r} has no part or side {name!r}: there are {choices(name, known)}")
-        return Part(name, Free(), sides=(name,))
+        known = [*(part.name for part in self.parts), *(sides := self.shape.outline().selectable_names)]
+        named = () if name == _ALL_SIDES else tuple(side.strip() for side in name.split(","))
+        for side in named:
+            if side not in sides:
+                raise InputError(f"body {self.name!r} has no part or side {side!r}: there are {choices(side, known)}")
+        return Part(name, Free(), sides=named)
 
 
 def lines_across(body: Body, symmetry: Symmetry | None) -> Symmetry | None:
