@@ -174,20 +174,29 @@ class AssemblySolution(SolvedProblem):
 
     @cached_property
     def singular_corners(self) -> dict[str, tuple[SingularCorner, ...]]:
-        """Singular corners at rigid obstacles, by the name of the body.
+        """Singular corners at rigid obstacles and other elastic bodies, by the name of the body.
 
-        See `bemkit.results.singular_corners`; of laws that depend on slip or time none are known.
+        See `bemkit.results.singular_corners` and `bemkit.results.joined_corners`; of laws that depend on slip or time
+        none are known.
         """
-        return {name: self._corners(name) for name in self.bodies}
+        from bemkit.results.joined_corners import joined_corners
+        from bemkit.results.singular_corners import GivenSides, singular_corners
 
-    def _corners(self, name: str) -> tuple[SingularCorner, ...]:
-        from bemkit.results.singular_corners import singular_corners
-
-        body = self.bodies[name]
-        if any(law.needs_history for law in body.scene.laws.values()):
-            return ()
-        table = self.contact.renamed({f"{name}.{part.name}": part.name for part in body.scene.contact_parts})
-        return singular_corners(body, table, unknown=self.assembly.listed_parts(name))
+        found: dict[str, list[SingularCorner]] = {}
+        given, materials = {}, {name: body.scene.material for name, body in self.bodies.items()}
+        for name, body in self.bodies.items():
+            table = self.contact.renamed({f"{name}.{part.name}": part.name for part in body.scene.contact_parts})
+            listed = self.assembly.listed_parts(name)
+            given[name] = GivenSides(body, table, None, listed)
+            has_history = any(law.needs_history for law in body.scene.laws.values())
+            found[name] = [] if has_history else list(singular_corners(body, table, unknown=listed))
+        for pair in self.assembly.elastic_contacts:
+            law, rows = self.assembly.law_of(pair), self.contact.renamed({pair.name: pair.name})
+            if rows.n_contact and not law.needs_history:
+                one, two = self._sides_of(pair.name)
+                for name, corner in joined_corners(one, two, rows, law, given, materials):
+                    found[name].append(corner)
+        return {name: tuple(corners) for name, corners in found.items()}
 
     def corners_of(self, body: SolvedBody) -> tuple[SingularCorner, ...]:
         """Return the singular corners of one of the bodies."""

@@ -27,9 +27,9 @@ from bemkit.solvers.active_sets import NodeStatus
 
 _PARALLEL = 1e-6
 """Component along the normal, or along the tangent, that is none."""
-_DIGITS = 6
+DIGITS = 6
 """Digits of angles: round-off of short elements must not separate equal ones."""
-_BEFORE, _AFTER = 0, 1
+BEFORE, AFTER = 0, 1
 """The element that ends at a node, and the one that starts there."""
 
 
@@ -45,6 +45,8 @@ class SingularCorner:
     before, after : tuple of int
         The elements in contact within `NEIGHBOURHOOD`, at least one, from the corner on: back along the boundary and
         on along it. None where that side is not in contact.
+    partner : str
+        The other elastic body; empty at a rigid obstacle.
     """
 
     x: float
@@ -52,6 +54,7 @@ class SingularCorner:
     exponent: float
     before: tuple[int, ...]
     after: tuple[int, ...]
+    partner: str = ""
 
     @property
     def elements(self) -> tuple[int, ...]:
@@ -60,7 +63,7 @@ class SingularCorner:
 
     def beside(self, mesh: BoundaryMesh) -> list[tuple[int, int]]:
         """Return of each side in contact the element at the corner, and the first one that lies further away."""
-        sides = ((self.before, _BEFORE), (self.after, _AFTER))
+        sides = ((self.before, BEFORE), (self.after, AFTER))
         return [(side[0], _next(mesh, side[-1], way)) for side, way in sides if side]
 
     def as_dict(self) -> dict[str, Any]:
@@ -89,7 +92,7 @@ def singular_corners(
     mesh = body.mesh
     if mesh.surface is not None:
         return ()
-    given, (ends, starts) = _GivenSides(body, contact, motion, unknown), mesh.node_elements.T
+    given, (ends, starts) = GivenSides(body, contact, motion, unknown), mesh.node_elements.T
     chosen = break_nodes(mesh) & (given.may_touch[ends] | given.may_touch[starts]) & (ends != starts)
     corners = []
     for node in np.flatnonzero(chosen).tolist():
@@ -100,12 +103,12 @@ def singular_corners(
         touches = [given.may_touch[k] and side.holds_normal for k, side in ((before, incoming), (after, outgoing))]
         if not any(touches):
             continue
-        angle = round(_angle(mesh, before, after), _DIGITS)
+        angle = round(angle_between(mesh, before, after), DIGITS)
         exponent = leading_exponent(angle, outgoing, incoming, body.scene.material.kappa)
         if exponent is not None:
             x, y = mesh.nodes[node].tolist()
-            near = [given.near(k, way) if touches[way] else () for k, way in ((before, _BEFORE), (after, _AFTER))]
-            corners.append(SingularCorner(x, y, exponent, *near))
+            near = [given.near(k, way) if touches[way] else () for k, way in ((before, BEFORE), (after, AFTER))]
+            corners.append(SingularCorner(x, y, exponent, before=near[BEFORE], after=near[AFTER]))
     return tuple(corners)
 
 
@@ -114,7 +117,7 @@ def _next(mesh: BoundaryMesh, element: int, way: int) -> int:
     return int(mesh.node_elements[mesh.elements[element, way], way])
 
 
-def _angle(mesh: BoundaryMesh, before: int, after: int) -> float:
+def angle_between(mesh: BoundaryMesh, before: int, after: int) -> float:
     """Return the angle [rad] of the body between the end of one element and the start of the next."""
     return float(np.pi - angles_between(_normal(mesh, before, 1.0), _normal(mesh, after, -1.0)))
 
@@ -123,7 +126,7 @@ def _normal(mesh: BoundaryMesh, element: int, xi: float) -> FloatArray:
     return np.asarray(mesh.normals_at(np.array([element]), np.array([xi]))[0, 0])
 
 
-class _GivenSides:
+class GivenSides:
     """Conditions on the elements of a solved body at either of their ends."""
 
     def __init__(

@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 
@@ -74,33 +75,128 @@ def leading_exponent(angle: float, outgoing: WedgeSide, incoming: WedgeSide, kap
         be missed.
     """
 
-    def determinant(exponent: ComplexArray) -> ComplexArray:
-        rows = (*_conditions(exponent, 0.0, outgoing, kappa), *_conditions(exponent, angle, incoming, kappa))
-        # less the roots of the functions themselves, which at 0 and 1 do not differ
-        return np.asarray(np.linalg.det(np.stack(rows, axis=-2)) / (exponent * (exponent - 1.0)))
+    def conditions(exponent: ComplexArray) -> ComplexArray:
+        at_start, at_end = (_Fields.at(exponent, theta, kappa) for theta in (0.0, angle))
+        return np.concatenate([at_start.conditions(outgoing), at_end.conditions(incoming)], axis=1)
 
-    roots = _roots_near(determinant, _STARTS.ravel())
-    between = roots.real[(roots.real > _MARGIN) & (roots.real < 1.0 - _MARGIN)]
-    return float(between.min()) if between.size else None
+    return _smallest_root(conditions)
 
 
-def _conditions(exponent: ComplexArray, theta: float, side: WedgeSide, kappa: float) -> tuple[ComplexArray, ...]:
-    """Return the two conditions of a side, (n, 4) each, on the coefficients of F.
+@dataclass(frozen=True)
+class JoinedWedge:
+    """One of two bodies that meet at a corner.
+
+    Parameters
+    ----------
+    angle : float [rad]
+        Of the body at the corner.
+    kappa : float
+        Kolosov's constant of the material.
+    stiffness : float
+        Shear modulus, in any unit that both bodies share.
+    other_side : WedgeSide
+        The side that does not touch the other body.
+    """
+
+    angle: float
+    kappa: float
+    stiffness: float
+    other_side: WedgeSide = FREE
+
+
+@lru_cache(maxsize=256)
+def joined_exponent(first: JoinedWedge, second: JoinedWedge, contact: WedgeSide) -> float | None:
+    """Return the exponent of the displacements at a corner where two elastic bodies touch along one side of each.
+
+    Both stick and are one wedge of two materials, or slide on each other.
+
+    Parameters
+    ----------
+    first, second : JoinedWedge
+        Anticlockwise about the corner: the touching side of the first one ends there, that of the second one starts.
+    contact : WedgeSide
+        `HELD` where they stick. Where they slide, `friction` is the friction coefficient times the sign of the slip of
+        either body against the other along its own tangent, which is the same.
+
+    Returns
+    -------
+    float or None
+        As for `leading_exponent`.
+    """
+
+    def conditions(exponent: ComplexArray) -> ComplexArray:
+        start, of_first = (_Fields.at(exponent, theta, first.kappa) for theta in (0.0, first.angle))
+        of_second, end = (_Fields.at(exponent, theta, second.kappa) for theta in (0.0, second.angle))
+        outer, nothing = start.conditions(first.other_side), np.zeros((exponent.size, 2, 4))
+        inner = of_first.joined(of_second, first.stiffness / second.stiffness, contact)
+        last = end.conditions(second.other_side)
+        rows = [np.concatenate([outer, nothing], axis=2), inner, np.concatenate([nothing, last], axis=2)]
+        return np.concatenate(rows, axis=1)
+
+    return _smallest_root(conditions)
+
+
+class _Fields(NamedTuple):
+    """Tractions and displacements along one direction, (n, 4) each, by the coefficients of F.
 
     With G the part of F of lambda - 1, H its harmonic conjugate: sigma_theta = (lambda + 1) F and sigma_r_theta = -F',
     both over lambda r^(lambda - 1); u_theta = (kappa + 1) H - F' and u_r = (kappa + 1) G - (lambda + 1) F, both over
     r^lambda / (2 mu).
     """
-    order = exponent[:, None] + _SHIFTS
-    cosine, sine = np.cos(order * theta), np.sin(order * theta)
-    function = np.where(_IS_COSINE, cosine, sine)
-    slope = order * np.where(_IS_COSINE, -sine, cosine)
-    conjugate = np.where(_IS_COSINE, sine, -cosine)
-    harmonic = (kappa + 1.0) * (_SHIFTS < 0.0)
-    scaled = (exponent[:, None] + 1.0) * function
-    normal = harmonic * conjugate - slope if side.holds_normal else scaled
-    tangent = harmonic * function - scaled if side.holds_tangent else side.friction * scaled - slope
-    return normal, tangent
+
+    sigma_theta: ComplexArray
+    sigma_r_theta: ComplexArray
+    u_theta: ComplexArray
+    u_r: ComplexArray
+
+    @classmethod
+    def at(cls, exponent: ComplexArray, theta: float, kappa: float) -> _Fields:
+        """Return those at an angle [rad]."""
+        order = exponent[:, None] + _SHIFTS
+        cosine, sine = np.cos(order * theta), np.sin(order * theta)
+        function = np.where(_IS_COSINE, cosine, sine)
+        slope = order * np.where(_IS_COSINE, -sine, cosine)
+        conjugate = np.where(_IS_COSINE, sine, -cosine)
+        harmonic = (kappa + 1.0) * (_SHIFTS < 0.0)
+        scaled = (exponent[:, None] + 1.0) * function
+        return cls(scaled, -slope, harmonic * conjugate - slope, harmonic * function - scaled)
+
+    def conditions(self, side: WedgeSide) -> ComplexArray:
+        """Return the two conditions of a side, (n, 2, 4)."""
+        normal = self.u_theta if side.holds_normal else self.sigma_theta
+        tangent = self.u_r if side.holds_tangent else self.sliding(side)
+        return np.stack([normal, tangent], axis=1)
+
+    def sliding(self, side: WedgeSide) -> ComplexArray:
+        """Return the condition on the shear of a side that slides."""
+        return side.friction * self.sigma_theta + self.sigma_r_theta
+
+    def joined(self, other: _Fields, softness: float, side: WedgeSide) -> ComplexArray:
+        """Return the four conditions between two bodies, (n, 4, 8); `softness` is that of the other relative to this.
+
+        Equal normal tractions and displacements, and the same along the tangent, or friction on either body.
+        """
+        rows = [(self.sigma_theta, -other.sigma_theta), (self.u_theta, -softness * other.u_theta)]
+        if side.holds_tangent:
+            rows += [(self.sigma_r_theta, -other.sigma_r_theta), (self.u_r, -softness * other.u_r)]
+        else:
+            nothing = np.zeros_like(self.u_r)
+            rows += [(self.sliding(side), nothing), (nothing, other.sliding(side))]
+        return np.stack([np.concatenate(row, axis=1) for row in rows], axis=1)
+
+
+def _smallest_root(conditions: Callable[[ComplexArray], ComplexArray]) -> float | None:
+    """Return the smallest real part between 0 and 1 of all roots of the determinant of (n, 4 m, 4 m) conditions."""
+
+    def determinant(exponent: ComplexArray) -> ComplexArray:
+        matrices = conditions(exponent)
+        # less the roots of the functions themselves, which at 0 and 1 do not differ
+        own = (exponent * (exponent - 1.0)) ** (matrices.shape[1] // 4)
+        return np.asarray(np.linalg.det(matrices) / own)
+
+    roots = _roots_near(determinant, _STARTS.ravel())
+    between = roots.real[(roots.real > _MARGIN) & (roots.real < 1.0 - _MARGIN)]
+    return float(between.min()) if between.size else None
 
 
 def _roots_near(function: Callable[[ComplexArray], ComplexArray], starts: ComplexArray) -> ComplexArray:

@@ -12,7 +12,7 @@ import bemkit as bk
 from bemkit.arrays import FloatArray
 from bemkit.reference import answer_of
 from bemkit.reference.compare import Places
-from bemkit.results.wedge import FREE, HELD, ROLLER, WedgeSide, leading_exponent
+from bemkit.results.wedge import FREE, HELD, ROLLER, JoinedWedge, WedgeSide, joined_exponent, leading_exponent
 from bemkit.solvers.active_sets import NodeStatus
 from tests.scenes import paper
 from tests.slow import slow_except
@@ -214,13 +214,20 @@ def stacked(accuracy: float) -> bk.AssemblySolution:
 
 
 def test_bodies_of_an_assembly_leave_out_corners_and_edges() -> None:
-    """Corners on the rigid floor are known by their exponents; of edges that press into another body none is asked."""
+    """Corners on the rigid floor and edges that press into another body are known by their exponents."""
     solution = stacked(1e-3)
     assert solution.is_converged
     assert solution.n_elements <= 150
     corners = solution.singular_corners
-    assert [(corner.x, round(corner.exponent, 6)) for corner in corners["lower"]] == [(1.0, SLIDES)]  # the left lifts
-    assert corners["upper"] == ()
+    # the lower block lifts on the left, and the upper one slides outwards on the right
+    edge = joined_exponent(
+        JoinedWedge(round(0.5 * np.pi, 6), 1.8, 1.0), JoinedWedge(np.pi, 1.8, 1.0), WedgeSide(True, friction=0.3)
+    )
+    assert [(corner.x, round(corner.exponent, 6)) for corner in corners["lower"][:1]] == [(1.0, SLIDES)]
+    for corner, partner in ((corners["lower"][1], "upper"), (corners["upper"][0], "lower")):
+        assert (corner.x, corner.y, corner.partner) == (pytest.approx(0.7), 0.5, partner)
+        assert corner.exponent == pytest.approx(edge, abs=1e-9)
+    assert [len(corners[name]) for name in ("lower", "upper")] == [2, 1]
     for name, body in solution.bodies.items():
         near = {k for corner in corners[name] for k in corner.elements}
         parts = np.concatenate(
@@ -230,9 +237,10 @@ def test_bodies_of_an_assembly_leave_out_corners_and_edges() -> None:
         assert near < left_out
         x = body.mesh.centres[sorted(left_out - near), 0]
         assert np.abs(np.abs(x - 0.5) - 0.2).max() < 0.01
-    (told,) = [text for text in map(str, solution.warnings) if "tractions are singular" in text]
-    assert told.startswith("Body 'lower': Contact tractions are singular at (1, 0)")
-    assert [corner["body"] for corner in solution.summary()["singular_corners"]] == ["lower"]
+    told = [text for text in map(str, solution.warnings) if "tractions are singular" in text]
+    assert told[0].startswith("Body 'lower': Contact tractions are singular at (1, 0)")
+    assert told[2].startswith("Body 'upper': Contact tractions are singular at (0.7, 0.5) (r^-0.36)")
+    assert [corner["body"] for corner in solution.summary()["singular_corners"]] == ["lower", "lower", "upper"]
 
 
 @pytest.mark.slow

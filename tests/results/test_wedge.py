@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bemkit.results.wedge import FREE, HELD, ROLLER, WedgeSide, leading_exponent
+from bemkit.results.wedge import FREE, HELD, ROLLER, JoinedWedge, WedgeSide, joined_exponent, leading_exponent
 
 RIGHT, STRAIGHT = 0.5 * math.pi, math.pi
 TANGENT_HELD = WedgeSide(holds_tangent=True)
@@ -95,3 +95,41 @@ def test_friction_against_outward_slip_makes_pressures_at_a_right_angle_grow() -
     assert np.all(np.diff(np.array(found, float)) < 0.0)
     assert found[1] == pytest.approx(0.712936, abs=1e-6)
     assert leading_exponent(RIGHT, FREE, WedgeSide(True, friction=-0.3), kappa(0.3)) is None
+
+
+@pytest.mark.parametrize(
+    ("degrees", "friction"), [(60, 0.961909), (75, 0.717733), (90, 0.5430756), (105, 0.409581), (120, 0.302550)]
+)
+def test_an_edge_on_a_half_plane_of_its_material_sticks_from_a_known_friction_on(degrees: int, friction: float) -> None:
+    """Stuck bodies are one wedge; at that friction its fields slide nowhere, so that outward slip has its exponent.
+
+    A change of the friction of 1e-6, its digits, changes the exponent by less than that.
+    """
+    edge, plane = JoinedWedge(math.radians(degrees), kappa(0.3), 1.0), JoinedWedge(math.pi, kappa(0.3), 1.0)
+    whole = leading_exponent(edge.angle + math.pi, FREE, FREE, edge.kappa)
+    outwards, at_start = (WedgeSide(True, friction=sign * friction) for sign in (1.0, -1.0))
+    assert joined_exponent(edge, plane, HELD) == pytest.approx(whole, abs=1e-9)
+    assert joined_exponent(edge, plane, outwards) == pytest.approx(whole, abs=1e-6)
+    assert joined_exponent(plane, edge, at_start) == pytest.approx(whole, abs=1e-6)
+    larger = joined_exponent(edge, plane, replace(outwards, friction=friction - 0.05))
+    assert larger is not None
+    assert whole is not None
+    assert larger > whole + 1e-3
+
+
+@pytest.mark.parametrize("contact", [HELD, ROLLER, WedgeSide(True, friction=0.3)])
+def test_a_body_on_one_that_is_much_stiffer_is_a_body_on_a_rigid_one(contact: WedgeSide) -> None:
+    """To the ratio of the stiffnesses, 1e-8."""
+    soft, stiff = JoinedWedge(RIGHT, kappa(0.2), 1e-8), JoinedWedge(STRAIGHT, kappa(0.3), 1.0)
+    rigid = leading_exponent(RIGHT, FREE, contact, soft.kappa)
+    assert or_bounded(joined_exponent(soft, stiff, contact)) == pytest.approx(min(or_bounded(rigid), 0.99), abs=1e-6)
+
+
+@given(angles, angles, st.sampled_from([HELD, ROLLER, WedgeSide(True, friction=0.4)]), kappas, kappas)
+def test_a_mirror_exchanges_the_two_bodies(
+    angle: float, other_angle: float, contact: WedgeSide, kappa: float, other_kappa: float
+) -> None:
+    one, other = JoinedWedge(angle, kappa, 1.0), JoinedWedge(min(other_angle, 6.2 - angle + 0.05), other_kappa, 3.0)
+    mirrored = replace(contact, friction=-contact.friction)
+    found, again = joined_exponent(one, other, contact), joined_exponent(other, one, mirrored)
+    assert or_bounded(found) == pytest.approx(or_bounded(again), abs=1e-5)
