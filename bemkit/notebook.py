@@ -53,7 +53,7 @@ class Explorable(ShownInNotebooks):
         return import_module("bemkit.pictures.catalogue").plot(self, what, part)
 
     def save(self, path: str | Path, *, inside: int = 0) -> None:
-        """Write the result in the format that the ending of the file name names; see `bemkit.export_result`."""
+        """Write the result in the format of the ending; see `bemkit.results.export.export_result`."""
         import_module("bemkit.results.export").export_result(path, self, inside=inside)
 
     def to_pandas(self, table: str = "contact") -> Any:

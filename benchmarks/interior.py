@@ -23,6 +23,7 @@ from bemkit.arrays import FloatArray
 from bemkit.geometry import Rectangle, discretise
 from bemkit.geometry.spaces import ConstantSpace, LinearSpace, dof_points
 from bemkit.operators.somigliana import fields as inner_fields
+from bemkit.operators.somigliana.fields import InteriorFields
 
 PAIRS = 10_000_000
 """Pairs of a point and an element that are integrated to measure the time of all."""
@@ -42,7 +43,7 @@ def row(n_elements: int, n_points: int) -> list[str]:
     x, y = dof_points(space), dof_points(tractions)
     displacement = np.column_stack([np.sin(x[:, 0] + 2.0 * x[:, 1]), np.cos(1.0 - 2.0 * x[:, 0] * x[:, 1])])
     traction = np.column_stack([np.sin(3.0 * y[:, 0]), y[:, 1]])
-    fields = bk.InteriorFields(mesh, bk.Material(2.0, 0.3), space, displacement, tractions, traction)
+    fields = InteriorFields(mesh, bk.Material(2.0, 0.3), space, displacement, tractions, traction)
     rng = np.random.default_rng(0)
     points = rng.uniform(0.0, 1.0, (n_points, 2)) * [2.0, 1.0]
     beside = np.column_stack([rng.uniform(0.1, 1.9, n_points), np.full(n_points, 2.0 / n_elements)])

@@ -25,6 +25,8 @@ from rich.table import Table
 from scipy.linalg.lapack import dgetrf, dpotrf
 
 import bemkit as bk
+from bemkit.geometry.spaces import ConstantSpace, LinearSpace
+from bemkit.operators.boundary import assemble, double_layer, hypersingular, single_layer
 from tests.operators.collocation_matrices import collocation_matrices
 
 
@@ -56,13 +58,13 @@ def operators(n_elements: int, repetitions: int) -> tuple[float, float, float, f
     """Times of LU, Cholesky, the collocation matrices, and V, K, W of a square."""
     mesh = bk.discretise(bk.Rectangle(1.0, 1.0).outline(), n_elements=n_elements)
     material = bk.Material(1.0, 0.3)
-    tractions, displacements = bk.ConstantSpace(mesh), bk.LinearSpace(mesh)
+    tractions, displacements = ConstantSpace(mesh), LinearSpace(mesh)
 
     def galerkin() -> np.ndarray:  # type: ignore[type-arg]
-        v = bk.single_layer(tractions, tractions, material)
-        k = bk.double_layer(displacements, tractions, material)
-        w = bk.hypersingular(displacements, displacements, material)
-        bk.assemble(v, k, w)
+        v = single_layer(tractions, tractions, material)
+        k = double_layer(displacements, tractions, material)
+        w = hypersingular(displacements, displacements, material)
+        assemble(v, k, w)
         return v.matrix()
 
     matrix = np.asfortranarray(galerkin())

@@ -17,6 +17,7 @@ from bemkit.geometry.curves import Arc, Segment
 from bemkit.geometry.local_values import values_on_elements
 from bemkit.geometry.outline import Outline, Side
 from bemkit.model.prepared import prepare
+from bemkit.operators.steklov_poincare.galerkin import GalerkinElasticity
 from bemkit.operators.steklov_poincare.operator import SteklovPoincareOperator
 
 REFERENCE = Path(__file__).parent / "reference" / "data"
@@ -132,7 +133,7 @@ def true_error(solution: bk.Solution, n_bisections: int = 2) -> float:
     tractions = scene.discretisation.traction_space(mesh.unit)
     body = prepared.only
     stiffness = SteklovPoincareOperator(
-        bk.GalerkinElasticity(mesh.unit, prepared.material_of(body), body.own_space, tractions)
+        GalerkinElasticity(mesh.unit, prepared.material_of(body), body.own_space, tractions)
     ).matrix()
     error = (fine - inherited).ravel()
     return float(np.sqrt(error @ stiffness @ error / (fine.ravel() @ stiffness @ fine.ravel())))

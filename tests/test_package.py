@@ -168,3 +168,8 @@ assert all(find_spec(name) for name in names)
 """
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
+
+
+def test_the_public_names_are_few() -> None:
+    """What a scene and its results need; what extenders need has modules."""
+    assert len(bemkit.__all__) <= 100

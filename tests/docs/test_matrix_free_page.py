@@ -9,7 +9,7 @@ import pytest
 from sybil import Sybil
 from sybil.parsers.markdown import PythonCodeBlockParser
 
-import bemkit as bk
+from bemkit.solvers.base import solve
 from tests.docs.pages import DOCS
 
 N_NODES = 2048
@@ -29,7 +29,7 @@ def page() -> dict[str, Any]:
 @pytest.mark.parametrize("law", range(3))
 def test_every_driver_certifies_every_law_on_a_fine_mesh(page: dict[str, Any], law: int) -> None:
     problem = page["wavy"](N_NODES, page["LAWS"][law])
-    solutions = [bk.solve(problem, driver) for driver in page["DRIVERS"]]
+    solutions = [solve(problem, driver) for driver in page["DRIVERS"]]
     for solution in solutions:
         assert solution.is_converged
         assert solution.certificate.worst <= 1e-9

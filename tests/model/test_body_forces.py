@@ -17,8 +17,10 @@ from bemkit.geometry.spaces import dof_points
 from bemkit.model.model import Model, build_model
 from bemkit.model.prepared import prepare
 from bemkit.operators.material import Plane
+from bemkit.operators.steklov_poincare.galerkin import GalerkinElasticity
 from bemkit.operators.steklov_poincare.operator import SteklovPoincareOperator
 from bemkit.runs.steps import UnsolvableSceneError
+from bemkit.solvers.base import solve
 from tests.slow import slow_except, slow_only
 
 MATERIAL = bk.Material(1.0, 0.3)
@@ -287,7 +289,7 @@ def test_the_certificate_knows_the_weight(parts: tuple[bk.Part, ...]) -> None:
     model = model_of(block(parts=parts))
     solution = bk.run(block(parts=parts))
     body = model.problem.body
-    state = bk.solve(model.problem, bk.SemismoothNewton()).state if solution.contact.n_contact else None
+    state = solve(model.problem, bk.SemismoothNewton()).state if solution.contact.n_contact else None
     assert body.imbalance(state).worst < 1e-12  # type: ignore[arg-type]
     condensed = dataclasses.replace(model.body.condensed, volume_force=None)
     if solution.contact.n_contact:
@@ -300,7 +302,7 @@ def test_the_certificate_knows_the_weight(parts: tuple[bk.Part, ...]) -> None:
 def test_tangential_displacements_are_those_of_the_body() -> None:
     """On a frictionless floor a heated block expands along it."""
     model = model_of(block(parts=(FLOOR,), body_forces=(WEIGHT, bk.Heating(0.1, 1.0))))
-    state = bk.solve(model.problem, bk.SemismoothNewton()).state
+    state = solve(model.problem, bk.SemismoothNewton()).state
     ((displacement, _),) = model.nodal_fields(state)
     nodes = model.prepared.contact_nodes
     along = np.sum(displacement[nodes.nodes] * nodes.frame[:, 1], axis=1)
@@ -426,7 +428,7 @@ def test_the_estimated_error_is_that_of_the_part_with_an_error(n_elements: int) 
     for local, dofs in enumerate(fine.element_dofs.T):
         inherited = np.einsum("pe,epc->ec", coarse.basis(places[:, local]), at_nodes)
         error[dofs] = exact[dofs] - solution.particular.displacement(points[dofs]) - inherited
-    stiffness = SteklovPoincareOperator(bk.GalerkinElasticity(mesh, MATERIAL, fine)).matrix()
+    stiffness = SteklovPoincareOperator(GalerkinElasticity(mesh, MATERIAL, fine)).matrix()
     true = np.sqrt(error.ravel() @ stiffness @ error.ravel() * 3.0 * oedometric(MATERIAL))
     assert solution.estimated_error is not None
     assert 0.4 < solution.estimated_error / true < 2.5

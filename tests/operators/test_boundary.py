@@ -11,7 +11,17 @@ from scipy.sparse.linalg import gmres
 import bemkit as bk
 from bemkit.arrays import FloatArray
 from bemkit.geometry import BoundaryMesh, GeometryError
-from bemkit.operators.boundary import PairOperator
+from bemkit.geometry.neighbours import corner_nodes
+from bemkit.geometry.spaces import ConstantSpace, LinearSpace, QuadraticSpace
+from bemkit.operators.boundary import (
+    PairOperator,
+    adjoint_double_layer,
+    assemble,
+    double_layer,
+    hypersingular,
+    mass,
+    single_layer,
+)
 from bemkit.operators.integrals.sweep import PairSweep
 from bemkit.operators.linear.dense import Cholesky, DenseLU, SingularMatrixError, multiply
 
@@ -24,11 +34,11 @@ def l_shape(n_elements: int = 36) -> BoundaryMesh:
 
 
 def operators(mesh: BoundaryMesh) -> tuple[PairOperator, PairOperator, PairOperator]:
-    tractions, displacements = bk.ConstantSpace(mesh), bk.LinearSpace(mesh)
+    tractions, displacements = ConstantSpace(mesh), LinearSpace(mesh)
     return (
-        bk.single_layer(tractions, tractions, MATERIAL),
-        bk.double_layer(displacements, tractions, MATERIAL),
-        bk.hypersingular(displacements, displacements, MATERIAL),
+        single_layer(tractions, tractions, MATERIAL),
+        double_layer(displacements, tractions, MATERIAL),
+        hypersingular(displacements, displacements, MATERIAL),
     )
 
 
@@ -44,8 +54,8 @@ def test_nothing_is_computed_before_it_is_asked_for_and_then_only_once() -> None
 def test_one_sweep_gives_the_same_matrices_as_three() -> None:
     mesh = l_shape()
     together, alone = operators(mesh), operators(mesh)
-    bk.assemble(*together)
-    bk.assemble(*together)  # assembled operators are left alone
+    assemble(*together)
+    assemble(*together)  # assembled operators are left alone
     for one, other in zip(together, alone, strict=True):
         # products of matrices of other sizes add up in another order
         np.testing.assert_allclose(one.matrix(), other.matrix(), rtol=0.0, atol=1e-15 * np.abs(one.matrix()).max())
@@ -53,9 +63,9 @@ def test_one_sweep_gives_the_same_matrices_as_three() -> None:
 
 def test_adjoint_is_exactly_the_transpose() -> None:
     mesh = l_shape()
-    tractions, displacements = bk.ConstantSpace(mesh), bk.LinearSpace(mesh)
-    adjoint = bk.adjoint_double_layer(tractions, displacements, MATERIAL)
-    double = bk.double_layer(displacements, tractions, MATERIAL)
+    tractions, displacements = ConstantSpace(mesh), LinearSpace(mesh)
+    adjoint = adjoint_double_layer(tractions, displacements, MATERIAL)
+    double = double_layer(displacements, tractions, MATERIAL)
     np.testing.assert_array_equal(adjoint.matrix(), double.matrix().T)
 
 
@@ -87,7 +97,7 @@ def test_results_do_not_depend_on_numbering(seed: int) -> None:
 def test_operators_are_combined_and_solved_with_as_linear_operators_of_scipy() -> None:
     mesh = l_shape()
     v, k, _ = operators(mesh)
-    m = bk.mass(k.trial, k.test)
+    m = mass(k.trial, k.test)
     u = np.random.default_rng(3).normal(size=k.trial.n_dofs)
     right = (0.5 * m + k) @ u
     np.testing.assert_allclose(right, 0.5 * (m.matrix() @ u) + k.matrix() @ u, rtol=1e-14, atol=1e-14)
@@ -99,23 +109,23 @@ def test_operators_are_combined_and_solved_with_as_linear_operators_of_scipy() -
 @pytest.mark.parametrize(
     ("make", "symmetry"),
     [
-        (bk.LinearSpace, bk.Symmetry(x=0.0)),
-        (bk.QuadraticSpace, None),
-        pytest.param(bk.LinearSpace, None, marks=pytest.mark.slow),
-        pytest.param(bk.QuadraticSpace, bk.Symmetry(x=0.0), marks=pytest.mark.slow),
+        (LinearSpace, bk.Symmetry(x=0.0)),
+        (QuadraticSpace, None),
+        pytest.param(LinearSpace, None, marks=pytest.mark.slow),
+        pytest.param(QuadraticSpace, bk.Symmetry(x=0.0), marks=pytest.mark.slow),
     ],
 )
 def test_blocks_are_computed_alone_and_equal_those_of_the_matrix(make: type, symmetry: bk.Symmetry | None) -> None:
     outline = bk.PlateWithHole(4.0, 2.0, 0.5, (-2.0, -1.0)).outline()
     mesh = bk.discretise(outline, n_elements=48, symmetry=symmetry)
-    u, t = make(mesh), bk.LinearSpace(mesh, bk.corner_nodes(mesh))
+    u, t = make(mesh), LinearSpace(mesh, corner_nodes(mesh))
     rng = np.random.default_rng(1)
     for operator in (
-        bk.single_layer(t, t, MATERIAL),
-        bk.double_layer(u, t, MATERIAL),
-        bk.double_layer(u, t, MATERIAL).T,
-        bk.hypersingular(u, u, MATERIAL),
-        bk.mass(u, t),
+        single_layer(t, t, MATERIAL),
+        double_layer(u, t, MATERIAL),
+        double_layer(u, t, MATERIAL).T,
+        hypersingular(u, u, MATERIAL),
+        mass(u, t),
     ):
         rows, columns = (rng.choice(n, 7, replace=False) for n in operator.shape)
         block = operator.block(rows, columns)
@@ -148,9 +158,9 @@ def test_blocks_that_do_not_exist_are_refused(rows: list[object]) -> None:
 
 def test_mass_integrates_products() -> None:
     mesh = l_shape()
-    space = bk.QuadraticSpace(mesh)
+    space = QuadraticSpace(mesh)
     total = np.ones(space.n_dofs // 2)
-    matrix = bk.mass(space, space).matrix()
+    matrix = mass(space, space).matrix()
     assert matrix.nnz == 2 * 9 * 36 - 2 * 36  # each element couples its three nodes, neighbours share one
     matrix = matrix.toarray()[::2, ::2]
     assert total @ matrix @ total == pytest.approx(8.0, rel=1e-14)  # the length of the boundary
@@ -160,19 +170,19 @@ def test_mass_integrates_products() -> None:
 
 def test_spaces_that_do_not_fit_are_refused() -> None:
     mesh, other = l_shape(), l_shape()
-    tractions, displacements = bk.ConstantSpace(mesh), bk.LinearSpace(mesh)
+    tractions, displacements = ConstantSpace(mesh), LinearSpace(mesh)
     with pytest.raises(GeometryError, match="live on different meshes: build both on the same BoundaryMesh"):
-        bk.single_layer(tractions, bk.ConstantSpace(other), MATERIAL)
+        single_layer(tractions, ConstantSpace(other), MATERIAL)
     with pytest.raises(GeometryError, match="hypersingular needs a continuous trial space, but ConstantSpace may jump"):
-        bk.hypersingular(tractions, displacements, MATERIAL)
+        hypersingular(tractions, displacements, MATERIAL)
     with pytest.raises(GeometryError, match="hypersingular needs a continuous test space"):
-        bk.hypersingular(displacements, bk.LinearSpace(mesh, bk.corner_nodes(mesh)), MATERIAL)
+        hypersingular(displacements, LinearSpace(mesh, corner_nodes(mesh)), MATERIAL)
     with pytest.raises(GeometryError, match="double_layer needs a continuous trial space"):
-        bk.double_layer(tractions, tractions, MATERIAL)
-    here = bk.single_layer(tractions, tractions, MATERIAL)
-    there = bk.single_layer(bk.ConstantSpace(other), bk.ConstantSpace(other), MATERIAL)
+        double_layer(tractions, tractions, MATERIAL)
+    here = single_layer(tractions, tractions, MATERIAL)
+    there = single_layer(ConstantSpace(other), ConstantSpace(other), MATERIAL)
     with pytest.raises(GeometryError, match="assemble those of one mesh at a time"):
-        bk.assemble(here, there)
+        assemble(here, there)
 
 
 @pytest.mark.parametrize(

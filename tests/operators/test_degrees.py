@@ -14,7 +14,9 @@ from bemkit.arrays import ComplexArray, FloatArray
 from bemkit.geometry.errors import GeometryError
 from bemkit.geometry.neighbours import break_nodes
 from bemkit.geometry.quadrature import gauss_lobatto
-from bemkit.geometry.spaces import dof_points
+from bemkit.geometry.spaces import LagrangeSpace, dof_points
+from bemkit.operators.somigliana.fields import InteriorFields
+from bemkit.operators.steklov_poincare.galerkin import GalerkinElasticity
 from bemkit.operators.steklov_poincare.nodal_conditions import integrate_traction
 from bemkit.operators.steklov_poincare.operator import SteklovPoincareOperator
 from bemkit.scene.toml import SceneError, load_scene, scene_from_toml, scene_to_toml, with_overrides
@@ -71,7 +73,7 @@ def test_polynomial_fields_are_exact(degree: int, name: str) -> None:
     )
     displacement, traction = polynomial_field(degree)
     u = displacement(dof_points(space))
-    force = SteklovPoincareOperator(bk.GalerkinElasticity(mesh, MATERIAL, space, tractions)) @ u.ravel()
+    force = SteklovPoincareOperator(GalerkinElasticity(mesh, MATERIAL, space, tractions)) @ u.ravel()
     expected = integrate_traction(space, np.arange(mesh.n_elements), traction)
     # round-off of matrices whose condition grows with the degree and with the ratio of the lengths
     assert np.abs(force.reshape(-1, 2) - expected).max() < 1e-11 * np.abs(expected).max()
@@ -79,15 +81,15 @@ def test_polynomial_fields_are_exact(degree: int, name: str) -> None:
 
 def test_fields_inside_are_those_polynomials() -> None:
     mesh, degree = MESHES["square"], 9
-    space = bk.LagrangeSpace(mesh, degree=degree)
-    tractions = bk.LagrangeSpace(mesh, break_nodes(mesh), degree=degree - 1)
+    space = LagrangeSpace(mesh, degree=degree)
+    tractions = LagrangeSpace(mesh, break_nodes(mesh), degree=degree - 1)
     displacement, traction = polynomial_field(degree)
     normals, local = (
         np.empty((tractions.n_dofs // 2, 2)),
         mesh.normals_at(np.arange(mesh.n_elements), tractions.local_nodes),
     )
     normals[tractions.element_dofs] = local
-    inside = bk.InteriorFields(
+    inside = InteriorFields(
         mesh, MATERIAL, space, displacement(dof_points(space)), tractions, traction(dof_points(tractions), normals)
     )
     # near a corner, near a side, in the middle; powers about an end cost high degrees some digits
@@ -185,7 +187,7 @@ def test_bad_degrees_are_named(degree: object) -> None:
     with pytest.raises(GeometryError, match=rf"^degree is {degree!r}: give a whole number from 1 to 12$"):
         bk.Galerkin(degree)  # type: ignore[arg-type]
     with pytest.raises(GeometryError, match="give a whole number from 1 to 12"):
-        bk.LagrangeSpace(MESHES["square"], degree=degree)  # type: ignore[arg-type]
+        LagrangeSpace(MESHES["square"], degree=degree)  # type: ignore[arg-type]
 
 
 def test_scenes_name_a_degree() -> None:

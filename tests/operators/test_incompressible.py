@@ -10,8 +10,10 @@ from bemkit.arrays import FloatArray
 from bemkit.contact.condensation.nodes import ContactNodes
 from bemkit.contact.conditions import separated, stick
 from bemkit.geometry import BoundaryMesh, Selection
-from bemkit.geometry.spaces import dof_points
+from bemkit.geometry.neighbours import corner_nodes
+from bemkit.geometry.spaces import LinearSpace, QuadraticSpace, dof_points
 from bemkit.operators.linear.dense import SingularMatrixError
+from bemkit.operators.steklov_poincare.collocation import CollocationElasticity
 from bemkit.operators.steklov_poincare.galerkin import GalerkinElasticity
 from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions, Support, integrate_traction
 from bemkit.operators.steklov_poincare.operator import SteklovPoincareOperator
@@ -34,15 +36,15 @@ def roller(mesh: BoundaryMesh, part: str) -> Support:
     return Support(part, mesh.part(part), mesh.normals[mesh.part(part)][:, None, :])
 
 
-def bottom_of(elastic: bk.GalerkinElasticity, mesh: BoundaryMesh) -> ContactNodes:
+def bottom_of(elastic: GalerkinElasticity, mesh: BoundaryMesh) -> ContactNodes:
     return contact_along_normals(elastic.displacement_space, mesh.part("bottom"))
 
 
 @pytest.mark.parametrize("quadratic", [False, True])
 def test_patch_of_a_field_that_keeps_the_volume(quadratic: bool) -> None:
     mesh = block()
-    spaces = (bk.QuadraticSpace(mesh), bk.LinearSpace(mesh, bk.corner_nodes(mesh))) if quadratic else ()
-    elastic = bk.GalerkinElasticity(mesh, RUBBER, *spaces)
+    spaces = (QuadraticSpace(mesh), LinearSpace(mesh, corner_nodes(mesh))) if quadratic else ()
+    elastic = GalerkinElasticity(mesh, RUBBER, *spaces)
     stress = PURE_SHEAR + PURE_SHEAR.T  # 2 mu strain; the pressure is free
     expected = np.zeros((elastic.displacement_space.n_dofs // 2, 2))
     for element in range(mesh.n_elements):
@@ -61,7 +63,7 @@ def test_patch_of_a_field_that_keeps_the_volume(quadratic: bool) -> None:
 
 def test_a_pressed_block_bulges_without_changing_its_volume() -> None:
     mesh = block()
-    elastic = bk.GalerkinElasticity(mesh, RUBBER)
+    elastic = GalerkinElasticity(mesh, RUBBER)
     force = integrate_traction(
         elastic.displacement_space, mesh.part("top"), lambda x, _: np.broadcast_to([0.0, -1.0], x.shape)
     )
@@ -92,7 +94,7 @@ def test_a_ring_under_inner_pressure_has_the_lame_solution() -> None:
     errors = []
     for n_elements in (32, 64, 128):
         mesh = annulus(n_elements)
-        elastic = bk.GalerkinElasticity(mesh, RUBBER)
+        elastic = GalerkinElasticity(mesh, RUBBER)
         radius = np.hypot(*mesh.nodes.T)
         unit = mesh.nodes / radius[:, None]
         inside = np.flatnonzero(np.hypot(*mesh.centres.T) < 1.5)
@@ -133,7 +135,7 @@ def test_example_1_has_a_smooth_incompressible_limit(discretisation: object) -> 
 
 def test_a_body_without_room_to_yield_is_named() -> None:
     mesh = block(24)
-    elastic = bk.GalerkinElasticity(mesh, RUBBER)
+    elastic = GalerkinElasticity(mesh, RUBBER)
     everywhere = np.broadcast_to(np.eye(2), (mesh.n_elements, 2, 2))
     # all sides but the bottom are clamped, and the bottom is the contact boundary
     clamped = np.setdiff1d(np.arange(mesh.n_elements), mesh.part("bottom"))
@@ -151,8 +153,8 @@ def test_a_body_without_room_to_yield_is_named() -> None:
 def test_collocation_refuses_tractions_under_given_displacements_alone() -> None:
     # a uniform pressure on the whole boundary belongs to no displacement
     with pytest.raises(SingularMatrixError, match="the single layer operator is singular"):
-        SteklovPoincareOperator(bk.CollocationElasticity(annulus(24), RUBBER)).matrix()
-    assert SteklovPoincareOperator(bk.CollocationElasticity(annulus(24), bk.Material(3.0, 0.49))).matrix().shape == (
+        SteklovPoincareOperator(CollocationElasticity(annulus(24), RUBBER)).matrix()
+    assert SteklovPoincareOperator(CollocationElasticity(annulus(24), bk.Material(3.0, 0.49))).matrix().shape == (
         48,
         48,
     )

@@ -8,12 +8,13 @@ import numpy as np
 import pytest
 
 import bemkit as bk
+from bemkit.solvers.base import ContactSolver
 from tests.slow import slow_except
 
 DISCRETISATIONS = {"constant": bk.ConstantCollocation(), "linear": bk.Galerkin(1)}
 
 
-def solved(example: int, discretisation: str, friction: float, solver: bk.ContactSolver | None = None) -> bk.Solution:
+def solved(example: int, discretisation: str, friction: float, solver: ContactSolver | None = None) -> bk.Solution:
     scene = bk.load_scene(f"paper-{example}")
     solver = bk.Fallbacks() if solver is None else solver
     law = bk.Coulomb(friction)
@@ -57,7 +58,7 @@ def test_friction_of_ten_and_a_hundred_still_converges(discretisation: str, fric
     "solver", [bk.AugmentedLagrangian(), bk.FixedPoint(), bk.LemkePivoting()], ids=lambda s: type(s).__name__
 )
 @pytest.mark.parametrize("friction", slow_except([3.0, 10.0, 100.0], 10.0))
-def test_other_drivers_are_right_or_say_that_they_failed(solver: bk.ContactSolver, friction: float) -> None:
+def test_other_drivers_are_right_or_say_that_they_failed(solver: ContactSolver, friction: float) -> None:
     solution = solved(1, "constant", friction, solver)
     is_right = max(violations(solution, friction)) <= 1e-7
     assert solution.is_converged == is_right

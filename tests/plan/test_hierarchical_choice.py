@@ -14,6 +14,7 @@ import pytest
 import bemkit as bk
 from bemkit.model.prepared import prepare
 from bemkit.operators.linear.solvers import ChosenLinearSolver, DenseCholesky
+from bemkit.operators.steklov_poincare.galerkin import GalerkinElasticity
 from bemkit.plan import check_elements
 from bemkit.plan import plan as plan_module
 from bemkit.runs.nested import run_nested
@@ -78,7 +79,7 @@ def test_compressed_equations_of_galerkin_are_refused(degree: int) -> None:
     with pytest.raises(bk.errors.InputError, match="dense equations only"):
         bk.run(scene)
     with pytest.raises(ValueError, match=r"give DenseCholesky\(\), or the result of"):
-        bk.GalerkinElasticity(scene.build_mesh(), scene.material, linear_solver=ASKED)
+        GalerkinElasticity(scene.build_mesh(), scene.material, linear_solver=ASKED)
 
 
 def test_automatic_keeps_galerkin_dense() -> None:

@@ -8,6 +8,7 @@ import pytest
 
 import bemkit as bk
 from bemkit.operators.linear.solvers import choose_linear_solver
+from bemkit.operators.steklov_poincare.galerkin import GalerkinElasticity
 from tests.contact.test_hierarchical_body import loose_block
 from tests.plan.test_hierarchical_choice import chosen, scene_of
 from tests.scenes import Perforated, squeezed
@@ -57,7 +58,7 @@ def test_galerkin_takes_what_automatic_takes() -> None:
     assert "not matrix-free, but" in choice.reason
     scene = scene_of(40, discretisation=bk.Galerkin(1))
     with pytest.raises(ValueError, match=r"give DenseCholesky\(\), or the result of"):
-        bk.GalerkinElasticity(scene.build_mesh(), scene.material, linear_solver=ASKED)
+        GalerkinElasticity(scene.build_mesh(), scene.material, linear_solver=ASKED)
 
 
 def test_the_plan_says_what_is_used_and_that_it_takes_less_memory() -> None:

@@ -15,7 +15,8 @@ from bemkit.contact.further_laws import SlipWeakening
 from bemkit.results.citations import DRIVERS, LAW_WORKS, PACKAGE, Citations, Method, cite, entries
 from bemkit.scene.registry import LAWS, SOLVERS
 from bemkit.scene.toml import shipped_files, with_overrides
-from bemkit.solvers.solution_path import PATH_MESSAGE
+from bemkit.solvers.solution_path import PATH_MESSAGE, SolutionPath
+from bemkit.solvers.springs import Springs
 from bemkit.version import __version__
 
 ROOT = Path(__file__).parents[2]
@@ -107,11 +108,11 @@ def test_a_run_without_stored_equations_cites_its_products_and_its_iteration() -
 def test_a_run_cites_the_path_of_solutions_if_it_was_followed() -> None:
     scene = with_overrides(PAPER_1, elements=40)
     assert "Lemke1965" not in keys(cite(bk.run(scene)))
-    solution = bk.run(replace(scene, solver=bk.Fallbacks((bk.SemismoothNewton(max_steps=1), bk.SolutionPath()))))
+    solution = bk.run(replace(scene, solver=bk.Fallbacks((bk.SemismoothNewton(max_steps=1), SolutionPath()))))
     assert any(record.message.startswith(PATH_MESSAGE) for record in solution.history)
     assert "Lemke1965" in keys(cite(solution))
     assert "Rockafellar1976" not in keys(cite(solution))
-    drivers = (bk.SemismoothNewton(max_steps=1), bk.Springs(least_motions=4), bk.FixedPoint())
+    drivers = (bk.SemismoothNewton(max_steps=1), Springs(least_motions=4), bk.FixedPoint())
     solution = bk.run(replace(scene, solver=bk.Fallbacks(drivers)))
     assert not {"Rockafellar1976", "Lemke1965"} & keys(cite(solution))  # one body takes no springs
     assert "NecasJarusekHaslinger1980" in keys(cite(solution))

@@ -14,7 +14,8 @@ import bemkit as bk
 from bemkit.atomic_files import OutputFileError
 from bemkit.cli.main import main
 from bemkit.pictures.shown import shown
-from bemkit.results.export import FORMATS, boundary_arrays
+from bemkit.results.assembly_solution import AssemblySolution
+from bemkit.results.export import FORMATS, boundary_arrays, export_result
 from bemkit.results.stress_measures import STRESSES
 from bemkit.results.stress_mesh import stress_mesh
 from bemkit.scene.toml import with_overrides
@@ -27,7 +28,7 @@ def solution() -> bk.Solution:
 
 
 @pytest.fixture(scope="module")
-def bodies() -> bk.AssemblySolution:
+def bodies() -> AssemblySolution:
     return bk.run(with_overrides(bk.load_scene("two-cylinders"), elements=40))
 
 
@@ -44,12 +45,12 @@ def test_every_ending_writes_and_replaces_its_own(
 ) -> None:
     path = tmp_path / f"r{ending}"
     for _ in range(2):
-        bk.export_result(path, request.getfixturevalue(name))
+        export_result(path, request.getfixturevalue(name))
     assert [file.name for file in tmp_path.iterdir()] == [path.name]
 
 
-def test_numpy_reads_the_arrays(bodies: bk.AssemblySolution, tmp_path: Path) -> None:
-    bk.export_result(tmp_path / "r.npz", bodies)
+def test_numpy_reads_the_arrays(bodies: AssemblySolution, tmp_path: Path) -> None:
+    export_result(tmp_path / "r.npz", bodies)
     with np.load(tmp_path / "r.npz") as arrays:
         assert set(arrays) == set(boundary_arrays(bodies))
         np.testing.assert_array_equal(arrays["upper/displacement"], bodies.bodies["upper"].boundary.displacement)
@@ -58,7 +59,7 @@ def test_numpy_reads_the_arrays(bodies: bk.AssemblySolution, tmp_path: Path) -> 
 
 def test_other_programs_read_the_lines(solution: bk.Solution, tmp_path: Path) -> None:
     meshio = pytest.importorskip("meshio")
-    bk.export_result(tmp_path / "r.vtu", solution)
+    export_result(tmp_path / "r.vtu", solution)
     mesh = meshio.read(tmp_path / "r.vtu")
     vertices, lines = mesh.cells
     assert (lines.type, vertices.type) == ("line", "vertex")
@@ -90,7 +91,7 @@ def test_stress_inside_goes_with_the_lines(tmp_path: Path) -> None:
     scene = bk.Scene(
         title="t", shape=bk.Rectangle(2.0, 1.0), material=material, parts=parts, mesh=bk.MeshOptions(elements=60)
     )
-    bk.export_result(tmp_path / "r.vtu", bk.run(scene), inside=11)
+    export_result(tmp_path / "r.vtu", bk.run(scene), inside=11)
     mesh = meshio.read(tmp_path / "r.vtu")
     assert [block.type for block in mesh.cells] == ["vertex", "line", "triangle"]
     triangles = mesh.cells[2].data
@@ -117,7 +118,7 @@ def test_triangles_end_at_the_boundary_and_hold_the_largest_stress(is_biaxial: b
         discretisation=bk.Galerkin(2),
     )
     solution = bk.run(scene)
-    bk.export_result(tmp_path / "r.vtu", solution, inside=49)
+    export_result(tmp_path / "r.vtu", solution, inside=49)
     mesh = meshio.read(tmp_path / "r.vtu")
     for name, values in mesh.point_data.items():
         assert np.isfinite(values).all(), name
@@ -150,9 +151,9 @@ def test_triangles_fill_every_body(name: str) -> None:
 
 def test_inside_is_refused_where_it_cannot_be_held(solution: bk.Solution, tmp_path: Path, capsys) -> None:
     with pytest.raises(OutputFileError, match=r"r.h5: .h5 holds no fields inside the body: give .vtu or .vtp, or no"):
-        bk.export_result(tmp_path / "r.h5", solution, inside=10)
+        export_result(tmp_path / "r.h5", solution, inside=10)
     with pytest.raises(OutputFileError, match=r"r.vtu: inside is 1: give from 2 to 1000 points across the body"):
-        bk.export_result(tmp_path / "r.vtu", solution, inside=1)
+        export_result(tmp_path / "r.vtu", solution, inside=1)
     assert call("run", "paper-1", "--inside", "10") == 2
     assert "--inside goes into a file: give -o with a name that ends in .vtu or .vtp" in capsys.readouterr().err
 
@@ -172,9 +173,9 @@ def test_the_command_line_goes_by_the_ending(
 
 
 @pytest.mark.parametrize("ending", [".vtu", ".vtp"])
-def test_pyvista_reads_named_fields_on_the_same_cells(ending: str, bodies: bk.AssemblySolution, tmp_path: Path) -> None:
+def test_pyvista_reads_named_fields_on_the_same_cells(ending: str, bodies: AssemblySolution, tmp_path: Path) -> None:
     pyvista = pytest.importorskip("pyvista")
-    bk.export_result(tmp_path / f"r{ending}", bodies, inside=9)
+    export_result(tmp_path / f"r{ending}", bodies, inside=9)
     data = pyvista.read(tmp_path / f"r{ending}")
     n_contact = bodies.contact.n_contact
     assert data.GetCellType(0) == pyvista.CellType.VERTEX
@@ -191,11 +192,11 @@ def test_pyvista_reads_named_fields_on_the_same_cells(ending: str, bodies: bk.As
     assert np.isfinite(data.point_data["von_mises"][square.point_ids]).all()
 
 
-def test_polygonal_data_hold_the_arrays_of_the_grid(bodies: bk.AssemblySolution, tmp_path: Path) -> None:
+def test_polygonal_data_hold_the_arrays_of_the_grid(bodies: AssemblySolution, tmp_path: Path) -> None:
     """Read by nothing but the standard library: the number of bytes and the data, in base64."""
     arrays = []
     for ending in (".vtu", ".vtp"):
-        bk.export_result(tmp_path / f"r{ending}", bodies)
+        export_result(tmp_path / f"r{ending}", bodies)
         piece = ElementTree.parse(tmp_path / f"r{ending}").find(".//Piece")
         assert piece is not None
         fields = [
@@ -218,7 +219,7 @@ def test_bodies_without_end_are_cut(tmp_path: Path) -> None:
     scene = bk.Scene(
         title="t", shape=shape, material=bk.Material(1e3, 0.3), parts=parts, mesh=bk.MeshOptions(elements=16)
     )
-    bk.export_result(tmp_path / "r.vtu", bk.run(scene), inside=10)
+    export_result(tmp_path / "r.vtu", bk.run(scene), inside=10)
     mesh = meshio.read(tmp_path / "r.vtu")
     assert [block.type for block in mesh.cells] == ["line", "triangle"]
     radius = np.hypot(*mesh.points[np.unique(mesh.cells[1].data), :2].T)

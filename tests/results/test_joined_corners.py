@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import bemkit as bk
+from bemkit.results.assembly_solution import AssemblySolution
 from bemkit.results.wedge import HELD, JoinedWedge, WedgeSide, joined_exponent
 from bemkit.solvers.active_sets import NodeStatus
 from tests.slow import slow_except
@@ -42,10 +43,10 @@ def pressed(friction: float, *, softness: float = 1.0, width: float = 4.0) -> bk
 
 
 @lru_cache
-def solved(friction: float, accuracy: float) -> bk.AssemblySolution:
+def solved(friction: float, accuracy: float) -> AssemblySolution:
     mesh = bk.MeshOptions(accuracy=accuracy, rising_degrees=True)
     scene = replace(pressed(friction), discretisation=bk.Galerkin(2), mesh=mesh)
-    solution: bk.AssemblySolution = bk.run(scene)
+    solution: AssemblySolution = bk.run(scene)
     return solution
 
 

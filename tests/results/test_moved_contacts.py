@@ -7,6 +7,7 @@ from dataclasses import replace
 import pytest
 
 import bemkit as bk
+from bemkit.results.assembly_solution import AssemblySolution
 
 CYLINDER = bk.Circle((0.5, -1.0), 1.0)
 
@@ -27,7 +28,7 @@ def block(x: float, obstacle: bk.Obstacle = CYLINDER) -> bk.Scene:
     )
 
 
-def doubts(solution: bk.Solution | bk.AssemblySolution) -> list[str]:
+def doubts(solution: bk.Solution | AssemblySolution) -> list[str]:
     return [sentence for sentence in map(str, solution.warnings) if "moves so far" in sentence]
 
 

@@ -12,6 +12,7 @@ import bemkit as bk
 from bemkit.arrays import FloatArray
 from bemkit.reference import answer_of
 from bemkit.reference.compare import Places
+from bemkit.results.assembly_solution import AssemblySolution
 from bemkit.results.wedge import FREE, HELD, ROLLER, JoinedWedge, WedgeSide, joined_exponent, leading_exponent
 from bemkit.solvers.active_sets import NodeStatus
 from tests.scenes import paper
@@ -207,9 +208,9 @@ def stack() -> bk.Assembly:
 
 
 @lru_cache
-def stacked(accuracy: float) -> bk.AssemblySolution:
+def stacked(accuracy: float) -> AssemblySolution:
     mesh = bk.MeshOptions(accuracy=accuracy, rising_degrees=True)
-    solution: bk.AssemblySolution = bk.run(replace(stack(), discretisation=bk.Galerkin(2), mesh=mesh))
+    solution: AssemblySolution = bk.run(replace(stack(), discretisation=bk.Galerkin(2), mesh=mesh))
     return solution
 
 

@@ -16,6 +16,7 @@ from rich.console import Console
 import bemkit as bk
 from bemkit.cli.console import print_summary
 from bemkit.report.page import report
+from bemkit.results.assembly_solution import AssemblySolution
 from bemkit.results.summary_rows import DIGITS, summary_rows
 from bemkit.results.tables import table_of, to_json
 from bemkit.scene.toml import with_overrides
@@ -24,7 +25,7 @@ UNITS = bk.UnitNames("mm", "MPa")
 
 
 @pytest.fixture(scope="module", params=["paper-1", "wedged-leg"])
-def solution(request: pytest.FixtureRequest) -> bk.Solution | bk.AssemblySolution:
+def solution(request: pytest.FixtureRequest) -> bk.Solution | AssemblySolution:
     scene = bk.load_scene(request.param)
     return bk.run(replace(with_overrides(scene, elements=40) if request.param == "paper-1" else scene, units=UNITS))
 
@@ -33,7 +34,7 @@ def text_of(page: str) -> str:
     return re.sub(r"\s+", " ", html.unescape(re.sub("<[^>]+>", " ", page)))
 
 
-def test_all_ways_out_have_the_same_rows(solution: bk.Solution | bk.AssemblySolution) -> None:
+def test_all_ways_out_have_the_same_rows(solution: bk.Solution | AssemblySolution) -> None:
     stream = io.StringIO()
     print_summary(solution, Console(file=stream, width=1000, highlight=False))
     printed = re.sub(r"\s+", " ", stream.getvalue())
@@ -48,7 +49,7 @@ def test_all_ways_out_have_the_same_rows(solution: bk.Solution | bk.AssemblySolu
             assert shown in lines, name
 
 
-def test_the_numbers_of_the_summary_are_those_of_json(solution: bk.Solution | bk.AssemblySolution) -> None:
+def test_the_numbers_of_the_summary_are_those_of_json(solution: bk.Solution | AssemblySolution) -> None:
     rows, summary = str(solution), json.loads(to_json(solution))
     force, energy = UNITS.as_dict()["force"], UNITS.energy
     expected = [f"{summary['energy']:.{DIGITS}g} {energy}", f"{summary['force_normal']:.{DIGITS}g} {force}"]
@@ -69,7 +70,7 @@ def test_the_numbers_of_the_summary_are_those_of_json(solution: bk.Solution | bk
         assert number in rows
 
 
-def test_the_peak_is_where_the_contact_table_has_it(solution: bk.Solution | bk.AssemblySolution) -> None:
+def test_the_peak_is_where_the_contact_table_has_it(solution: bk.Solution | AssemblySolution) -> None:
     table = table_of(solution, "contact")
     for contact in solution.summary()["contacts"]:
         rows = [row for row in table.as_dicts() if row["part"] == contact["name"]]
@@ -78,7 +79,7 @@ def test_the_peak_is_where_the_contact_table_has_it(solution: bk.Solution | bk.A
         assert 0.0 <= contact["contact_fraction"] <= 1.0 + 1e-12
 
 
-def test_the_forces_are_those_of_the_parts(solution: bk.Solution | bk.AssemblySolution) -> None:
+def test_the_forces_are_those_of_the_parts(solution: bk.Solution | AssemblySolution) -> None:
     expected = [force.force_x for body in solution.solved_bodies for force in body.part_forces]
     assert list(solution.forces.values("force_x")) == expected
 

@@ -11,6 +11,7 @@ import pytest
 import bemkit as bk
 from bemkit.errors import InputError
 from bemkit.model.contacts import OverlapError
+from bemkit.results.assembly_solution import AssemblySolution
 from bemkit.runs.adaptive import run_adaptive
 from bemkit.runs.steps import UnsolvableSceneError
 from tests.slow import slow_except
@@ -483,7 +484,7 @@ def test_a_body_whose_energy_can_be_negative_is_named() -> None:
     assert "body 'split'" in solution.message
 
 
-def _between_soft_ones(ratio: float) -> bk.AssemblySolution:
+def _between_soft_ones(ratio: float) -> AssemblySolution:
     """Two bodies on each other, so many times stiffer than those below and above them, pressed and sheared."""
     foot, load = bk.Part("foot", bk.Clamped(), ("bottom",)), bk.Part("top", bk.Traction(x=2e-3, y=-1e-2), ("top",))
     given = (("a", 1.0, (foot,)), ("b", ratio, ()), ("c", ratio, ()), ("d", 1.0, (load,)))

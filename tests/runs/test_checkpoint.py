@@ -12,6 +12,8 @@ import pytest
 
 import bemkit as bk
 from bemkit.cli.main import main
+from bemkit.results.assembly_solution import AssemblySolution
+from bemkit.results.export import export_result
 from bemkit.results.load_history import LoadHistory
 from bemkit.runs import load_path
 from bemkit.sealed_file import USER_BLOCK
@@ -51,7 +53,7 @@ def kill_after(file: Path, n_steps: int) -> Callable[[StepRecord], None]:
     return callback
 
 
-def loading_of(solution: bk.Solution | bk.AssemblySolution) -> LoadHistory:
+def loading_of(solution: bk.Solution | AssemblySolution) -> LoadHistory:
     assert solution.loading is not None
     return solution.loading
 
@@ -233,7 +235,7 @@ def test_histories_are_written_in_every_format(scene: bk.Scene | bk.Assembly, en
         main(["run", str(tmp_path / "scene.toml"), "-q", "-o", str(tmp_path / f"a.{ending}")])
     assert ended.value.code == 0
     assert (tmp_path / f"a.{ending}").stat().st_size > 100
-    bk.export_result(tmp_path / f"b.{ending}", bk.run(short))
+    export_result(tmp_path / f"b.{ending}", bk.run(short))
 
 
 def test_the_command_line_shows_steps(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -19,6 +19,7 @@ from bemkit.model.model import build_model
 from bemkit.model.prepared import prepare
 from bemkit.model.shapes import NotSentError
 from bemkit.operators.linear.dense import SingularMatrixError
+from bemkit.results.assembly_solution import AssemblySolution
 
 SAME = 1e-9
 """The same operations on the same numbers, but BLAS may take another number of threads."""
@@ -37,7 +38,7 @@ def coarse(name: str = "pin-in-plate", discretisation: Any = None, n_elements: i
     return replace(loaded, discretisation=discretisation or bk.Galerkin(1), mesh=mesh, **changes)
 
 
-def assert_same(one: bk.AssemblySolution, other: bk.AssemblySolution) -> None:
+def assert_same(one: AssemblySolution, other: AssemblySolution) -> None:
     assert one.is_converged
     assert other.is_converged
     size = np.abs(one.contact.sigma_n).max()

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import bemkit as bk
+from bemkit.geometry.outline import Selection
 from bemkit.geometry.spaces import QuadraticSpace, dof_points
 from bemkit.operators.rigid_modes import rigid_motions, without_motion
 from bemkit.results.error_indicators import blind_elements, element_errors, traction_errors
@@ -171,7 +172,7 @@ def test_a_plate_that_falls_and_turns_keeps_its_estimate(word: str) -> None:
 
 
 def test_pieces_of_too_few_elements_are_blind() -> None:
-    parts = {"two": bk.Selection(("left",)), "rest": bk.Selection(("top", "bottom", "right"))}
+    parts = {"two": Selection(("left",)), "rest": Selection(("top", "bottom", "right"))}
     mesh = bk.discretise(bk.Rectangle(4.0, 1.0).outline(), n_elements=10, parts=parts)
     is_upright = np.abs(mesh.normals[:, 0]) > 0.5
     assert int(is_upright.sum()) == 2  # one element each, and four on the others

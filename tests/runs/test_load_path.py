@@ -15,6 +15,7 @@ from bemkit.runs import load_path
 from bemkit.runs.steps import UnsolvableSceneError
 from bemkit.scene.load_history import load_steps, with_scaled_loads
 from bemkit.solvers.base import Status
+from bemkit.solvers.solution_path import SolutionPath
 from tests.runs.masonry import FRICTION, wall
 
 
@@ -214,7 +215,7 @@ def test_an_increment_grows_only_where_the_solver_took_few_steps(monkeypatch) ->
 
 
 def test_the_whole_path_is_followed_once_in_a_load_step() -> None:
-    class Counting(bk.SolutionPath):
+    class Counting(SolutionPath):
         n_paths = 0
 
         def step(self, problem, iterate):  # type: ignore[no-untyped-def]

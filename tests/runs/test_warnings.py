@@ -21,6 +21,7 @@ from bemkit.operators.material import Material
 from bemkit.plan import make_plan
 from bemkit.result_warning import ResultWarning, first_of_each_kind, without_duplicates
 from bemkit.results import warnings as warnings_module
+from bemkit.results.assembly_solution import AssemblySolution
 from bemkit.results.result_file import read_result, write_result
 from bemkit.results.solution import Solution
 from bemkit.results.tables import to_json
@@ -89,7 +90,7 @@ def test_large_rotations_are_warned_of() -> None:
 
 def test_large_strains_of_one_body_of_several_are_warned_of(monkeypatch) -> None:
     solution = run(with_overrides(load_scene("two-cylinders"), elements=40))
-    assert isinstance(solution, bk.AssemblySolution)
+    assert isinstance(solution, AssemblySolution)
     assert not any(LARGE in words for words in map(str, find_warnings(solution)))
     monkeypatch.setattr(warnings_module, "LARGEST_STRAIN", 1e-4)
     doubts = [words for words in map(str, find_warnings(solution)) if LARGE in words]

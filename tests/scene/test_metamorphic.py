@@ -12,9 +12,10 @@ import pytest
 import bemkit as bk
 from bemkit.arrays import FloatArray
 from bemkit.solvers.alm import BoundUpdate
+from bemkit.solvers.base import ContactSolver
 from tests.slow import slow_except
 
-DRIVERS: dict[str, bk.ContactSolver] = {
+DRIVERS: dict[str, ContactSolver] = {
     "newton": bk.SemismoothNewton(),
     "augmented": bk.AugmentedLagrangian(),
     "augmented, current bound": bk.AugmentedLagrangian(bound=BoundUpdate.CURRENT),

@@ -15,6 +15,7 @@ from bemkit.contact.laws import Coulomb, Frictionless
 from bemkit.contact.problem import ContactState
 from bemkit.model.model import build_model
 from bemkit.model.prepared import prepare
+from bemkit.solvers.base import ContactSolver
 from bemkit.solvers.newton import carried_on
 from bemkit.testing.independent_check import violations_of_body
 from tests.slow import slow_except
@@ -47,7 +48,7 @@ DRIVEN = pytest.mark.parametrize("driver", DRIVERS, ids=lambda driver: type(driv
     ids=["linear", "quadratic", "constant"],
 )
 def test_a_body_that_gives_way_to_its_obstacle_is_solved_without_contact_forces(
-    driver: bk.ContactSolver, discretisation: bk.Galerkin, distance: float
+    driver: ContactSolver, discretisation: bk.Galerkin, distance: float
 ) -> None:
     """No load pushes the disc to the wall: neither springs nor round-off of what the support causes."""
     solution = bk.run(carried_disc(distance, solver=driver, discretisation=discretisation))
@@ -75,7 +76,7 @@ def assert_right_or_unsolved(scene: bk.Scene, distance: float, push: float) -> b
 
 @DRIVEN
 @pytest.mark.parametrize("push", slow_except([1e-10, 1e-5], 1e-10))
-def test_the_wall_carries_the_push_however_small(driver: bk.ContactSolver, push: float) -> None:
+def test_the_wall_carries_the_push_however_small(driver: ContactSolver, push: float) -> None:
     """Beside what a disc clamped at the wall would exert on it, pushes are nothing; they are all there is."""
     is_solved = assert_right_or_unsolved(carried_disc(0.3, push, law=Coulomb(0.2), solver=driver), 0.3, push)
     assert is_solved or push < 1e-5  # 1e-10 of a strain of one leaves few digits
@@ -85,9 +86,7 @@ def test_the_wall_carries_the_push_however_small(driver: bk.ContactSolver, push:
 @DRIVEN
 @pytest.mark.parametrize("law", [Frictionless(), Coulomb(0.2)], ids=["frictionless", "coulomb"])
 @pytest.mark.parametrize("distance", [1e-12, 1e-3, 0.3])
-def test_a_carried_disc_is_right_or_has_no_answer(
-    driver: bk.ContactSolver, law: bk.FrictionLaw, distance: float
-) -> None:
+def test_a_carried_disc_is_right_or_has_no_answer(driver: ContactSolver, law: bk.FrictionLaw, distance: float) -> None:
     for discretisation in (bk.Galerkin(1), bk.Galerkin(2), bk.ConstantCollocation()):
         for push in (0.0, 1e-15, 1e-10, 1e-5, 1e-2):
             scene = carried_disc(distance, push, law=law, solver=driver, discretisation=discretisation)

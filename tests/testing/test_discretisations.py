@@ -13,7 +13,7 @@ import pytest
 import bemkit as bk
 from bemkit.arrays import FloatArray
 from bemkit.cli.main import main
-from bemkit.geometry.spaces import BoundarySpace
+from bemkit.geometry.spaces import BoundarySpace, ConstantSpace, LinearSpace, QuadraticSpace
 from bemkit.operators.linear.solvers import LinearSolver
 from bemkit.operators.steklov_poincare import CondensedMap
 from bemkit.operators.steklov_poincare.collocation import CollocationElasticity
@@ -28,7 +28,7 @@ from tests.slow import slow_except
 PLUGIN = """
 from dataclasses import dataclass
 import numpy as np
-import bemkit as bk
+from bemkit.geometry.spaces import LinearSpace, QuadraticSpace
 from bemkit.scene.discretisation import SymmetricGalerkin
 
 @dataclass(frozen=True)
@@ -36,10 +36,10 @@ class Jumping(SymmetricGalerkin):
     everywhere: bool = True
 
     def displacement_space(self, mesh):
-        return bk.QuadraticSpace(mesh)
+        return QuadraticSpace(mesh)
 
     def traction_space(self, mesh):
-        return bk.LinearSpace(mesh, np.full(mesh.n_nodes, self.everywhere))
+        return LinearSpace(mesh, np.full(mesh.n_nodes, self.everywhere))
 """
 
 
@@ -105,11 +105,11 @@ class Own(SymmetricGalerkin):
 
     def displacement_space(self, mesh: bk.BoundaryMesh) -> BoundarySpace:
         """Return quadratic functions."""
-        return bk.QuadraticSpace(mesh)
+        return QuadraticSpace(mesh)
 
     def traction_space(self, mesh: bk.BoundaryMesh) -> BoundarySpace:
         """Return linear functions without any continuity."""
-        return bk.LinearSpace(mesh, np.ones(mesh.n_nodes, bool))
+        return LinearSpace(mesh, np.ones(mesh.n_nodes, bool))
 
 
 class NoDataclass(SymmetricGalerkin):
@@ -144,7 +144,7 @@ class TooHigh(Own):
     estimates_error = True
 
     def traction_space(self, mesh: bk.BoundaryMesh) -> BoundarySpace:
-        return bk.ConstantSpace(mesh)
+        return ConstantSpace(mesh)
 
 
 @dataclass(frozen=True)

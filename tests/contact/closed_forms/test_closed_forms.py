@@ -13,10 +13,11 @@ import bemkit as bk
 from bemkit.model.model import build_model
 from bemkit.model.prepared import prepare
 from bemkit.solvers.alm import BoundUpdate
+from bemkit.solvers.base import ContactSolver, solve
 from bemkit.solvers.lemke import LemkePivoting
 from tests.slow import slow_except, slow_only
 
-DRIVERS: dict[str, bk.ContactSolver] = {
+DRIVERS: dict[str, ContactSolver] = {
     "newton": bk.SemismoothNewton(),
     "augmented": bk.AugmentedLagrangian(),
     "augmented, current bound": bk.AugmentedLagrangian(bound=BoundUpdate.CURRENT),
@@ -172,7 +173,7 @@ def test_the_tie_on_the_whole_body_ends_whatever_the_driver() -> None:
     )
     model = build_model(prepare(scene, scene.build_mesh()))
     for driver in DRIVERS.values():
-        solution = bk.solve(model.problem, driver, throw=False)
+        solution = solve(model.problem, driver, throw=False)
         assert solution.is_converged or solution.status is bk.Status.STALLED
         if solution.is_converged:
             force = (

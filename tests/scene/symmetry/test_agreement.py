@@ -11,9 +11,11 @@ import pytest
 import bemkit as bk
 from bemkit.geometry.neighbours import break_nodes
 from bemkit.geometry.reflection import antisymmetric_dofs, reflected_to_whole
-from bemkit.geometry.spaces import BoundarySpace
+from bemkit.geometry.spaces import BoundarySpace, ConstantSpace, LinearSpace, QuadraticSpace
 from bemkit.model.model import build_model
 from bemkit.model.prepared import prepare
+from bemkit.operators.boundary import adjoint_double_layer, double_layer, hypersingular, mass, single_layer
+from bemkit.operators.steklov_poincare.galerkin import GalerkinElasticity
 from bemkit.operators.steklov_poincare.operator import SteklovPoincareOperator
 from bemkit.testing import check_double_layer, check_operator, check_space
 from tests.scenes import DISCRETISATIONS, square, squeezed, whole_mesh
@@ -65,8 +67,8 @@ def test_fields_are_those_of_the_whole_body(case: str, discretisation: object, p
 
 
 SPACES = {
-    "linear": lambda mesh: (bk.LinearSpace(mesh), bk.ConstantSpace(mesh)),
-    "quadratic": lambda mesh: (bk.QuadraticSpace(mesh), bk.LinearSpace(mesh, break_nodes(mesh))),
+    "linear": lambda mesh: (LinearSpace(mesh), ConstantSpace(mesh)),
+    "quadratic": lambda mesh: (QuadraticSpace(mesh), LinearSpace(mesh, break_nodes(mesh))),
 }
 
 
@@ -86,10 +88,10 @@ def test_every_operator_is_the_folded_operator_of_the_whole(
     material = bk.Material(1.0, 0.3)
     (u, t), (whole_u, whole_t) = SPACES[kind](mesh), SPACES[kind](mesh.whole)
     for make, trial, test, whole_trial, whole_test in (
-        (bk.single_layer, t, t, whole_t, whole_t),
-        (bk.double_layer, u, t, whole_u, whole_t),
-        (bk.adjoint_double_layer, t, u, whole_t, whole_u),
-        (bk.hypersingular, u, u, whole_u, whole_u),
+        (single_layer, t, t, whole_t, whole_t),
+        (double_layer, u, t, whole_u, whole_t),
+        (adjoint_double_layer, t, u, whole_t, whole_u),
+        (hypersingular, u, u, whole_u, whole_u),
     ):
         folded = make(trial, test, material).matrix()[np.ix_(~antisymmetric_dofs(test), ~antisymmetric_dofs(trial))]
         whole = make(whole_trial, whole_test, material).matrix()
@@ -97,8 +99,8 @@ def test_every_operator_is_the_folded_operator_of_the_whole(
         # single integrals are good to about 1e-14
         assert np.abs(folded - expected).max() <= 1e-13 * np.abs(expected).max(), make
     elastic, whole_elastic = (
-        bk.GalerkinElasticity(mesh, material, u, t),
-        bk.GalerkinElasticity(mesh.whole, material, whole_u, whole_t),
+        GalerkinElasticity(mesh, material, u, t),
+        GalerkinElasticity(mesh.whole, material, whole_u, whole_t),
     )
     assert np.array_equal(SteklovPoincareOperator(elastic).matrix(), SteklovPoincareOperator(elastic).matrix().T)
     fold = folding(u, whole_u)
@@ -119,14 +121,14 @@ def test_spaces_and_operators_on_a_half_keep_their_promises(symmetry: bk.Symmetr
         for space in (u, t):
             check_space(space)
         for operator in (
-            bk.single_layer(t, t, material),
-            bk.single_layer(u, u, material),
-            bk.hypersingular(u, u, material),
-            bk.mass(t, t),
-            bk.mass(u, u),
+            single_layer(t, t, material),
+            single_layer(u, u, material),
+            hypersingular(u, u, material),
+            mass(t, t),
+            mass(u, u),
         ):
             check_operator(operator)
-        check_double_layer(bk.double_layer(u, t, material))
+        check_double_layer(double_layer(u, t, material))
 
 
 @pytest.mark.parametrize(("symmetry", "n_floating"), slow_only([(None, 3), (X, 1), (Y, 1), (BOTH, 0)], (X, 1)), ids=str)

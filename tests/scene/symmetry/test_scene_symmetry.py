@@ -10,6 +10,7 @@ import pytest
 import bemkit as bk
 from bemkit.geometry.errors import GeometryError
 from bemkit.geometry.reflection import element_images
+from bemkit.geometry.spaces import LinearSpace
 from bemkit.scene.symmetry import AsymmetricSceneError, find_symmetry
 from tests.scenes import EccentricRing, square, squeezed
 
@@ -157,7 +158,7 @@ def test_later_scenes_of_a_history_must_be_symmetric_too() -> None:
 
 
 def test_images_need_symmetric_local_nodes() -> None:
-    class Lopsided(bk.LinearSpace):
+    class Lopsided(LinearSpace):
         @property
         def local_nodes(self) -> np.ndarray:  # type: ignore[override]
             return np.array([-1.0, 0.5])

@@ -9,8 +9,9 @@ import pytest
 
 import bemkit as bk
 from bemkit.geometry.errors import GeometryError
-from bemkit.geometry.neighbours import along_boundary, break_nodes
-from bemkit.geometry.spaces import BoundarySpace
+from bemkit.geometry.neighbours import along_boundary, break_nodes, corner_nodes
+from bemkit.geometry.outline import Selection
+from bemkit.geometry.spaces import BoundarySpace, ConstantSpace, LinearSpace, QuadraticSpace
 
 PLATE = bk.PlateWithHole(2.0, 3.0, 0.3, (5.0, -1.0))
 CASES = [
@@ -88,14 +89,14 @@ def test_a_hole_beside_the_line_stands_for_two() -> None:
 @WHOLE
 def test_spaces_number_every_dof_once(shape: bk.Rectangle, symmetry: bk.Symmetry) -> None:
     mesh = halved(shape, symmetry)
-    spaces: list[BoundarySpace] = [bk.ConstantSpace(mesh), bk.LinearSpace(mesh), bk.QuadraticSpace(mesh)]
-    spaces += [bk.LinearSpace(mesh, break_nodes(mesh)), bk.QuadraticSpace(mesh, np.ones(mesh.n_nodes, bool))]
+    spaces: list[BoundarySpace] = [ConstantSpace(mesh), LinearSpace(mesh), QuadraticSpace(mesh)]
+    spaces += [LinearSpace(mesh, break_nodes(mesh)), QuadraticSpace(mesh, np.ones(mesh.n_nodes, bool))]
     for space in spaces:
         assert np.array_equal(np.unique(space.element_dofs), np.arange(space.n_dofs // 2))
 
 
 def test_parts_beyond_the_line_are_empty() -> None:
-    parts = {"left": bk.Selection(("left",)), "right": bk.Selection(("right",)), "top": bk.Selection(("top",))}
+    parts = {"left": Selection(("left",)), "right": Selection(("right",)), "top": Selection(("top",))}
     outline = bk.Rectangle(1.0, 1.0).outline()
     mesh = bk.discretise(outline, n_elements=40, parts=parts, symmetry=bk.Symmetry(x=0.5))
     assert mesh.part("right").size == 0
@@ -120,7 +121,7 @@ def test_a_line_through_a_corner_leaves_it_one() -> None:
     rhombus = bk.Polygon(((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0)))
     for shape, is_corner in ((rhombus, True), (bk.Disk(1.0), False)):
         mesh = bk.discretise(shape.outline(), n_elements=32, symmetry=bk.Symmetry(x=0.0))
-        assert (bk.corner_nodes(mesh)[mesh.on_symmetry_lines[:, 0]] == is_corner).all()
+        assert (corner_nodes(mesh)[mesh.on_symmetry_lines[:, 0]] == is_corner).all()
         assert mesh.on_symmetry_lines.sum() == 2
 
 

@@ -26,7 +26,7 @@ FAST = ("rotating-disc", "uniform-slip", "gravity-column", "pair-patch", "gravit
 
 
 def test_fast_cases_are_met() -> None:
-    found = bk.verify(FAST, quick=True)
+    found = verify(FAST, quick=True)
     assert found.is_met
     assert {row.name for row in found.rows} == set(FAST)
     kirsch = next(row for row in found.rows if row.name == "kirsch-hole")
@@ -36,17 +36,17 @@ def test_fast_cases_are_met() -> None:
 
 @pytest.mark.parametrize("name", ["receding-pair", "cattaneo-mindlin"])
 def test_meshes_of_several_bodies_follow_the_solution(name: str) -> None:
-    assert not bk.verify([name], quick=True).missed
+    assert not verify([name], quick=True).missed
 
 
 @pytest.mark.parametrize("name", [name for name in CASES if CASES[name]().resolutions[:2] == (1e-2, 5e-5)])
 def test_rising_degrees_reach_the_accuracies_asked_for(name: str) -> None:
-    assert not bk.verify([name], quick=True).missed
+    assert not verify([name], quick=True).missed
 
 
 @pytest.mark.slow
 def test_all_cases_are_met() -> None:
-    found = bk.verify()
+    found = verify()
     assert [f"{row.name}: {row.quantity.name}" for row in found.missed] == []
 
 
