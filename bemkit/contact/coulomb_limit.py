@@ -104,11 +104,12 @@ def coulomb_limit(
             constant / scale,
             growing / size,
             cohesion[points] / scale,
-            slopes[points],
+            slope[points],
         )
         return _limit(blocks)
 
-    found = with_met_nodes(scaled, cohesion / scale, slope, programme)
+    # sliding does not dilate: only points that the motion presses, or that hold without pressure, join
+    found = with_met_nodes(scaled, cohesion / scale, 0.0 * slope, programme)
     if np.isnan(found.factor):
         raise InputError("no state of collapse was found: compare largest_load_factor, a bound from above")
     held, factor, smallest = (scale / size * value for value in (found.held, found.factor, found.smallest))
