@@ -20,6 +20,7 @@ from bemkit.results.stress_measures import STRESSES
 from bemkit.results.stress_mesh import stress_mesh
 from bemkit.scene.toml import with_overrides
 from tests.perforated_plate import NOMINAL, plate
+from tests.slow import slow_only
 
 
 @pytest.fixture(scope="module")
@@ -109,7 +110,7 @@ def test_stress_inside_goes_with_the_lines(tmp_path: Path) -> None:
     np.testing.assert_allclose(mesh.point_data["von_mises"], 1e-3 * np.sqrt(1.0 - 0.3 + 0.09), rtol=1e-9)
 
 
-@pytest.mark.parametrize("is_biaxial", [True, False])
+@pytest.mark.parametrize("is_biaxial", slow_only([True, False], True))
 def test_triangles_end_at_the_boundary_and_hold_the_largest_stress(is_biaxial: bool, tmp_path: Path) -> None:
     meshio = pytest.importorskip("meshio")
     scene = plate(

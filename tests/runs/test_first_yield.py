@@ -33,20 +33,22 @@ def test_below_a_contact_the_stress_follows_a_power_of_the_load() -> None:
         ),
         law=bk.Frictionless(),
         symmetry=bk.Symmetry(x=0.0),
-        mesh=bk.MeshOptions(elements=240),
+        discretisation=bk.Galerkin(2),
+        mesh=bk.MeshOptions(accuracy=1e-3, rising_degrees=True),
     )
     one = largest_equivalent_stress(bk.run(scene))
-    found = bk.first_yield(scene, 2.0**0.5 * one.value, rtol=1e-4)
-    assert found.load_factor == pytest.approx(2.0, rel=0.05)  # elements are a tenth of the contact
+    found = bk.first_yield(scene, 2.0**0.5 * one.value, rtol=1e-2)
+    assert found.load_factor == pytest.approx(2.0, rel=0.03)  # the contact is 6 % of the radius wide
     assert 0.0 < found.y < 0.2
     pressure = float(-found.solution.contact.sigma_n.min())
-    assert 2.0**0.5 * one.value == pytest.approx(0.56 * pressure, rel=0.05)
+    assert 2.0**0.5 * one.value == pytest.approx(0.56 * pressure, rel=0.03)
 
 
 def test_what_cannot_yield_is_refused() -> None:
     scene = bk.load_scene("disc-between-plates")
     assert isinstance(scene, bk.Scene)
-    with pytest.raises(bk.InputError, match=r"the largest stress does not follow the load: 0\.0296"):
+    scene = replace(scene, mesh=bk.MeshOptions(elements=60))
+    with pytest.raises(bk.InputError, match=r"the largest stress does not follow the load: 0\.02877"):
         bk.first_yield(scene, 0.05)
     with pytest.raises(bk.InputError, match=r"yield_stress is -1\.0: give a positive stress"):
         bk.first_yield(scene, -1.0)

@@ -17,7 +17,7 @@ LOAD = np.pi * MODULUS * HALF_WIDTH**2 / (4.0 * RADIUS)
 PRESSURE = MODULUS * HALF_WIDTH / (2.0 * RADIUS)
 
 
-def specimen(strain: float, n_elements: int = 1500, **changes: object) -> bk.Scene:
+def specimen(strain: float, n_elements: int = 500, **changes: object) -> bk.Scene:
     pressed = bk.FarField(force_x=0.0, force_y=LOAD, turn=0.0)
     shear = 0.5 * FRICTION * LOAD
     steps = (bk.Step(1.0), bk.Step(2.0, {"far.force_x": f"{shear} * (t - 1)", "far.strain": f"{strain} * (t - 1)"}))
