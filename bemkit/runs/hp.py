@@ -36,6 +36,7 @@ from bemkit.runs.density import DensityMeshes
 from bemkit.runs.element_degrees import below_layers, few_kinds, sufficient_degrees
 from bemkit.runs.mesh_sequence import AnyScene, AnySolution, Level, Member, zone_cuts
 from bemkit.scene.discretisation import Discretisation
+from bemkit.solvers.base import Status
 
 SAFETY = 0.4
 """The next mesh is planned for this part of the error asked for."""
@@ -96,13 +97,17 @@ class LayeredMeshes:
         return not is_first and self.error(solutions[-1]) <= self.accuracy
 
     def _is_stuck(self, solutions: Sequence[AnySolution]) -> bool:
-        """Return whether the last two meshes have not halved the error of the best before them, all in layers."""
+        """Return whether the last two meshes have not halved the error of the best before them, all in layers.
+
+        After a mesh that misses contact the next one, in layers, is the first to look at its zones.
+        """
         errors = [
             self.error(solution)
             for solution in solutions
             if all(body.coefficient_errors is not None for body in solution.solved_bodies)
         ]
-        return len(errors) > FEWEST_LEVELS and min(errors[-2:]) > 0.5 * min(errors[:-2])
+        n_missed = sum(solution.status is Status.MISSED_CONTACT for solution in solutions)
+        return len(errors) > FEWEST_LEVELS + n_missed and min(errors[-2:]) > 0.5 * min(errors[:-2])
 
     def _check_lengths(self, members: Sequence[Member], errors: _Errors) -> None:
         """Raise an error that names the place if the largest error is that of an element as short as can be."""

@@ -177,3 +177,26 @@ def test_an_overlap_beside_a_contact_zone_belongs_to_its_end() -> None:
     free = values._replace(sigma_n=nothing)
     assert free.beyond_zones().clearance.tolist() == clearance.tolist()
     assert deepest(values._replace(step=nothing + 5e-3).beyond_zones())[0] == 0.0
+
+
+def test_places_that_move_after_a_missed_contact_take_one_mesh_more() -> None:
+    """The first mesh in layers only finds the zone; the fifth one has its ends, and a sixth one the accuracy."""
+    plane = bk.HalfPlane((-0.3420201433256687, -0.9396926207859084), (0.3420201433256687, 0.9396926207859084))
+    scene = bk.Scene(
+        title="half disc on a tilted plane",
+        shape=bk.Sector(1.0, 180.0, 360.0),
+        material=bk.Material(1.0, 0.3),
+        parts=(
+            bk.Part("load", bk.PrescribedDisplacement(-3.42e-6, -9.4e-6), ("start", "end")),
+            bk.Part("arc", bk.Contact(plane), ("arc",)),
+        ),
+        law=bk.Frictionless(),
+        discretisation=bk.Galerkin(2),
+        mesh=bk.MeshOptions(accuracy=1e-3, rising_degrees=True),
+    )
+    solution = bk.run(scene)
+    assert solution.is_converged, solution.message
+    # the half-width of a cylinder under the same force [Johnson1985], to the accuracy
+    width = 2.0 * np.sqrt(4.0 * solution.force_normal * (1.0 - 0.3**2) / np.pi)
+    one, two = (each.s for each in solution.transitions)
+    assert two - one == pytest.approx(width, rel=1e-3)
