@@ -90,9 +90,12 @@ def _limit_dict(limit: CoulombLimit) -> dict[str, float | None]:
 def _limit_lines(limit: CoulombLimit) -> list[str]:
     if math.isinf(limit.associative):
         return ["contacts and supports hold any multiple of the load"]
+    held = (
+        f"{limit.held:.6g}  known forces let no motion begin" if math.isfinite(limit.held) else "no such forces found"
+    )
     return [
         f"collapse with Coulomb friction  {limit.factor:.6g}  a motion begins from known forces",
         f"smallest collapse found         {limit.smallest:.6g}  from other forces",
-        f"held                            {limit.held:.6g}  known forces let no motion begin",
+        f"held                            {held}",
         f"bound from above                {limit.associative:.6g}  no forces balance more (sliding dilates)",
     ]

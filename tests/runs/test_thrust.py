@@ -106,6 +106,9 @@ def test_the_command(tmp_path, capsys) -> None:
     assert _run_to_end(["collapse", str(file), "--json", "-"]) == 0
     numbers = json.loads(capsys.readouterr().out)
     assert numbers["factor"] == pytest.approx(0.3, rel=1e-6)
+    file.write_text(bk.scene_to_toml(assembly_of(np.array([[0.0, 0.0, 4.0, 1.0]]), 0.0, 4)))
+    assert _run_to_end(["collapse", str(file)]) == 0
+    assert "no such forces found" in capsys.readouterr().out
     assert _run_to_end(["collapse", "masonry-arch"]) == 0
     assert "hold any multiple" in capsys.readouterr().out
     assert _run_to_end(["collapse", "paper-1"]) == 2
