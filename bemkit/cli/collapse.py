@@ -88,8 +88,8 @@ def _limit_dict(limit: CoulombLimit) -> dict[str, float | None]:
 
 
 def _limit_lines(limit: CoulombLimit) -> list[str]:
-    if math.isinf(limit.associative):
-        return ["contacts and supports hold any multiple of the load"]
+    if math.isinf(limit.factor):
+        return ["contacts and supports can hold any multiple of the load"]
     held = (
         f"{limit.held:.6g}  known forces let no motion begin" if math.isfinite(limit.held) else "no such forces found"
     )

@@ -29,6 +29,8 @@ _BELOW = (0.01, 0.02, 0.05, 0.1, 0.2)
 _HOLDS = 1e-6
 """Relative growth of the factor that shows that no motion begins, above the tolerance of linear programming."""
 
+_WEDGED = 1e4
+"""Pressing force relative to the loads above which bodies are wedged."""
 _ANY_FACTOR = np.array([[-WITHOUT_BOUND, WITHOUT_BOUND]])
 
 
@@ -61,6 +63,9 @@ class CoulombLimit:
     associative: float
 
 
+_WITHOUT_LIMIT = CoulombLimit(np.inf, np.inf, np.inf, np.inf)
+
+
 def coulomb_limit(
     motions: RigidMotions, constant: FloatArray, growing: FloatArray, cohesion: FloatArray, slope: FloatArray
 ) -> CoulombLimit | None:
@@ -75,7 +80,8 @@ def coulomb_limit(
     Returns
     -------
     CoulombLimit or None
-        None if no factor at all balances the loads.
+        None if no factor at all balances the loads. All factors are infinite if supports hold any multiple, or if no
+        load is constant and contact forces hold any multiple.
 
     Notes
     -----
@@ -87,8 +93,8 @@ def coulomb_limit(
     associative = largest_factor(motions, constant, growing, [(cohesion, slope)])
     if associative is None:
         return None
-    if not np.isfinite(associative):
-        return CoulombLimit(np.inf, np.inf, np.inf, associative)
+    if np.isinf(associative) and not (motions.shape[0] and constant.any() and growing.any()):
+        return _WITHOUT_LIMIT
     unit = largest_components(motions)
     unit = np.where(unit > 0.0, unit, 1.0)  # what touches nothing
     scaled, constant, growing = scaled_motions(motions, unit), constant / unit, growing / unit
@@ -143,12 +149,17 @@ def _limit(blocks: _Blocks) -> tuple[CoulombLimit, FloatArray | None]:
     pressing = _pressing_forces_at_the_limit(blocks)
     if pressing is None:
         return none
+    if pressing.max(initial=0.0) > _WEDGED:  # without a limit: begin with the forces that the constant load needs
+        least = _pressing_forces_near(blocks, 0.0, np.zeros(pressing.size))
+        pressing = pressing if least is None else least
     factor, smallest, velocities, n_steady = np.nan, np.inf, None, 0
     for _ in range(_N_STEPS):
         found = _largest_with_bound(blocks, blocks.bound(pressing))
         if found is None:
             break
         last, (value, forces, motion) = factor, found
+        if value > 0.5 * WITHOUT_BOUND:
+            return _WITHOUT_LIMIT, None
         lowest, highest = _factors_of_collapse(blocks, motion)
         smallest = min(smallest, lowest)
         if lowest <= highest:

@@ -80,7 +80,7 @@ def coulomb_load_factor(assembly: Assembly, *, meshes: Meshes = None) -> Coulomb
     Returns
     -------
     CoulombLimit
-        All infinite if supports and contacts hold any multiple.
+        All infinite if supports hold any multiple, or if no load is constant and contacts hold any multiple.
 
     Raises
     ------

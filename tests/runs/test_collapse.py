@@ -224,3 +224,14 @@ def test_round_off_between_equal_factors_of_collapse_is_no_contradiction() -> No
     wall = bk.scene_from_toml(shipped_files("new")["wall"].read_text("utf-8"))
     found = bk.coulomb_load_factor(wall)
     assert found.factor == pytest.approx(0.6 * 3 * 0.08 * 1.8 * 9.81 / 0.8, rel=1e-6)
+
+
+def test_a_block_under_a_ceiling_slides_without_dilation_though_forces_can_wedge_it() -> None:
+    """Weight 2 and friction 0.4 hold 0.8 unless the ceiling presses; sliding that dilates is impossible."""
+    block = assembly_of(np.array([[0.0, 0.0, 2.0, 1.0]]), 0.4, 4, push=True)
+    (body,) = block.bodies
+    ceiling = bk.Part("ceiling", bk.Contact(bk.HalfPlane((0.0, 1.0), (0.0, -1.0))), ("top",))
+    found = bk.coulomb_load_factor(replace(block, bodies=(replace(body, parts=(*body.parts, ceiling)),)))
+    assert found.associative == np.inf
+    assert found.factor == pytest.approx(0.8, rel=1e-6)
+    assert found.smallest == pytest.approx(0.8, rel=1e-6)
