@@ -13,7 +13,7 @@ from bemkit.arrays import FloatArray, IntArray
 from bemkit.contact.body import SlipHistory
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.results.between_nodes import BetweenNodes
-from bemkit.results.contact_table import resolved_transitions, single_contacts
+from bemkit.results.contact_table import resolved_transitions, unresolved_contacts
 from bemkit.results.part_forces import ContactForce, RigidResult
 from bemkit.results.resultants import contact_facts
 from bemkit.results.solved_body import BoundaryFields, SolvedBody
@@ -212,13 +212,13 @@ class AssemblySolution(SolvedProblem):
 
     @cached_property
     def zone_ends(self) -> tuple[ZoneEnd, ...]:
-        """Ends of zones of one status on all sides, missed contact and single nodes.
+        """Ends of zones of one status on all sides, missed and unresolved contact.
 
-        See `resolved_transitions`, `missed_contacts` and `single_contacts`.
+        See `resolved_transitions`, `missed_contacts` and `unresolved_contacts`.
         """
         resolved = resolved_transitions(self.contact, self.transitions)
         places = [(each.part, (each.x, each.y)) for each in resolved]
-        places += [*single_contacts(self.contact), *self.missed_contacts.items()]
+        places += [*unresolved_contacts(self.contact, resolved), *self.missed_contacts.items()]
         return tuple(side.near(np.array(place)) for name, place in places for side in self._sides_of(name))
 
     @cached_property

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from functools import cached_property
+from itertools import pairwise
 from types import MappingProxyType
 from typing import Any
 
@@ -265,15 +266,22 @@ def free_contacts(table: ContactTable) -> set[str]:
     return {name for name in table.parts if not table.sigma_n[table.rows(name)].any()}
 
 
-def single_contacts(contact: ContactTable) -> list[tuple[str, tuple[float, float]]]:
-    """Return the parts and points of single nodes in contact between separated ones, which resolve no zone.
+def unresolved_contacts(contact: ContactTable, resolved: Sequence[Transition]) -> list[tuple[str, tuple[float, float]]]:
+    """Return the parts and middle nodes of zones in contact between separated nodes without a resolved transition.
 
-    The next mesh keeps a node there, else it may miss the contact.
+    Such a zone is a single node, or zones of single nodes lie at both its ends. The next mesh keeps a node there, else
+    it may miss the contact.
     """
     is_pressed, joined = contact.sigma_n < 0.0, contact.is_joined
-    is_free = np.append(False, joined & ~is_pressed[:-1]) & np.append(joined & ~is_pressed[1:], False)
-    rows = np.flatnonzero(is_pressed & is_free).tolist()
-    return [(str(contact.part[k]), (float(contact.x[k]), float(contact.y[k]))) for k in rows]
+    changes = np.flatnonzero(~joined | (is_pressed[:-1] != is_pressed[1:])).tolist()
+    places = []
+    for before, end in pairwise(changes):  # zones of nodes before + 1 ... end
+        k = (before + 1 + end) // 2
+        part, low, high = str(contact.part[k]), contact.s[before], contact.s[end + 1]
+        if is_pressed[k] and joined[before] and joined[end]:
+            if not any(each.part == part and low <= each.s <= high for each in resolved):
+                places.append((part, (float(contact.x[k]), float(contact.y[k]))))
+    return places
 
 
 def _kept_apart(contact: ContactTable, changes: list[int], places: FloatArray) -> FloatArray:

@@ -19,7 +19,7 @@ from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.results.between_nodes import BetweenNodes, violations_between_nodes
 from bemkit.results.contact_table import ContactTable as ContactTable
 from bemkit.results.contact_table import Transition as Transition
-from bemkit.results.contact_table import bound_at, resolved_transitions, single_contacts
+from bemkit.results.contact_table import bound_at, resolved_transitions, unresolved_contacts
 from bemkit.results.resultants import contact_facts
 from bemkit.results.solved_body import BoundaryFields as BoundaryFields
 from bemkit.results.solved_body import SolvedBody
@@ -156,14 +156,14 @@ class Solution(SolvedProblem, SolvedBody):
 
     @cached_property
     def zone_ends(self) -> tuple[ZoneEnd, ...]:
-        """Resolved ends of zones of one status, missed contact and single nodes.
+        """Resolved ends of zones of one status, missed and unresolved contact.
 
-        See `resolved_transitions`, `missed_contacts` and `single_contacts`.
+        See `resolved_transitions`, `missed_contacts` and `unresolved_contacts`.
         """
         from bemkit.results.zone_ends import Side, zone_end
 
         resolved = resolved_transitions(self.contact, self.transitions)
-        places = (*single_contacts(self.contact), *self.missed_contacts.items())
+        places = (*unresolved_contacts(self.contact, resolved), *self.missed_contacts.items())
         missed = (Side("", self.mesh, part).near(np.array(place)) for part, place in places)
         return (*(zone_end(self.mesh, self.contact, each) for each in resolved), *missed)
 

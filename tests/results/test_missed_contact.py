@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -9,6 +10,7 @@ import pytest
 
 import bemkit as bk
 from bemkit.results.least_clearance import PointsBetween, deepest, with_least_clearances
+from bemkit.runs.adaptive import run_adaptive
 from tests.slow import slow_except
 
 STEEL = bk.Material(1.0, 0.3)
@@ -200,3 +202,13 @@ def test_places_that_move_after_a_missed_contact_take_one_mesh_more() -> None:
     width = 2.0 * np.sqrt(4.0 * solution.force_normal * (1.0 - 0.3**2) / np.pi)
     one, two = (each.s for each in solution.transitions)
     assert two - one == pytest.approx(width, rel=1e-3)
+
+
+def test_the_next_mesh_keeps_a_node_in_a_zone_whose_ends_are_zones_of_single_nodes() -> None:
+    """One node slips on either side of a few that stick; without a node there the next mesh missed the contact."""
+    mesh = bk.MeshOptions(accuracy=5e-3, rising_degrees=True)
+    scene = replace(roll(1.1e-6, 11.2, bk.Galerkin(2), mesh), law=bk.Coulomb(0.3))
+    arc = replace(scene.contact_parts[0], where=None)
+    solutions = run_adaptive(replace(scene, parts=(scene.parts[0], arc)))
+    assert solutions[-1].is_converged, solutions[-1].message
+    assert [each.status for each in solutions].count(bk.Status.MISSED_CONTACT) == 1
