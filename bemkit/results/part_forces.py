@@ -206,13 +206,27 @@ def contact_sizes(table: ContactTable, part: str, transitions: Sequence[Transiti
 
 
 def _contact_length(table: ContactTable, part: str, transitions: Sequence[Transition]) -> float:
-    """Return the length of the pieces of a part, between its ends and transitions, whose nodes are closed."""
-    nodes = table.rows(part)
-    weights = table.weight[nodes]
-    begin, total, length = max(float(table.s[nodes][0] - 0.5 * weights[0]), 0.0), float(weights.sum()), 0.0
-    is_inside, last = bool(table.status[nodes][0] != NodeStatus.SEPARATED), begin
+    """Return the length of the pieces of a part, between its ends and transitions, whose nodes are closed.
+
+    Nodes without a partner end a piece.
+    """
+    nodes = np.flatnonzero(table.rows(part))
+    gaps = np.flatnonzero((np.diff(nodes) > 1) | ~table.is_joined[nodes[:-1]])
+    return sum(_closed_length(table, piece, part, transitions) for piece in np.split(nodes, gaps + 1))
+
+
+def _closed_length(table: ContactTable, nodes: IntArray, part: str, transitions: Sequence[Transition]) -> float:
+    """Return the closed length of neighbouring nodes."""
+    weights, s = table.weight[nodes], table.s[nodes]
+    total, length = float(weights.sum()), 0.0
+    # elements reach beyond the outer nodes, if these do not lie at their ends
+    beyond = max(total - float(s[-1] - s[0]), 0.0) * float(weights[0] / (weights[0] + weights[-1]))
+    last = begin = max(float(s[0]) - beyond, 0.0)
+    is_inside = bool(table.status[nodes[0]] != NodeStatus.SEPARATED)
     for transition in transitions:
-        if transition.part == part and "separated" in (transition.from_status, transition.to_status):
+        if transition.part != part or not s[0] - weights[0] <= transition.s <= s[-1] + weights[-1]:
+            continue
+        if "separated" in (transition.from_status, transition.to_status):
             if is_inside:
                 length += transition.s - last
             is_inside, last = transition.to_status != "separated", transition.s

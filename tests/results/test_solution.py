@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from bemkit.results.contact_table import ContactTable, find_transitions
+from bemkit.results.part_forces import contact_sizes
 from bemkit.results.solution import BoundaryFields, Solution
 from bemkit.runs.run import run
 from bemkit.scene.toml import load_scene, with_overrides
@@ -186,3 +187,12 @@ def test_two_rows_of_one_node_change_where_they_are() -> None:
     columns = {"s": s, "x": s - 0.5, "clearance": np.array([3.0, 2.0, 1.0, 0.0, 0.0])}
     (found,) = find_transitions(table([SEPARATED] * 3 + [STICK] * 2, **columns))
     assert found.s == 2.5
+
+
+def test_each_run_of_nodes_with_partners_has_its_own_contact_length() -> None:
+    """Nodes of a side that face nothing are no rows: without an end between two runs, the second one is separated."""
+    s = np.array([0.5, 1.5, 2.5, 9.5, 10.5, 11.5, 20.5, 21.5])
+    rows = table([STICK] * 3 + [SEPARATED] * 3 + [SEPARATED, FORWARD], s=s, x=s)
+    (end,) = find_transitions(rows)
+    assert end.s == 21.0
+    assert contact_sizes(rows, "a", (end,))["contact_length"] == pytest.approx(3.0 + 1.0, rel=1e-12)
