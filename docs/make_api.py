@@ -21,26 +21,25 @@ EXTENDED = (
 )
 
 
-def main() -> None:
+def main(pages: Path = FOLDER) -> None:
     """Write all pages anew."""
-    shutil.rmtree(FOLDER, ignore_errors=True)
+    shutil.rmtree(pages, ignore_errors=True)
     by_folder: dict[str, list[str]] = {}
     for name in bemkit.__all__:
         by_folder.setdefault(home_of(name).split(".")[1], []).append(name)
     folders = [folder for folder in purposes() if folder in by_folder]
-    write("bemkit", index_page(folders, by_folder))
+    write(pages / "bemkit.rst", index_page(folders, by_folder))
     for folder in folders:
-        write(f"names/{folder}", names_page(folder, by_folder[folder]))
+        write(pages / "names" / f"{folder}.rst", names_page(folder, by_folder[folder]))
     for folder in EXTENDED:
         inner = {".".join(module.split(".")[:-1]) for module in modules_of(folder)}
         for package in sorted(inner):
             modules = [module for module in modules_of(folder) if module.rpartition(".")[0] == package]
-            write(package, modules_page(package, modules))
+            write(pages / f"{package}.rst", modules_page(package, modules))
 
 
-def write(name: str, text: str) -> None:
+def write(path: Path, text: str) -> None:
     """Write a page; the first blank line of a text is not a part of it."""
-    path = FOLDER / f"{name}.rst"
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text(text.lstrip("\n"), "utf-8")
 

@@ -67,26 +67,26 @@ def main() -> None:
     (FOLDER / "index.rst").write_text(index(titles), "utf-8")
 
 
-def write(entry: Entry) -> str:
-    """Run an entry, draw its pictures, write its page, and return its title."""
-    title, text, drawn = run_program(entry) if entry.name.endswith(".py") else run_scene(entry)
+def write(entry: Entry, folder: Path = FOLDER) -> str:
+    """Run an entry of a folder, draw its pictures, write its page there, and return its title."""
+    title, text, drawn = (run_program if entry.name.endswith(".py") else run_scene)(entry, folder)
     pictures = []
     for name, figure in drawn.items():
         pictures.append(f"{entry.page}-{name}.png")
-        figure.savefig(FOLDER / pictures[-1], dpi=DOTS_PER_INCH, bbox_inches="tight")
-    (FOLDER / pictures[0]).rename(FOLDER / f"{entry.page}.png")
+        figure.savefig(folder / pictures[-1], dpi=DOTS_PER_INCH, bbox_inches="tight")
+    (folder / pictures[0]).rename(folder / f"{entry.page}.png")
     shown = "".join(f".. image:: {name}\n   :alt: {title}\n\n" for name in (f"{entry.page}.png", *pictures[1:]))
     look = f"**What to look at.** {entry.look}\n\n" if entry.look else ""
     page = heading(title) + text.replace("PICTURES", look + shown)
-    (FOLDER / f"{entry.page}.rst").write_text(page, "utf-8")
+    (folder / f"{entry.page}.rst").write_text(page, "utf-8")
     return title
 
 
-def run_scene(entry: Entry) -> tuple[str, str, Mapping[str, Figure]]:
+def run_scene(entry: Entry, folder: Path) -> tuple[str, str, Mapping[str, Figure]]:
     """Solve a scene; return its title, its page and its pictures."""
     is_file = entry.name.endswith(".toml")
-    source = (FOLDER / entry.name) if is_file else shipped_files()[entry.name]
-    scene = bk.load_scene(FOLDER / entry.name if is_file else entry.name)
+    source = (folder / entry.name) if is_file else shipped_files()[entry.name]
+    scene = bk.load_scene(folder / entry.name if is_file else entry.name)
     solution = bk.run(scene)
     if not solution.is_converged:
         raise RuntimeError(f"the gallery's scene {entry.name} ended with {solution.status.name}: {solution.message}")
@@ -105,9 +105,9 @@ def chosen(solution: bk.Solution | AssemblySolution) -> dict[str, Figure]:
     return dict(islice(figures(solution, ["deformation", second]).items(), 2))
 
 
-def run_program(entry: Entry) -> tuple[str, str, Mapping[str, Figure]]:
+def run_program(entry: Entry, folder: Path) -> tuple[str, str, Mapping[str, Figure]]:
     """Run a program; return the first line of its docstring, its page and its picture."""
-    path = FOLDER / entry.name
+    path = folder / entry.name
     program = path.read_text("utf-8")
     title, _, description = (ast.get_docstring(ast.parse(program)) or "").partition("\n\n")
     _, _, statements = program.partition('\n"""\n')

@@ -34,6 +34,7 @@ from bemkit.solvers.base import Status
 from bemkit.solvers.ssn import SemismoothNewton
 from tests.slow import slow_except
 
+pytestmark = pytest.mark.usefixtures("here")
 SMALL = ["--elements", "40"]
 
 
@@ -42,11 +43,6 @@ def call(*arguments: str) -> int:
         main(list(arguments))
     assert isinstance(caught.value.code, int)
     return caught.value.code
-
-
-@pytest.fixture(autouse=True)
-def in_empty_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
 
 
 def test_run_prints_a_summary(capsys: pytest.CaptureFixture[str]) -> None:

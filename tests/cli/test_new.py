@@ -26,8 +26,8 @@ def test_these_are_all_kinds_and_the_help_lists_them() -> None:
 
 
 @pytest.mark.parametrize("kind", slow_except(KINDS, "block", "rough-surface"))
-def test_two_commands_from_nothing_to_a_picture(kind: str, tmp_path, monkeypatch, capsys) -> None:
-    monkeypatch.chdir(tmp_path)
+@pytest.mark.usefixtures("here")
+def test_two_commands_from_nothing_to_a_picture(kind: str, capsys) -> None:
     assert _run_to_end(["new", kind]) == 0
     second = capsys.readouterr().out.split("bemkit ")[-1].split()
     assert second[:2] == ["run", f"{kind}.toml"]
@@ -72,8 +72,8 @@ def test_alternatives_in_comments_are_valid(kind: str) -> None:
         (["block", "none/new.toml"], "none"),
     ],
 )
-def test_what_is_refused(arguments: list[str], message: str, tmp_path, monkeypatch, capsys) -> None:
-    monkeypatch.chdir(tmp_path)
+@pytest.mark.usefixtures("here")
+def test_what_is_refused(arguments: list[str], message: str, tmp_path, capsys) -> None:
     Path("there.toml").write_text("mine")
     assert _run_to_end(["new", *arguments]) == 2
     assert re.search(message, capsys.readouterr().err)

@@ -31,8 +31,8 @@ def call(*arguments: str) -> Result:
 
 
 @pytest.mark.parametrize("name", slow_except(FILES, "version-4.msh"))
-def test_from_a_file_to_a_picture(name: str, tmp_path, monkeypatch) -> None:
-    monkeypatch.chdir(tmp_path)
+@pytest.mark.usefixtures("here")
+def test_from_a_file_to_a_picture(name: str, tmp_path) -> None:
     put(tmp_path, name)
     only = ["--only", "part"] if name == "part.svg" else []
     shown = call("outline", name, *only, "-o", "scene.toml", "--plot", "figures")
@@ -85,8 +85,8 @@ def test_the_sides_of_a_scene_that_comes_with_bemkit_are_shown() -> None:
         (["version-4.msh", "-o", "no/notes.txt"], "does not exist: create it first"),
     ],
 )
-def test_refused_in_one_line(arguments: list[str], message: str, tmp_path, monkeypatch, capsys) -> None:
-    monkeypatch.chdir(tmp_path)
+@pytest.mark.usefixtures("here")
+def test_refused_in_one_line(arguments: list[str], message: str, tmp_path, capsys) -> None:
     put(tmp_path, "version-4.msh")
     Path("notes.txt").write_text("mine")
     assert _run_to_end(["outline", *arguments]) == 2

@@ -14,6 +14,7 @@ from bemkit.cli.main import main
 from bemkit.reference import find_reference
 from bemkit.sealed_file import seal
 
+pytestmark = pytest.mark.usefixtures("here")
 SMALL = ("--elements", "24", "--discretisation", "linear")
 
 
@@ -21,11 +22,6 @@ def call(*arguments: str) -> int:
     with pytest.raises(SystemExit) as caught:
         main(list(arguments))
     return caught.value.code
-
-
-@pytest.fixture(autouse=True)
-def here(tmp_path, monkeypatch) -> None:
-    monkeypatch.chdir(tmp_path)
 
 
 def test_the_animation_may_be_named_where_pictures_are(capsys) -> None:

@@ -83,10 +83,8 @@ def test_each_mesh_is_announced_with_its_size(heard: list[str]) -> None:
         ),
     ],
 )
-def test_a_terminal_shows_stage_and_step(
-    arguments: tuple[str, ...], words: tuple[str, ...], tmp_path: object, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(str(tmp_path))
+@pytest.mark.usefixtures("here")
+def test_a_terminal_shows_stage_and_step(arguments: tuple[str, ...], words: tuple[str, ...]) -> None:
     shown = on_a_terminal(*arguments)
     assert all(word in shown for word in words)
     assert on_a_terminal(*arguments, "-q") == ""

@@ -34,8 +34,8 @@ SLOW = [
     slow_only([page for page in PAGES if "```python" in page.read_text("utf-8")], *SLOW),
     ids=lambda page: page.stem,
 )
-def test_page(page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
+@pytest.mark.usefixtures("here")
+def test_page(page: Path) -> None:
     document = Sybil(parsers=[PythonCodeBlockParser()]).parse(page)  # one namespace for the page
     examples = list(document.examples())
     assert len(examples) == page.read_text("utf-8").count("\n```python\n")

@@ -6,7 +6,6 @@ import re
 import runpy
 import shlex
 from itertools import pairwise
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -44,11 +43,11 @@ def test_the_comparison_can_fail() -> None:
 
 
 @pytest.mark.parametrize(("page", "fewest"), slow_only(OUTPUTS_SHOWN.items(), ("paper-tables.md", 1)))
+@pytest.mark.usefixtures("here")
 def test_shown_output(
-    page: str, fewest: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    page: str, fewest: int, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """Run the blocks in order; ``...`` stands for what depends on the machine."""
-    monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("COLUMNS", "120")
     names: dict[str, Any] = {"__name__": "page"}
     n_checked = 0

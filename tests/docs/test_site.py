@@ -15,24 +15,23 @@ from tests.slow import slow_only
 
 
 @pytest.fixture
-def make_api(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> ModuleType:
-    monkeypatch.syspath_prepend(DOCS)
+def api(tmp_path: Path) -> Path:
+    """The folder of the written reference."""
     import make_api
 
-    monkeypatch.setattr(make_api, "FOLDER", tmp_path / "api")
-    make_api.main()
-    return make_api
+    make_api.main(tmp_path / "api")
+    return tmp_path / "api"
 
 
-def test_every_public_name_is_documented_once_and_listed(make_api: ModuleType) -> None:
-    pages = "".join(path.read_text("utf-8") for path in (make_api.FOLDER / "names").iterdir())
+def test_every_public_name_is_documented_once_and_listed(api: Path) -> None:
+    pages = "".join(path.read_text("utf-8") for path in (api / "names").iterdir())
     documented = re.findall(r"^\.\. auto(?:class|function):: bemkit\.(\w+)$", pages, re.MULTILINE)
     assert sorted(documented) == bemkit.__all__
-    listed = re.findall(r"^   (\w+)$", (make_api.FOLDER / "bemkit.rst").read_text("utf-8"), re.MULTILINE)
+    listed = re.findall(r"^   (\w+)$", (api / "bemkit.rst").read_text("utf-8"), re.MULTILINE)
     assert sorted(listed) == bemkit.__all__
 
 
-def test_every_module_that_researchers_extend_is_documented(make_api: ModuleType) -> None:
+def test_every_module_that_researchers_extend_is_documented(api: Path) -> None:
     package = Path(bemkit.__file__).parent
     for folder in (
         "geometry",
@@ -47,14 +46,14 @@ def test_every_module_that_researchers_extend_is_documented(make_api: ModuleType
         "testing",
         "reference",
     ):
-        text = "".join(path.read_text("utf-8") for path in make_api.FOLDER.glob(f"bemkit.{folder}*.rst"))
+        text = "".join(path.read_text("utf-8") for path in api.glob(f"bemkit.{folder}*.rst"))
         for path in (package / folder).rglob("*.py"):
             module = ".".join(("bemkit", *path.relative_to(package).with_suffix("").parts))
             assert path.stem == "__init__" or f".. automodule:: {module}\n" in text, module
 
 
-def test_names_of_the_package_are_not_documented_twice(make_api: ModuleType) -> None:
-    text = (make_api.FOLDER / "bemkit.geometry.meshing.rst").read_text("utf-8")
+def test_names_of_the_package_are_not_documented_twice(api: Path) -> None:
+    text = (api / "bemkit.geometry.meshing.rst").read_text("utf-8")
     section = text.partition(".. automodule:: bemkit.geometry.meshing.discretise\n")[2].partition(".. automodule::")[0]
     assert "   :exclude-members: Algebraic, Geometric, Uniform, discretise\n" in section
     assert ":py:obj:`bemkit.Uniform`" in section
@@ -73,10 +72,7 @@ def test_names_of_the_package_are_not_documented_twice(make_api: ModuleType) -> 
     ],
     ids=["bars", "formula", "literal", "list", "parameter", "places", "nothing"],
 )
-def test_formulas_of_docstrings_stay_as_they_are(
-    lines: list[str], shown: list[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.syspath_prepend(DOCS)
+def test_formulas_of_docstrings_stay_as_they_are(lines: list[str], shown: list[str]) -> None:
     from docstring_marks import as_restructured_text
 
     assert as_restructured_text(lines) == shown
@@ -91,8 +87,7 @@ def test_every_page_has_its_place_in_the_navigation() -> None:
 
 
 @pytest.fixture
-def make_gallery(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> ModuleType:
-    monkeypatch.syspath_prepend(DOCS)
+def make_gallery() -> ModuleType:
     import make_gallery
 
     return make_gallery
@@ -108,15 +103,12 @@ def test_the_gallery_shows_every_shipped_scene_and_every_file_of_its_folder(make
 @pytest.mark.parametrize(
     "name", slow_only(["uniform-slip", "wedge-in-groove.toml", "friction-sweep.py"], "friction-sweep.py")
 )
-def test_a_page_of_the_gallery_has_text_picture_and_code(
-    name: str, make_gallery: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_page_of_the_gallery_has_text_picture_and_code(name: str, make_gallery: ModuleType, tmp_path: Path) -> None:
     for path in (DOCS / "gallery").glob("*.*"):
         if path.suffix in (".toml", ".py"):
             (tmp_path / path.name).write_bytes(path.read_bytes())
-    monkeypatch.setattr(make_gallery, "FOLDER", tmp_path)
     entry = next(entry for entry in make_gallery.entries() if entry.name == name)
-    title = make_gallery.write(entry)
+    title = make_gallery.write(entry, tmp_path)
     page = (tmp_path / f"{entry.page}.rst").read_text("utf-8")
     assert page.startswith(f"{title}\n====")
     assert f"**What to look at.** {entry.look}" in page
@@ -126,12 +118,9 @@ def test_a_page_of_the_gallery_has_text_picture_and_code(
     assert f":img-bottom: {entry.page}.png" in make_gallery.index({entry.page: title})
 
 
-def test_a_scene_of_the_gallery_that_fails_stops_the_build(
-    make_gallery: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_scene_of_the_gallery_that_fails_stops_the_build(make_gallery: ModuleType, tmp_path: Path) -> None:
     text = shipped_files()["paper-1"].read_text("utf-8")
     scene = f'solver = {{ kind = "semismooth-newton", max_steps = 1 }}\n{text}'
     (tmp_path / "short.toml").write_text(scene, "utf-8")
-    monkeypatch.setattr(make_gallery, "FOLDER", tmp_path)
     with pytest.raises(RuntimeError, match=r"short\.toml ended with MAX_STEPS"):
-        make_gallery.write(make_gallery.Entry("short.toml", "nothing"))
+        make_gallery.write(make_gallery.Entry("short.toml", "nothing"), tmp_path)

@@ -114,10 +114,8 @@ def test_matplotlib_that_is_missing_is_told(solution: Solution, tmp_path: Path, 
         save_pictures(solution, tmp_path)
 
 
-def test_the_command_draws_results_and_scenes(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.chdir(tmp_path)
+@pytest.mark.usefixtures("here")
+def test_the_command_draws_results_and_scenes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert call("run", "paper-1", "--elements", "40", "-q", "-o", "r.h5", "--plot", "p", "--what", "traction") == 0
     assert [path.name for path in Path("p").iterdir()] == ["traction.png"]
     assert call("plot", "r.h5", "--what", "stress-yy, zoom", "-o", "q") == 0
@@ -148,11 +146,11 @@ def test_the_command_draws_results_and_scenes(
         (("run", "paper-1", "--plot", "p", "--what", "tension"), "'tension' is not a picture"),
     ],
 )
+@pytest.mark.usefixtures("here")
 def test_the_command_refuses_before_anything_is_solved(
     arguments: tuple[str, ...], message: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
 ) -> None:  # fmt: skip
-    monkeypatch.chdir(tmp_path)
     monkeypatch.setattr("bemkit.cli.sources.run", None)
     assert call(*arguments) == 2
     assert message in capsys.readouterr().err

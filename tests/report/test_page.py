@@ -145,14 +145,13 @@ def test_histories_and_several_bodies_have_reports(without: Callable[..., None])
     assert any("lower" in text for text in page.texts)
 
 
+@pytest.mark.usefixtures("here")
 def test_the_command_writes_it(
     tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
     solution: bk.Solution,
     without: Callable[..., None],
 ) -> None:
-    monkeypatch.chdir(tmp_path)
     without("matplotlib")
     bk.write_result("r.h5", solution)
     for _ in range(2):  # the second replaces the first

@@ -140,9 +140,8 @@ def test_the_plan_foresees_the_counts_and_says_what_is_left_out(arch: AssemblySo
     assert items["rigid obstacles"].is_needed
 
 
-def test_the_command_line_takes_assemblies(tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
-                                           capsys: pytest.CaptureFixture[str]) -> None:  # fmt: skip
-    monkeypatch.chdir(tmp_path)
+@pytest.mark.usefixtures("here")
+def test_the_command_line_takes_assemblies(capsys: pytest.CaptureFixture[str]) -> None:  # fmt: skip
     assert (
         call(
             "run",

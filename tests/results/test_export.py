@@ -159,10 +159,8 @@ def test_inside_is_refused_where_it_cannot_be_held(solution: bk.Solution, tmp_pa
     assert "--inside goes into a file: give -o with a name that ends in .vtu or .vtp" in capsys.readouterr().err
 
 
-def test_the_command_line_goes_by_the_ending(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.chdir(tmp_path)
+@pytest.mark.usefixtures("here")
+def test_the_command_line_goes_by_the_ending(capsys: pytest.CaptureFixture[str]) -> None:
     assert call("run", "paper-1", "--elements", "24", "-q", "-o", "r.h5") == 0
     assert call("show", "r.h5", "-o", "r.json") == 0
     assert json.loads(Path("r.json").read_text("utf-8"))["converged"]

@@ -45,10 +45,10 @@ def is_alive(process: int) -> bool:
         return False
 
 
+@pytest.mark.usefixtures("here")
 def test_the_second_of_two_runs_into_one_file_is_refused_before_it_computes(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.chdir(tmp_path)
     first = start(tmp_path, "run", "paper-1", "--elements", "3000", "-q", "-o", "r.h5")
     try:
         wait_until(Path(".r.h5.lock").exists)

@@ -126,11 +126,16 @@ def straight_displacement_moments(
     )
 
 
-def straight_gradient_moments(panels: Panels, x: ComplexArray, elements: IntArray, highest: int) -> GradientMoments:
-    """Return the moments of straight elements for gradients; parameters as in `straight_displacement_moments`."""
+def straight_gradient_moments(
+    panels: Panels, x: ComplexArray, elements: IntArray, highest: int, at_end: float = AT_END
+) -> GradientMoments:
+    """Return the moments of straight elements for gradients; parameters as in `straight_displacement_moments`.
+
+    Points within ``at_end`` of an end, in halves of the element, have their powers about it.
+    """
     plus, minus, eta = _local(panels, x, elements)
     half, tangent = panels.half[elements], panels.tangent[elements]
-    origin = np.where(np.abs(plus) < AT_END, START, np.where(np.abs(minus) < AT_END, END, CENTRE))
+    origin = np.where(np.abs(plus) < at_end, START, np.where(np.abs(minus) < at_end, END, CENTRE))
     orders = local_moments(plus, minus, max(1, highest), 3)
     for end, zeta in ((START, plus), (END, minus)):
         _expand_about_end(orders, zeta, np.flatnonzero(origin == end), end)
