@@ -81,3 +81,20 @@ def test_supports_that_contradict_each_other_name_part_and_point() -> None:
         supported(LinearSpace(mesh), supports)
     # element centres are shared by no one
     assert supported(ConstantSpace(mesh), supports).is_fixed.sum() == 16
+
+
+@pytest.mark.parametrize("space", [ConstantSpace, LinearSpace])
+def test_functions_of_given_displacements_are_evaluated_on_their_part_only(
+    space: type[ConstantSpace | LinearSpace],
+) -> None:
+    mesh, seen = square(), []
+
+    def displacement(points: FloatArray) -> FloatArray:
+        seen.append(points)
+        return np.sqrt(points - [0.0, 1.0])  # undefined below the top
+
+    top = mesh.part("top")
+    axes = np.broadcast_to(np.eye(2), (top.size, 2, 2))
+    conditions = supported(space(mesh), [Support("top", top, axes, displacement)])
+    np.testing.assert_array_equal(np.concatenate(seen)[:, 1], 1.0)
+    assert sum(map(len, seen)) == conditions.is_fixed.all(axis=1).sum()

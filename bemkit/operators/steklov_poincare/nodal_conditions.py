@@ -253,8 +253,8 @@ def supported(space: BoundarySpace, supports: Sequence[Support]) -> NodalConditi
     n_nodes = space.n_dofs // 2
     points = dof_points(space)
     supports = [*supports, *_mirrors(space)]
-    given = [np.zeros_like(points) if each.displacement is None else each.displacement(points) for each in supports]
     directions = [_directions_of(space, support) for support in supports]
+    given = [_given_at(points, support, own) for support, own in zip(supports, directions, strict=True)]
     matrix, right = np.zeros((n_nodes, 2, 2)), np.zeros((n_nodes, 2))
     for own, values in zip(directions, given, strict=True):
         matrix += own
@@ -288,6 +288,14 @@ def _mirrors(space: BoundarySpace) -> list[Support]:
     if not elements.size:
         return []
     return [Support("symmetry line", elements, np.where(held[elements], 1.0, 0.0)[..., None] * np.eye(2))]
+
+
+def _given_at(points: FloatArray, support: Support, directions: FloatArray) -> FloatArray:
+    """Return the displacement (n_nodes, 2) of one support, zero at nodes that it does not fix."""
+    values, is_fixed = np.zeros_like(points), directions.any(axis=(1, 2))
+    if support.displacement is not None and is_fixed.any():
+        values[is_fixed] = support.displacement(points[is_fixed])
+    return values
 
 
 def _directions_of(space: BoundarySpace, support: Support) -> FloatArray:
