@@ -60,6 +60,26 @@ class Explorable(ShownInNotebooks):
         """Return a table as a pandas data frame: ``contact``, ``boundary``, ``history``, ``steps``, ``forces``."""
         return import_module("bemkit.results.tables").table_of(self, table).to_pandas()
 
+    def to_pyvista(self, inside: int = 40) -> Any:
+        """Return boundaries, contact nodes and fields inside as a grid of pyvista, to draw and explore.
+
+        Parameters
+        ----------
+        inside : int
+            Points across each body at which there are fields inside; 0 for none.
+
+        Returns
+        -------
+        pyvista.UnstructuredGrid
+            With the data of a ``.vtu`` file; see `bemkit.results.vtk.write_vtk`.
+
+        Raises
+        ------
+        InputError
+            If pyvista is not installed, or `inside` is neither 0 nor from 2 to 1000.
+        """
+        return import_module("bemkit.results.export").to_pyvista(self, inside)
+
     @property
     def forces(self) -> Any:
         """Table of the resultants on the parts of all bodies."""

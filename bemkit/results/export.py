@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from types import MappingProxyType
 from typing import Any
 
@@ -12,6 +13,7 @@ import numpy as np
 
 from bemkit.arrays import FloatArray, IntArray
 from bemkit.atomic_files import OutputFileError, check_target, replacing, write_text
+from bemkit.errors import InputError
 from bemkit.results.assembly_solution import AssemblySolution
 from bemkit.results.solution import Solution
 from bemkit.results.tables import to_csv, to_json
@@ -93,6 +95,24 @@ def export_result(path: str | Path, solution: Solution | AssemblySolution, *, in
         chosen.write_inside(target, solution, inside)
     else:
         chosen.write(target, solution)
+
+
+def to_pyvista(solution: Solution | AssemblySolution, inside: int) -> Any:
+    """Return what a ``.vtu`` file holds as a grid of pyvista.
+
+    Raises
+    ------
+    InputError
+        If pyvista is not installed, or `inside` is neither 0 nor from 2 to 1000.
+    """
+    try:
+        import pyvista
+    except ImportError:
+        raise InputError('grids of pyvista need it: pip install "bemkit[viz]"') from None
+    with TemporaryDirectory() as folder:
+        path = Path(folder, "result.vtu")
+        export_result(path, solution, inside=inside)
+        return pyvista.read(path)
 
 
 def boundary_arrays(solution: Solution | AssemblySolution) -> dict[str, FloatArray | IntArray]:

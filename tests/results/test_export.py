@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import sys
 from base64 import b64decode
 from pathlib import Path
 from xml.etree import ElementTree
@@ -179,7 +180,7 @@ def test_pyvista_reads_named_fields_on_the_same_cells(ending: str, bodies: Assem
     n_contact = bodies.contact.n_contact
     assert data.GetCellType(0) == pyvista.CellType.VERTEX
     assert data.GetCellType(n_contact) == pyvista.CellType.LINE
-    assert data.GetCellType(data.n_cells - 1) == pyvista.CellType.QUAD
+    assert data.GetCellType(data.n_cells - 1) == pyvista.CellType.TRIANGLE
     of_vertices = [data.get_cell(number).point_ids[0] for number in range(n_contact)]
     for name in ("sigma_n", "sigma_t", "gap", "status"):
         np.testing.assert_array_equal(data.point_data[name][of_vertices], getattr(bodies.contact, name))
@@ -224,3 +225,20 @@ def test_bodies_without_end_are_cut(tmp_path: Path) -> None:
     radius = np.hypot(*mesh.points[np.unique(mesh.cells[1].data), :2].T)
     assert radius.min() > 0.99  # a chord of the hole
     assert 2.0 < radius.max() < 4.0
+
+
+def test_a_grid_of_pyvista_holds_what_the_file_holds() -> None:
+    pytest.importorskip("pyvista")
+    solution = bk.run(bk.load_scene("paper-1"))
+    grid = solution.to_pyvista(inside=20)
+    assert {"displacement", "stress", "von_mises", "sigma_n", "status"} <= set(grid.point_data)
+    assert {"traction", "body"} <= set(grid.cell_data)
+    assert (grid.celltypes == 5).sum() > 100  # triangles
+    is_contact = np.isfinite(grid.point_data["sigma_n"])
+    np.testing.assert_array_equal(grid.point_data["sigma_n"][is_contact], solution.contact.sigma_n)
+
+
+def test_a_grid_without_pyvista_names_the_extra(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "pyvista", None)
+    with pytest.raises(bk.InputError, match=r'grids of pyvista need it: pip install "bemkit\[viz\]"'):
+        bk.run(bk.load_scene("bending")).to_pyvista()
