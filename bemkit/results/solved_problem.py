@@ -332,12 +332,17 @@ def with_times(result: AnySolution, solutions: Sequence[AnySolution]) -> AnySolu
     )
 
 
+_EARLIER = "Load step "
+"""How warnings begin that are those of an earlier step."""
+
+
 def following(
     so_far: AnySolution | None, solution: AnySolution, stated: Stated, number: int, n_steps: int
 ) -> AnySolution:
     """Return a step of a load history with the records, solves, times, memory and warnings of all before it.
 
-    Of each kind and subject of warnings the last one is kept; `at_step` has those of a step.
+    Of each kind and subject of warnings the last one is kept, and names its step unless that is this one; `at_step` has
+    those of a step.
 
     Parameters
     ----------
@@ -355,7 +360,13 @@ def following(
     name = f"load step {number} of {n_steps}"
     before = () if so_far is None else (so_far,)
     total: AnySolution = with_totals(solution, [*before, solution], [*("" for _ in before), name])
-    warnings = without_duplicates((*solution.warnings, *(each for earlier in before for each in earlier.warnings)))
+    earlier = [
+        each
+        if each.text.startswith(_EARLIER)
+        else replace(each, text=f"{_EARLIER}{number - 1} of {n_steps}: {each.text}")
+        for each in (() if so_far is None else so_far.warnings)
+    ]
+    warnings = without_duplicates((*solution.warnings, *earlier))
     loading = None if solution.loading is None else replace(solution.loading, asked=stated)
     message = f"{name}: {solution.message}"
     whole: AnySolution = replace(total, message=message, warnings=warnings, loading=loading)

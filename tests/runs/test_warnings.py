@@ -363,3 +363,26 @@ def test_three_warnings_of_a_kind_are_listed_and_the_others_counted() -> None:
     (*listed, more, last) = first_of_each_kind([*alike, other])
     assert (listed, last) == (alike[:3], other)
     assert (more.text, more.number) == ("3 more warnings of this kind: large strain.", 3)
+
+
+def test_warnings_of_an_earlier_step_name_it() -> None:
+    """The roll is lifted again: the last state is without contact, and its zones are those of the first step."""
+    scene = bk.Scene(
+        title="roll",
+        shape=bk.Sector(1.0, 180.0, 360.0),
+        material=bk.Material(1.0, 0.3),
+        law=bk.Coulomb(0.3),
+        parts=(
+            bk.Part("load", bk.PrescribedDisplacement(x=0.0, y=-1e-2), ("start", "end")),
+            bk.Part("tip", bk.Contact(bk.HalfPlane((0, -1))), ("arc",)),
+        ),
+        steps=(bk.Step(1.0), *(bk.Step(t, {"parts.load.condition.y": 1e-3}) for t in (2.0, 3.0))),
+        discretisation=bk.Galerkin(1),
+        mesh=bk.MeshOptions(elements=40),
+    )
+    solution = bk.run(scene)
+    assert solution.is_converged
+    assert not solution.contact.sigma_n.any()
+    zones = [str(warning) for warning in solution.warnings if "contact zone" in str(warning)]
+    assert zones
+    assert all(words.startswith("Load step 1 of 3: A contact zone of part 'tip'") for words in zones)
