@@ -27,7 +27,6 @@ _TURNING_SAFETY = 1.25  # the turning is sampled, not bounded
 _MOST_SPLITS = 24  # the tip of a thin ellipse turns on as little of its length as the square of its slenderness
 RESOLUTION = 8 * float(np.finfo(float).eps)
 """Points closer than this times the size of their coordinates are the same point: they differ by round-off only."""
-_BATCH = 4096
 _FEW_BOXES = 64
 """So many boxes are compared each with each."""
 _MOST_HALVED = 1_000_000  # more pairs than this mean two curves that all but coincide
@@ -201,7 +200,7 @@ def _with_turning(pieces: Pieces, start: FloatArray, end: FloatArray, span: Floa
     return replace(pieces, start=start, end=end, span=span, turning=turning)
 
 
-def find_meeting(pieces: Pieces, following: IntArray) -> tuple[int, int] | None:
+def find_meeting(pieces: Pieces, following: IntArray, batch: int = 4096) -> tuple[int, int] | None:
     """Find two pieces that cross, touch or fold back onto each other.
 
     Parameters
@@ -210,6 +209,8 @@ def find_meeting(pieces: Pieces, following: IntArray) -> tuple[int, int] | None:
         Pieces of closed loops, each of at least three pieces that turn by less than `LARGEST_TURNING`.
     following : (n,) int array
         Index of the piece that starts where this one ends.
+    batch : int
+        Pairs that are settled at a time.
 
     Returns
     -------
@@ -231,15 +232,15 @@ def find_meeting(pieces: Pieces, following: IntArray) -> tuple[int, int] | None:
     first = np.concatenate([first[is_apart], everyone])
     second = np.concatenate([second[is_apart], following])
     is_joint = np.arange(len(first)) >= np.count_nonzero(is_apart)
-    return _settle(pieces.take(first), pieces.take(second), is_joint)
+    return _settle(pieces.take(first), pieces.take(second), is_joint, batch)
 
 
-def _settle(a: Pieces, b: Pieces, is_joint: BoolArray) -> tuple[int, int] | None:
+def _settle(a: Pieces, b: Pieces, is_joint: BoolArray, batch: int) -> tuple[int, int] | None:
     """Settle pairs (a, b), halving where needed; where `is_joint`, b starts at the end of a.
 
     Halves go first, a batch at a time: curves that coincide are found out after one descent to round-off.
     """
-    waiting = _batches(a, b, is_joint)
+    waiting = _batches(a, b, is_joint, batch)
     n_halved = 0
     while waiting:
         a, b, is_joint = waiting.pop()
@@ -253,14 +254,14 @@ def _settle(a: Pieces, b: Pieces, is_joint: BoolArray) -> tuple[int, int] | None
         if is_final.any() or n_halved > _MOST_HALVED:
             row = int(np.argmax(is_final))
             return int(a.owner[row]), int(b.owner[row])
-        waiting += _batches(*_halve_pairs(a, b, is_joint))
+        waiting += _batches(*_halve_pairs(a, b, is_joint), batch)
     return None
 
 
-def _batches(a: Pieces, b: Pieces, is_joint: BoolArray) -> list[tuple[Pieces, Pieces, BoolArray]]:
+def _batches(a: Pieces, b: Pieces, is_joint: BoolArray, batch: int) -> list[tuple[Pieces, Pieces, BoolArray]]:
     """Cut pairs into batches, the first one last."""
     rows = np.arange(len(a))
-    cut = [rows[begin : begin + _BATCH] for begin in range(0, len(a), _BATCH)]
+    cut = [rows[begin : begin + batch] for begin in range(0, len(a), batch)]
     return [(a.take(each), b.take(each), is_joint[each]) for each in reversed(cut)]
 
 

@@ -65,7 +65,6 @@ def test_no_point_of_a_segment_is_nearer_than_the_distance(p, a, b, fraction: fl
 
 
 def test_pairs_are_settled_batch_by_batch_each_taken_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("bemkit.geometry.pieces._BATCH", 4)
     taken = []
 
     def take(pieces: Pieces, index: IntArray) -> Pieces:
@@ -78,8 +77,8 @@ def test_pairs_are_settled_batch_by_batch_each_taken_once(monkeypatch: pytest.Mo
     start = np.stack([np.cos(angle), np.sin(angle)], axis=1)
     nothing = np.zeros(400, int)
     pieces = make_pieces((), start, np.roll(start, -1, axis=0), nothing - 1, np.zeros((400, 2)))
-    assert find_meeting(pieces, np.roll(np.arange(400), -1)) is None
+    assert find_meeting(pieces, np.roll(np.arange(400), -1), batch=4) is None
     # neighbours alone are near each other: both of each pair once for all and once for its batch
     assert sum(taken) == 4 * 400
     folded = make_pieces((), start, start[(np.arange(400) + 200) % 400], nothing - 1, np.zeros((400, 2)))
-    assert find_meeting(folded, np.roll(np.arange(400), -1)) is not None
+    assert find_meeting(folded, np.roll(np.arange(400), -1), batch=4) is not None

@@ -223,12 +223,12 @@ def test_what_does_not_fit_is_refused_before_it_is_tried(memory: Callable[[float
 
 def test_a_limit_of_the_process_counts_as_its_memory(monkeypatch: pytest.MonkeyPatch) -> None:
     resource = pytest.importorskip("resource")
-    whole = physical_memory()
-    monkeypatch.setattr(resource, "getrlimit", lambda _: (resource.RLIM_INFINITY,) * 2)
+    whole, limits = physical_memory(), [resource.RLIM_INFINITY]
+    monkeypatch.setattr(resource, "getrlimit", lambda _: (limits[-1],) * 2)
     assert physical_memory() == whole
-    monkeypatch.setattr(resource, "getrlimit", lambda _: (1 << 30, 1 << 30))
+    limits.append(1 << 30)
     assert physical_memory() < float(1 << 30)  # what the interpreter takes is off
-    monkeypatch.setattr(resource, "getrlimit", lambda _: (1 << 20, 1 << 20))
+    limits.append(1 << 20)
     with pytest.raises(TooLargeError, match=r"320 elements need about \S+ GB, there are 0 GB"):
         bk.run(load_scene("paper-1"))
 
