@@ -10,7 +10,7 @@ import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray
 from bemkit.contact.conditions import RigidMotions, as_rows, largest_components, scaled_motions
-from bemkit.contact.problem import ContactProblem
+from bemkit.contact.problem import ContactProblem, ContactState
 
 if TYPE_CHECKING:
     from scipy.sparse import csc_array, csr_array
@@ -83,8 +83,14 @@ class UnsolvableLoad:
         return f"the load {how} (work {self.work:.3g} on that rigid motion)"
 
 
-def find_unsolvable_load(problem: ContactProblem) -> UnsolvableLoad | None:
+def find_unsolvable_load(problem: ContactProblem, state: ContactState | None = None) -> UnsolvableLoad | None:
     """Return a rigid motion on which the load cannot be balanced, or None if contact tractions may balance it.
+
+    Parameters
+    ----------
+    problem : ContactProblem
+    state : ContactState, optional
+        Whose pressures bound the friction, at pressed nodes only. By default they may grow without bound.
 
     Raises
     ------
@@ -107,11 +113,15 @@ def find_unsolvable_load(problem: ContactProblem) -> UnsolvableLoad | None:
     motions = scaled_motions(motions, unit)
     if force_scale == 0.0:
         return None
-    touches = np.isfinite(problem.gap)
+    if state is None:
+        touches, pairs = np.isfinite(problem.gap), friction_envelopes(problem)
+    else:
+        pressure = state.traction[:, 0]
+        touches, pairs = pressure < 0.0, [(problem.friction_bound(pressure), np.zeros(problem.n_contact))]
     if motions.shape[0] == 1 and isinstance(motions, np.ndarray) and _presses(motions, load, touches):
         return None
     best = None
-    for cohesion, slope in friction_envelopes(problem):
+    for cohesion, slope in pairs:
         resistance = np.where(touches, problem.body.weights * cohesion, 0.0) / force_scale
         coefficients = _largest_escape(motions, load / force_scale, resistance, np.where(touches, slope, np.nan))
         motion = np.asarray(coefficients @ motions).reshape(-1, 2)

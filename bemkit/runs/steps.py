@@ -26,6 +26,7 @@ from bemkit.runs.load_path import Callback, Path, ReachedStep, Standing, reach
 from bemkit.runs.solution_of import solution_of
 from bemkit.scene.load_history import load_steps
 from bemkit.scene.steps import Stated
+from bemkit.solvers.active_sets import NodeStatus
 from bemkit.solvers.base import ContactSolution, Status
 from bemkit.stopwatch import Stage, StageClock, announce, assembly_time
 
@@ -63,7 +64,7 @@ def built(prepared: Prepared, clock: StageClock, executor: Executor | None = Non
 
 def checked(model: Model, result: ContactSolution) -> ContactSolution:
     """Return the outcome of a solve, named otherwise if energies, turns that a mesh stops, or slides are wrong."""
-    result = with_energies_checked(model, result)
+    result = _with_load_named(model, with_energies_checked(model, result))
     if any(rows.law.is_frictionless for rows in model.prepared.rows):
         from bemkit.model.turning import with_turning_checked
 
@@ -73,6 +74,18 @@ def checked(model: Model, result: ContactSolution) -> ContactSolution:
     from bemkit.model.finite_sliding import with_sliding_checked
 
     return with_sliding_checked(model, result)
+
+
+def _with_load_named(model: Model, result: ContactSolution) -> ContactSolution:
+    """Name the load in the message of a failed solve, if all pressed nodes slip and their friction cannot hold it."""
+    has_stick = bool(np.isin(result.node_status, NodeStatus.STICK).any())
+    if result.status not in (Status.STALLED, Status.CYCLING) or has_stick or not result.state.is_finite:
+        return result
+    load = find_unsolvable_load(model.problem, result.state)
+    if load is None:
+        return result
+    words = f"At the pressures of the last state {explained(model, load)}. {result.message}"
+    return replace(result, message=words)
 
 
 def why_not(model: Model, result: ContactSolution) -> str:

@@ -148,3 +148,26 @@ def test_a_body_that_turns_about_the_only_node_that_touches_does_not_slide(node:
     x, y = model.units.to_physical(model.prepared.contact_nodes.points[node])
     assert abs(y) < 1e-15
     assert describe(model.prepared, escape).startswith(f"the load turns the body anticlockwise about ({x:.4g}, 0) with")
+
+
+@pytest.mark.parametrize("share", [0.5, 2.0])
+def test_a_torque_beyond_the_friction_of_a_shrunk_ring_is_named(share: float) -> None:
+    """The pressures of the fit bound the friction, which a motion of the ring as a whole does not know."""
+    ring = bk.Scene(
+        title="ring",
+        shape=bk.Ring(1.0, 2.0),
+        material=bk.Material(1.0, 0.3),
+        law=bk.Coulomb(0.3),
+        parts=(
+            bk.Part("hole", bk.Contact(bk.Gap(-1e-3)), ("inner",)),
+            # the friction of the fit holds a moment of 9.7e-4 N m/m: 1e-3 of interference on this ring
+            bk.Part("rim", bk.Pressure(0.0, shear=share * 9.7e-4 / (2.0 * np.pi * 2.0**2)), ("outer",)),
+        ),
+        discretisation=bk.Galerkin(1),
+        mesh=bk.MeshOptions(elements=48),
+    )
+    solution = bk.run(ring)
+    is_named = (
+        "At the pressures of the last state the load turns the body anticlockwise about (0, 0)" in solution.message
+    )
+    assert (solution.is_converged, is_named) == ((True, False) if share < 1.0 else (False, True))
