@@ -188,3 +188,32 @@ def test_a_pressure_in_a_hole_is_found_again_at_every_ratio(name: str, poisson_r
     mean = np.average(normal[hole], weights=mesh.lengths[hole])
     # second order leaves half a percent on arcs of a tenth of the hole; singular corners leave 2.3 percent
     assert mean == pytest.approx(-1.0, abs=0.03 if name == "square tunnel" else 0.01)
+
+
+def test_an_incompressible_half_disc_needs_a_contact_part_that_leaves_room() -> None:
+    """Displacements given on the flat side and contact on the whole arc leave no room; the message has the remedy.
+
+    The force is that of a nearly incompressible disc, to ten times the difference of the ratios.
+    """
+
+    def pressed(poisson_ratio: float, where: bk.Expression | None) -> bk.Scene:
+        return bk.Scene(
+            title="half disc",
+            shape=bk.Sector(1.0, 180.0, 360.0),
+            material=bk.Material(1.0, poisson_ratio),
+            parts=(
+                bk.Part("load", bk.PrescribedDisplacement(0.0, -1e-2), ("start", "end")),
+                bk.Part("arc", bk.Contact(bk.HalfPlane((0.0, -1.0))), ("arc",), where),
+            ),
+            law=bk.Coulomb(0.3),
+            discretisation=bk.Galerkin(2),
+            mesh=bk.MeshOptions(elements=60),
+        )
+
+    with pytest.raises(
+        SingularMatrixError, match=r"end the contact part by `where` before the boundary that never touches"
+    ):
+        bk.run(pressed(0.5, None))
+    half, nearly = (bk.run(pressed(ratio, bk.Expression("y < -0.6"))) for ratio in (0.5, 0.4999))
+    assert half.is_converged
+    assert half.force_normal == pytest.approx(nearly.force_normal, rel=1e-3)

@@ -60,7 +60,8 @@ class VolumeConstraint:
         if yielded.size and not yielded.min() > 0.0:
             raise SingularMatrixError(
                 "the incompressible body (poisson_ratio 0.5) has no free boundary to make room, as supports and "
-                "contact take all of it: leave a part free, or give a poisson_ratio of 0.4999"
+                "contact take all of it: leave a part free, end the contact part by `where` before the boundary that "
+                "never touches, or give a poisson_ratio of 0.4999"
             )
         return displacement, yielded
 
