@@ -29,7 +29,7 @@ from bemkit.operators.linear.threads import blas_threads_for
 from bemkit.operators.steklov_poincare.hierarchical import HierarchicalCollocation
 from tests.scenes import Perforated
 
-FLOOR = bk.HalfPlane((0.0, 0.0), (0.0, 1.0))
+FLOOR = bk.RigidHalfPlane((0.0, 0.0), (0.0, 1.0))
 
 
 def pressed(title: str, shape: object, **changes: object) -> bk.Scene:
@@ -68,7 +68,7 @@ def gear() -> bk.Scene:
     shaft = tuple(side.name for side in wheel.outline().loops[1])
     below = -math.cos(0.15 * 2.0 * math.pi / wheel.n_teeth)
     parts = (
-        bk.Part("tooth", bk.Contact(bk.HalfPlane((0.0, below), (0.0, 1.0))), sides=("side-2",)),
+        bk.Part("tooth", bk.Contact(bk.RigidHalfPlane((0.0, below), (0.0, 1.0))), sides=("side-2",)),
         bk.Part("shaft", bk.PrescribedDisplacement(x=2e-4, y=-1e-3), sides=shaft),
     )
     return pressed("gear with 40 teeth", wheel, parts=parts)
@@ -77,7 +77,7 @@ def gear() -> bk.Scene:
 def perforated(n_x: int, n_y: int) -> bk.Scene:
     """A plate with rows of holes."""
     scene = pressed(f"plate with {n_x * n_y} holes", Perforated(n_x, n_y))
-    floor = bk.Contact(bk.HalfPlane((0.0, -1.0), (0.0, 1.0)))
+    floor = bk.Contact(bk.RigidHalfPlane((0.0, -1.0), (0.0, 1.0)))
     return replace(scene, parts=(replace(scene.parts[0], condition=floor), scene.parts[1]))
 
 

@@ -19,7 +19,7 @@ def rough_surface(n_elements: int, mean_pressure: float = 0.02) -> bk.Scene:
     obstacle = bk.SelfAffineProfile(period=1.0, rms_height=1e-3, hurst=0.8, roll_off=0.125, cut_off=1 / 512, seed=1)
     return bk.Scene(
         title="rough surface",
-        shape=bk.PeriodicHalfPlaneBody(1.0),
+        shape=bk.PeriodicHalfPlane(1.0),
         material=bk.Material(1.0, 0.3),
         law=bk.Coulomb(0.3),
         parts=(bk.Part("zone", bk.Contact(obstacle)),),

@@ -21,7 +21,7 @@ import numpy as np
 
 from bemkit.cli.progress import compute_with_progress
 from bemkit.contact.laws import Coulomb, Frictionless
-from bemkit.contact.obstacle import Circle, HalfPlane
+from bemkit.contact.obstacle import RigidCircle, RigidHalfPlane
 from bemkit.errors import BemkitError
 from bemkit.formulas import Expression
 from bemkit.geometry.shapes import Rectangle, Sector
@@ -76,10 +76,10 @@ def _at_obstacle(draw, radius, approach, material, discretisation, mesh, law) ->
     normal = np.array([-np.sin(angle), np.cos(angle)])
     lowest = -radius * normal
     shift = (-approach * normal).tolist()
-    obstacle = HalfPlane(tuple(lowest.tolist()), tuple(normal.tolist()))
+    obstacle = RigidHalfPlane(tuple(lowest.tolist()), tuple(normal.tolist()))
     if draw.chance(0.3):
         size = radius * draw.decades(-0.5, 1.0)
-        obstacle = Circle(tuple((lowest - size * normal).tolist()), size)
+        obstacle = RigidCircle(tuple((lowest - size * normal).tolist()), size)
     left, right = (radius * draw.between(0.05, 0.4) for _ in range(2))
     where = Expression(f"x > {lowest[0] - left:.17g} and x < {lowest[0] + right:.17g}")
     parts = (

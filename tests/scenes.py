@@ -84,7 +84,7 @@ def wavy() -> bk.Scene:
 
 def disc(approach: float = 0.0160341) -> bk.Scene:
     """A quarter of a disc between rigid plates, E' = 1: half-angle 0.100134, peak pressure 0.050235."""
-    floor = bk.Contact(bk.HalfPlane((0.0, approach - 1.0), (0.0, 1.0)))
+    floor = bk.Contact(bk.RigidHalfPlane((0.0, approach - 1.0), (0.0, 1.0)))
     return bk.Scene(
         title="disc between plates",
         shape=QuarterDisk(),
@@ -106,7 +106,7 @@ def angle() -> bk.Scene:
         shape=bk.Polygon(corners, ("foundation", "end", "step", "inner", "top", "back")),
         material=bk.Material(1.0, 0.3),
         parts=(
-            bk.Part("foundation", bk.Contact(bk.HalfPlane()), sides=("foundation",)),
+            bk.Part("foundation", bk.Contact(bk.RigidHalfPlane()), sides=("foundation",)),
             bk.Part("wall", bk.Clamped(), sides=("back",)),
             bk.Part("load", bk.Traction(y=-1e-3), sides=("end",)),
         ),
@@ -193,7 +193,7 @@ DISCRETISATIONS = (bk.Galerkin(1), bk.Galerkin(2), bk.ConstantCollocation())
 def square(**changes: object) -> bk.Scene:
     """Return the whole body of the paper's Example 2."""
     parts = (
-        bk.Part("foundation", bk.Contact(bk.HalfPlane()), sides=("bottom",)),
+        bk.Part("foundation", bk.Contact(bk.RigidHalfPlane()), sides=("bottom",)),
         bk.Part("top load", bk.Traction(y=bk.Expression("-x**2 * (1 - x)**2")), sides=("top",)),
         bk.Part("left load", bk.Traction(x=bk.Expression("2 * y**2 * (1 - y)**2")), sides=("left",)),
         bk.Part("right load", bk.Traction(x=bk.Expression("-2 * y**2 * (1 - y)**2")), sides=("right",)),
@@ -215,7 +215,7 @@ def squeezed(shape: bk.Disk | bk.Ring | bk.PlateWithHole | bk.Rectangle, **chang
     parts = tuple(
         bk.Part(
             name,
-            bk.Contact(bk.HalfPlane((0.0, sign * 0.97), (0.0, -sign))),
+            bk.Contact(bk.RigidHalfPlane((0.0, sign * 0.97), (0.0, -sign))),
             sides=outside,
             where=bk.Expression(f"{sign} * y > 0.5 and abs(x) < 0.8"),
         )
@@ -257,7 +257,7 @@ class EccentricRing:
 
 
 LINEAR, CONSTANT = bk.Galerkin(1), bk.ConstantCollocation()
-FLOOR = bk.Part("floor", bk.Contact(bk.HalfPlane()), sides=("bottom",))
+FLOOR = bk.Part("floor", bk.Contact(bk.RigidHalfPlane()), sides=("bottom",))
 
 
 def block(*parts: bk.Part, **options: object) -> bk.Scene:

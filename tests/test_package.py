@@ -147,7 +147,7 @@ def test_solving_a_scene_from_objects_loads_no_output_library() -> None:
     code = """
 import bemkit as bk
 scene = bk.Scene(title="block", shape=bk.Rectangle(1.0, 1.0), material=bk.Material(1.0, 0.3), parts=(
-    bk.Part("floor", bk.Contact(bk.HalfPlane()), sides=("bottom",)),
+    bk.Part("floor", bk.Contact(bk.RigidHalfPlane()), sides=("bottom",)),
     bk.Part("wall", bk.Roller(), sides=("right",)),
     bk.Part("load", bk.Traction(y=-1.0), sides=("top",)),
 ), mesh=bk.MeshOptions(elements=24))

@@ -116,7 +116,7 @@ def _measured(
 
 
 @dataclass(frozen=True)
-class HalfPlane:
+class RigidHalfPlane:
     """The obstacle fills the half-plane behind a line, with the inner product (x - point, normal) <= 0.
 
     Parameters
@@ -169,7 +169,7 @@ class _Round:
 
 
 @dataclass(frozen=True)
-class Circle(_Round):
+class RigidCircle(_Round):
     """The obstacle fills a disc; the body lies outside it (a roll, a shaft in a hole).
 
     Parameters
@@ -193,7 +193,7 @@ class Circle(_Round):
 
 
 @dataclass(frozen=True)
-class Cavity(_Round):
+class RigidCavity(_Round):
     """The obstacle fills everything outside a circle; the body lies inside it (a disc in a rigid ring).
 
     Parameters

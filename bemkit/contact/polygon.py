@@ -16,7 +16,7 @@ _ROUND_OFF = 1e-12
 
 
 @dataclass(frozen=True)
-class PolygonalObstacle:
+class RigidPolygon:
     """The obstacle fills a polygon; the body lies outside it.
 
     Parameters

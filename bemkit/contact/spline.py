@@ -22,7 +22,7 @@ _MOST_STEPS = 60
 
 
 @dataclass(frozen=True)
-class SplineObstacle:
+class RigidSpline:
     """The obstacle fills the left side of a smooth curve through points.
 
     So a closed curve is filled inside if its points run anticlockwise, and outside (a cavity) if they run clockwise. An

@@ -272,7 +272,7 @@ class ExteriorOf(CheckedShape):
 
 
 @dataclass(frozen=True)
-class HalfPlaneBody(CheckedShape):
+class ElasticHalfPlane(CheckedShape):
     """The elastic half-plane y < 0; its only side, surface, is the strip of y = 0 that may carry tractions.
 
     The rest of its surface is free of traction. A strip that is no longer than needed makes the best use of elements.
@@ -292,9 +292,9 @@ class HalfPlaneBody(CheckedShape):
     right: float
 
     def __post_init__(self) -> None:
-        (left, right) = as_point((self.left, self.right), "HalfPlaneBody: left and right")
+        (left, right) = as_point((self.left, self.right), "ElasticHalfPlane: left and right")
         if left >= right:
-            raise GeometryError(f"HalfPlaneBody: left is {left}, not less than right, {right}: give the left end first")
+            raise GeometryError(f"ElasticHalfPlane: left is {left}, not below right, {right}: give the left end first")
 
     @cached_property
     def _outline(self) -> Outline:
@@ -303,7 +303,7 @@ class HalfPlaneBody(CheckedShape):
 
 
 @dataclass(frozen=True)
-class PeriodicHalfPlaneBody(CheckedShape):
+class PeriodicHalfPlane(CheckedShape):
     """The elastic half-plane y < 0 under periodic tractions; its only side, surface, is one period of y = 0.
 
     Parameters
@@ -322,8 +322,8 @@ class PeriodicHalfPlaneBody(CheckedShape):
     left: float = 0.0
 
     def __post_init__(self) -> None:
-        require_positive("PeriodicHalfPlaneBody", period=self.period)
-        as_point((self.left, self.left + self.period), "PeriodicHalfPlaneBody: left and right end")
+        require_positive("PeriodicHalfPlane", period=self.period)
+        as_point((self.left, self.left + self.period), "PeriodicHalfPlane: left and right end")
 
     @cached_property
     def _outline(self) -> Outline:

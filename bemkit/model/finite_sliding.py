@@ -12,10 +12,10 @@ from dataclasses import replace
 import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray
-from bemkit.contact.obstacle import Cavity, Circle, HalfPlane, Obstacle, measure_contact
-from bemkit.contact.polygon import PolygonalObstacle
+from bemkit.contact.obstacle import Obstacle, RigidCavity, RigidCircle, RigidHalfPlane, measure_contact
+from bemkit.contact.polygon import RigidPolygon
 from bemkit.contact.signed_distance import SignedDistance
-from bemkit.contact.spline import SplineObstacle
+from bemkit.contact.spline import RigidSpline
 from bemkit.geometry.spaces import element_nodes
 from bemkit.geometry.vectors import norms
 from bemkit.model.contacts import ContactRows
@@ -26,7 +26,7 @@ from bemkit.scene.conditions import Contact
 from bemkit.scene.unit_names import amount
 from bemkit.solvers.base import ContactSolution, Status
 
-IN_THE_PLANE = (HalfPlane, Circle, Cavity, PolygonalObstacle, SplineObstacle, SignedDistance)
+IN_THE_PLANE = (RigidHalfPlane, RigidCircle, RigidCavity, RigidPolygon, RigidSpline, SignedDistance)
 """Obstacles with a position in the plane, so that their distance from a point that has moved is known."""
 _BY_DEFORMATION = 5.0
 """Displacements by contact forces, up to which a motion along a contact is one of deformation."""

@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 
 from bemkit.arrays import FloatArray
-from bemkit.contact.obstacle import Cavity, Circle, HalfPlane, Obstacle
-from bemkit.contact.polygon import PolygonalObstacle
+from bemkit.contact.obstacle import Obstacle, RigidCavity, RigidCircle, RigidHalfPlane
+from bemkit.contact.polygon import RigidPolygon
 from bemkit.contact.signed_distance import SignedDistance
-from bemkit.contact.spline import SplineObstacle
+from bemkit.contact.spline import RigidSpline
 from bemkit.errors import InputError
 from bemkit.model.prepared import Prepared
 from bemkit.scene.conditions import Contact
@@ -51,16 +51,16 @@ def shift_between(before: Obstacle, after: Obstacle) -> FloatArray | None:
     if before == after:
         return np.zeros(2)
     match before, after:
-        case HalfPlane(), HalfPlane():
+        case RigidHalfPlane(), RigidHalfPlane():
             is_shift = replace(before, point=after.point) == after
             return np.subtract(after.point, before.point) if is_shift else None
-        case Circle(), Circle():
+        case RigidCircle(), RigidCircle():
             return np.subtract(after.centre, before.centre)
-        case Cavity(), Cavity():
+        case RigidCavity(), RigidCavity():
             return np.subtract(after.centre, before.centre)
-        case PolygonalObstacle(), PolygonalObstacle():
+        case RigidPolygon(), RigidPolygon():
             return _common_shift(np.array(before.vertices), np.array(after.vertices))
-        case SplineObstacle(), SplineObstacle():
+        case RigidSpline(), RigidSpline():
             return _common_shift(np.array(before.points), np.array(after.points))
         case (SignedDistance(), _) | (_, SignedDistance()):
             return None

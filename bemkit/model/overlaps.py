@@ -22,8 +22,8 @@ def check_apart(scene: Stated, bodies: Sequence[PlacedBody]) -> None:
     """
     if len(bodies) == 1 and not scene.rigid:
         return
-    from bemkit.contact.obstacle import Circle
-    from bemkit.contact.polygon import PolygonalObstacle
+    from bemkit.contact.obstacle import RigidCircle
+    from bemkit.contact.polygon import RigidPolygon
     from bemkit.geometry.overlap import ROUND_OFF, Polyline, deepest_overlap, near_pairs
 
     finite = [body for body in bodies if body.mesh.surface is None]
@@ -36,7 +36,7 @@ def check_apart(scene: Stated, bodies: Sequence[PlacedBody]) -> None:
         if depth > 0.0:
             raise _overlap(names, depth, place)
     for rigid in scene.rigid:
-        if isinstance(rigid.obstacle, Circle | PolygonalObstacle):
+        if isinstance(rigid.obstacle, RigidCircle | RigidPolygon):
             for body, outline in zip(finite, outlines, strict=True):
                 points = outline.points.reshape(-1, 2)
                 gap = rigid.obstacle.gap(points, points)

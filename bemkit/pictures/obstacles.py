@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 
 from bemkit.arrays import FloatArray, IntArray
-from bemkit.contact.obstacle import Cavity, Circle, HalfPlane, Obstacle, measure_contact
-from bemkit.contact.polygon import PolygonalObstacle
+from bemkit.contact.obstacle import Obstacle, RigidCavity, RigidCircle, RigidHalfPlane, measure_contact
+from bemkit.contact.polygon import RigidPolygon
 from bemkit.contact.signed_distance import SignedDistance
-from bemkit.contact.spline import SplineObstacle
+from bemkit.contact.spline import RigidSpline
 from bemkit.errors import InputError
 from bemkit.formulas import evaluate_field
 from bemkit.geometry.mesh import BoundaryMesh
@@ -111,20 +111,20 @@ def outline_of(obstacle: object, frame: FloatArray) -> list[FloatArray]:
     """
     reach = 4.0 * float(np.hypot(*np.ptp(frame, axis=1)))
     match obstacle:
-        case HalfPlane(point=point, normal=normal):
+        case RigidHalfPlane(point=point, normal=normal):
             inward = -np.array(normal) / np.hypot(*normal)
             along = np.array([-inward[1], inward[0]])
             centre = np.array(point) + ((frame.mean(axis=1) - np.array(point)) @ along) * along
             surface = np.array([centre - reach * along, centre + reach * along])
             return [np.concatenate([surface, surface[::-1] + reach * inward])]
-        case Circle(centre=centre, radius=radius) | Cavity(centre=centre, radius=radius):
+        case RigidCircle(centre=centre, radius=radius) | RigidCavity(centre=centre, radius=radius):
             angle = np.linspace(0.0, 2.0 * np.pi, _POINTS_OF_CIRCLE)
             return [np.array(centre) + radius * np.stack([np.cos(angle), np.sin(angle)], axis=1)]
-        case PolygonalObstacle(vertices=vertices):
+        case RigidPolygon(vertices=vertices):
             return [np.array(vertices, dtype=float)]
-        case SplineObstacle(is_closed=True):
+        case RigidSpline(is_closed=True):
             return [obstacle.curve(_POINTS_OF_SPAN)]
-        case SplineObstacle():
+        case RigidSpline():
             curve = obstacle.curve(_POINTS_OF_SPAN)
             first, last = curve[0] - curve[1], curve[-1] - curve[-2]
             begin = curve[0] + reach * first / np.hypot(*first)
@@ -155,9 +155,9 @@ def _where_negative(distance: Any, frame: FloatArray) -> list[FloatArray]:
 
 def _is_hollow(obstacle: object) -> bool:
     """Whether an obstacle fills the outside of its outline."""
-    if isinstance(obstacle, SplineObstacle) and obstacle.is_closed:
+    if isinstance(obstacle, RigidSpline) and obstacle.is_closed:
         return not _is_anticlockwise(obstacle.curve())
-    return isinstance(obstacle, Cavity)
+    return isinstance(obstacle, RigidCavity)
 
 
 def _with_outside(loops: list[FloatArray], obstacle: object, frame: FloatArray) -> list[FloatArray]:
@@ -178,7 +178,7 @@ def _is_anticlockwise(loop: FloatArray) -> bool:
 
 
 def _is_endless(obstacle: object) -> bool:
-    return isinstance(obstacle, HalfPlane) or (isinstance(obstacle, SplineObstacle) and not obstacle.is_closed)
+    return isinstance(obstacle, RigidHalfPlane) or (isinstance(obstacle, RigidSpline) and not obstacle.is_closed)
 
 
 def _draw(axes: Axes, loops: list[FloatArray], style: dict[str, Any], label: str | None) -> None:

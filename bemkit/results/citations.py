@@ -9,7 +9,7 @@ from importlib import resources
 from types import MappingProxyType
 
 from bemkit.geometry.curves import Segment
-from bemkit.geometry.shapes import HalfPlaneBody, PeriodicHalfPlaneBody
+from bemkit.geometry.shapes import ElasticHalfPlane, PeriodicHalfPlane
 from bemkit.results.assembly_solution import AssemblySolution
 from bemkit.results.solution import Solution
 from bemkit.scene.assembly import Assembly
@@ -116,7 +116,7 @@ def cite(subject: Scene | Assembly | Solution | AssemblySolution) -> Citations:
 def _of_bodies(stated: Scene | Assembly) -> Iterator[Method]:
     bodies: tuple[Scene | Body, ...] = stated.bodies if isinstance(stated, Assembly) else (stated,)
     is_adaptive = stated.mesh.accuracy is not None
-    with_boundary = [body for body in bodies if not isinstance(body.shape, HalfPlaneBody | PeriodicHalfPlaneBody)]
+    with_boundary = [body for body in bodies if not isinstance(body.shape, ElasticHalfPlane | PeriodicHalfPlane)]
     if len(with_boundary) < len(bodies):
         yield Method("flexibility of the surface of a half-plane in closed form", ("Johnson1985",))
     for discretisation in (body.discretisation or stated.discretisation for body in with_boundary):

@@ -5,17 +5,17 @@ from __future__ import annotations
 import numpy as np
 
 from bemkit.arrays import IntArray
-from bemkit.contact.obstacle import Cavity, Circle, HalfPlane, Obstacle
-from bemkit.contact.polygon import PolygonalObstacle
+from bemkit.contact.obstacle import Obstacle, RigidCavity, RigidCircle, RigidHalfPlane
+from bemkit.contact.polygon import RigidPolygon
 from bemkit.contact.signed_distance import SignedDistance
-from bemkit.contact.spline import SplineObstacle
+from bemkit.contact.spline import RigidSpline
 from bemkit.geometry.neighbours import along_boundary
 from bemkit.geometry.vectors import norms
 from bemkit.results.between_nodes import Interpolation, points_at_obstacle, points_between
 from bemkit.results.solved_body import SolvedBody
 from bemkit.scene.conditions import Contact
 
-_IN_THE_PLANE = (HalfPlane, Circle, Cavity, PolygonalObstacle, SplineObstacle, SignedDistance)
+_IN_THE_PLANE = (RigidHalfPlane, RigidCircle, RigidCavity, RigidPolygon, RigidSpline, SignedDistance)
 """Obstacles with a position in the plane, so that their distance from a point that has moved is known."""
 _PRESSED = 0.01
 """Share of the largest pressure from which on a point counts as pressed."""

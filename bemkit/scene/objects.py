@@ -22,7 +22,7 @@ _EXAMPLES: Mapping[str, str] = MappingProxyType(
         "touching": "Touching(within=0.01)",
         "units": "UnitNames(length='mm', stress='MPa')",
         "condition": "Clamped()",
-        "obstacle": "HalfPlane()",
+        "obstacle": "RigidHalfPlane()",
     }
 )
 _SEVERAL = ("parts", "steps", "load_factors", "body_forces", "bodies", "rigid", "contacts", "sides")

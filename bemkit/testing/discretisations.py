@@ -8,7 +8,7 @@ from dataclasses import is_dataclass, replace
 import numpy as np
 
 from bemkit.contact.laws import Coulomb, Frictionless
-from bemkit.contact.obstacle import HalfPlane
+from bemkit.contact.obstacle import RigidHalfPlane
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.shapes import PlateWithHole, Rectangle
 from bemkit.operators.linear.solvers import DenseCholesky
@@ -105,7 +105,7 @@ def _check_tension(discretisation: Discretisation, name: str) -> None:
 def _check_contact(discretisation: Discretisation, name: str) -> None:
     """Check the forces on a block that is pressed down and to the side on a floor with friction."""
     parts = (
-        Part("floor", Contact(HalfPlane()), ("bottom",)),
+        Part("floor", Contact(RigidHalfPlane()), ("bottom",)),
         Part("load", Traction(x=0.1, y=-1.0), ("top",)),
         Part("wall", Roller(), ("right",)),
     )

@@ -6,7 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from bemkit.contact.obstacle import HalfPlane
+from bemkit.contact.obstacle import RigidHalfPlane
 from bemkit.geometry.placement import Placement
 from bemkit.geometry.shapes import Polygon, Rectangle
 from bemkit.scene.assembly import Touching
@@ -85,7 +85,7 @@ def arch(draw: Draw, members: Members) -> Layout:
     end = Placement(turn=angle)
     low, high = ((float(x), float(y)) for x, y in end.forward(np.array([[inner, 0.0], [outer, 0.0]])))
     wedge = Polygon(((inner, 0.0), (outer, 0.0), high, low), ("before", "back", "after", "front"))
-    first, last = ((Part("floor", Contact(HalfPlane()), (side,)),) for side in ("before", "after"))
+    first, last = ((Part("floor", Contact(RigidHalfPlane()), (side,)),) for side in ("before", "after"))
     bodies = (
         members.body("first", wedge, first, is_heavy=True),
         members.body("stone", wedge, (), end, copies=CircleCopies(n - 2, angle), is_heavy=True),

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 
 from bemkit.contact.further_laws import CohesiveCoulomb
 from bemkit.contact.laws import Coulomb, FrictionLaw, Frictionless, Tresca
-from bemkit.contact.obstacle import HalfPlane
+from bemkit.contact.obstacle import RigidHalfPlane
 from bemkit.geometry.meshing.discretise import Algebraic, Uniform
 from bemkit.geometry.placement import Placement
 from bemkit.geometry.shapes import Shape
@@ -44,7 +44,7 @@ def base(draw: Draw, side: str) -> tuple[Part, ...]:
         case "rollers":
             return (Part("base", Roller(), (side,)),)
         case "obstacle":
-            return (Part("base", Contact(HalfPlane((0.0, 0.0))), (side,)),)
+            return (Part("base", Contact(RigidHalfPlane((0.0, 0.0))), (side,)),)
     return ()
 
 

@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 
 from bemkit.contact.laws import FrictionLaw
-from bemkit.contact.obstacle import Circle, Gap, HalfPlane, Obstacle
-from bemkit.contact.polygon import PolygonalObstacle
+from bemkit.contact.obstacle import Gap, Obstacle, RigidCircle, RigidHalfPlane
+from bemkit.contact.polygon import RigidPolygon
 from bemkit.contact.rough_profile import SelfAffineProfile
 from bemkit.formulas import Expression
 from bemkit.geometry.meshing.discretise import Algebraic, Geometric, Grading, Uniform
-from bemkit.geometry.shapes import HalfPlaneBody, PeriodicHalfPlaneBody, Shape
+from bemkit.geometry.shapes import ElasticHalfPlane, PeriodicHalfPlane, Shape
 from bemkit.operators.material import Material
 from bemkit.scene.conditions import (
     Clamped,
@@ -60,8 +60,8 @@ class _Strip:
     @property
     def shape(self) -> Shape:
         if self.is_periodic:
-            return PeriodicHalfPlaneBody(self.length, self.left)
-        return HalfPlaneBody(self.left, self.left + self.length)
+            return PeriodicHalfPlane(self.length, self.left)
+        return ElasticHalfPlane(self.left, self.left + self.length)
 
     @property
     def force(self) -> float:
@@ -178,17 +178,17 @@ def _obstacle(draw: Draw, strip: _Strip, begin: float, end: float) -> Obstacle:
             slope = draw.between(-0.5, 0.5)
             return Gap(abs(gap), direction=(slope, 1.0))
         case "plane":
-            return HalfPlane((x, gap), (0.0, -1.0))
+            return RigidHalfPlane((x, gap), (0.0, -1.0))
         case "tilted":
-            return HalfPlane((x, gap), (draw.one_of((-1.0, 1.0)) * height / width, -1.0))
+            return RigidHalfPlane((x, gap), (draw.one_of((-1.0, 1.0)) * height / width, -1.0))
         case "circle":
             radius = width**2 / height if draw.chance(0.7) else width * draw.decades(-0.5, 1.0)
-            return Circle((x, gap + radius), radius)
+            return RigidCircle((x, gap + radius), radius)
         case "polygon":
             top, half = gap + width, 0.5 * width * draw.between(0.1, 1.0)
             wedge = ((x, gap), (x + half, top), (x - half, top))
             block = ((x - half, gap), (x + half, gap), (x + half, top), (x - half, top))
-            return PolygonalObstacle(draw.one_of((wedge, block)))
+            return RigidPolygon(draw.one_of((wedge, block)))
         case "rough":
             period, seed = strip.length, int(draw.integers(1000))
             cut_off = period / draw.one_of((8, 16))

@@ -11,8 +11,8 @@ import numpy as np
 from bemkit.arrays import FloatArray
 from bemkit.contact.further_laws import CohesiveCoulomb
 from bemkit.contact.laws import Coulomb, FrictionLaw, Frictionless, Tresca
-from bemkit.contact.obstacle import Cavity, Circle, Gap, HalfPlane, Obstacle
-from bemkit.contact.polygon import PolygonalObstacle
+from bemkit.contact.obstacle import Gap, Obstacle, RigidCavity, RigidCircle, RigidHalfPlane
+from bemkit.contact.polygon import RigidPolygon
 from bemkit.formulas import Expression
 from bemkit.scene.conditions import (
     Clamped,
@@ -72,18 +72,18 @@ def _obstacle(draw: Draw, body: Body, down: FloatArray, sides: tuple[SideSample,
         case "directed":
             return Gap(distance, direction=pair(down))
         case "plane":
-            return HalfPlane(pair(lowest + distance * down), pair(-down))
+            return RigidHalfPlane(pair(lowest + distance * down), pair(-down))
         case "tilted":
             down = turned(np.radians(draw.between(-25.0, 25.0))) @ down
             lowest = points[int(np.argmax((points - body.centre) @ down))]
-            return HalfPlane(pair(lowest + distance * down), pair(-down))
+            return RigidHalfPlane(pair(lowest + distance * down), pair(-down))
         case "circle":
             radius = body.size * draw.decades(-1.0, 1.5)
-            return Circle(pair(lowest + (radius + distance) * down), radius)
+            return RigidCircle(pair(lowest + (radius + distance) * down), radius)
         case "cavity":
             reach = float(np.hypot(*(points - body.centre).T).max())
             radius = reach * (1.0 + draw.decades(-3.0, 1.0))
-            return Cavity(pair(lowest + (distance - radius) * down), radius)
+            return RigidCavity(pair(lowest + (distance - radius) * down), radius)
         case "bump":
             x, y = pair(lowest)
             curve = draw.decades(-4.0, 0.0) / body.size
@@ -91,14 +91,14 @@ def _obstacle(draw: Draw, body: Body, down: FloatArray, sides: tuple[SideSample,
     return Gap(distance)
 
 
-def _polygon(draw: Draw, body: Body, down: FloatArray, top: FloatArray) -> PolygonalObstacle:
+def _polygon(draw: Draw, body: Body, down: FloatArray, top: FloatArray) -> RigidPolygon:
     """Draw a block whose upper side touches a point, or a wedge whose tip does."""
     across = np.array([-down[1], down[0]])
     width, depth = body.size * draw.between(0.2, 1.5), body.size * draw.between(0.2, 2.0)
     corners: tuple[tuple[float, float], ...] = ((1.0, -0.5), (1.0, 0.5), (0.0, 0.5), (0.0, -0.5))
     if draw.chance(0.4):
         corners = ((1.0, -0.5), (1.0, 0.5), (0.0, 0.0))
-    return PolygonalObstacle(tuple(pair(top + d * depth * down + s * width * across) for d, s in corners))
+    return RigidPolygon(tuple(pair(top + d * depth * down + s * width * across) for d, s in corners))
 
 
 def _shaft(draw: Draw, body: Body, hole: tuple[float, float, float]) -> Part:
@@ -110,7 +110,7 @@ def _shaft(draw: Draw, body: Body, hole: tuple[float, float, float]) -> Part:
     if draw.chance(0.3):
         return Part("shaft", Contact(Gap(play)), sides=chosen)
     shift = draw.direction() * max(play, 0.0) * draw.one_of((0.0, 1.0, 1.0))
-    return Part("shaft", Contact(Circle((x + float(shift[0]), y + float(shift[1])), radius - play)), sides=chosen)
+    return Part("shaft", Contact(RigidCircle((x + float(shift[0]), y + float(shift[1])), radius - play)), sides=chosen)
 
 
 def _is_round(side: SideSample, hole: tuple[float, float, float]) -> bool:

@@ -7,7 +7,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from bemkit.contact.obstacle import Cavity, Circle, Gap, HalfPlane, Obstacle
+from bemkit.contact.obstacle import Gap, Obstacle, RigidCavity, RigidCircle, RigidHalfPlane
 from bemkit.formulas import Expression
 from bemkit.geometry.meshing.discretise import Algebraic, Geometric, Grading, Uniform
 from bemkit.geometry.shapes import Disk, PlateWithHole, Rectangle, Ring, Shape
@@ -183,7 +183,7 @@ def _block(draw: Draw, size: float, stress: float, motion: float) -> _Layout:
     gap = draw.one_of((0.0, 0.0, size * draw.decades(-6.0, -2.0), -size * draw.decades(-6.0, -3.0)))
     curve = draw.decades(-3.0, 0.0) / size
     obstacles: tuple[Obstacle, ...] = (
-        HalfPlane((0.0, -0.5 * height - gap)),
+        RigidHalfPlane((0.0, -0.5 * height - gap)),
         Gap(gap),
         Gap(Expression(f"{gap!r} + {curve!r} * x**2")),
     )
@@ -204,7 +204,10 @@ def _round(draw: Draw, size: float, stress: float, motion: float) -> _Layout:
         shape, name = Ring(radius * draw.between(0.2, 0.9), radius), "outer"
     gap = draw.one_of((0.0, 0.0, size * draw.decades(-6.0, -2.0)))
     large = radius * (1.0 + draw.decades(-3.0, 0.0))
-    obstacles: tuple[Obstacle, ...] = (HalfPlane((0.0, -radius - gap)), Cavity((0.0, large - radius - gap), large))
+    obstacles: tuple[Obstacle, ...] = (
+        RigidHalfPlane((0.0, -radius - gap)),
+        RigidCavity((0.0, large - radius - gap), large),
+    )
     floor = Part("contact", Contact(draw.one_of(obstacles)), sides=(f"{name}-3", f"{name}-4"))
     actions: tuple[Condition, ...] = (Traction(y=-stress), PrescribedDisplacement(y=-motion))
     return shape, (floor, Part("top", draw.one_of(actions), sides=(f"{name}-1", f"{name}-2"))), Symmetry(x=0.0)
@@ -214,7 +217,7 @@ def _shrunk(draw: Draw, size: float, stress: float, motion: float) -> _Layout:
     """Draw a ring shrunk on a shaft, with pressure from outside."""
     shape = Ring(0.5 * size * draw.between(0.2, 0.9), 0.5 * size)
     inner = tuple(f"inner-{k}" for k in range(1, 5))
-    obstacles: tuple[Obstacle, ...] = (Gap(-motion), Circle((0.0, 0.0), shape.inner_radius + motion))
+    obstacles: tuple[Obstacle, ...] = (Gap(-motion), RigidCircle((0.0, 0.0), shape.inner_radius + motion))
     shaft = Part("contact", Contact(draw.one_of(obstacles)), sides=inner)
     outer = Part("outer", Pressure(stress), sides=tuple(f"outer-{k}" for k in range(1, 5)))
     return shape, (shaft, outer) if draw.chance(0.5) else (shaft,), Symmetry(x=0.0, y=0.0)

@@ -17,7 +17,7 @@ scene = bk.Scene(
     material=bk.Material(youngs_modulus=1000.0, poisson_ratio=0.0),
     law=bk.Coulomb(friction_coefficient=0.4),
     parts=(
-        bk.Part("foundation", bk.Contact(bk.HalfPlane()), sides=("bottom",)),
+        bk.Part("foundation", bk.Contact(bk.RigidHalfPlane()), sides=("bottom",)),
         bk.Part("weight", bk.Traction(y=-1.0), sides=("top",)),
         bk.Part("push", bk.Traction(x=0.0), sides=("left",)),
     ),

@@ -64,7 +64,7 @@ def half_planes_among(seed: int, count: int) -> list[RandomCase[bk.Scene]]:
 def test_random_half_planes_end_in_the_right_answer_or_a_named_failure() -> None:
     cases = half_planes_among(4, 60)
     assert len(cases) >= 4  # 12 per cent
-    assert {type(case.scenes[0].shape).__name__ for case in cases} == {"HalfPlaneBody", "PeriodicHalfPlaneBody"}
+    assert {type(case.scenes[0].shape).__name__ for case in cases} == {"ElasticHalfPlane", "PeriodicHalfPlane"}
     for case in cases:
         assert tuple(scene_from_toml(text) for text in case.files().values()) == case.scenes
     trials = [try_case(case.seed, case.index) for case in cases if case.index % EVERY != EVERY - 1]
@@ -99,8 +99,8 @@ def test_every_kind_is_drawn() -> None:
     drawn = Counter(type(value).__name__ for scene in scenes for value in kinds_in(scene))
     wanted = (
         *("Rectangle", "Polygon", "Disk", "Sector", "Ring", "PlateWithHole", "ExteriorOf"),
-        *("HalfPlaneBody", "PeriodicHalfPlaneBody", "FarField"),
-        *("HalfPlane", "Circle", "Cavity", "Gap"),
+        *("ElasticHalfPlane", "PeriodicHalfPlane", "FarField"),
+        *("RigidHalfPlane", "RigidCircle", "RigidCavity", "Gap"),
         *("Clamped", "Roller", "PrescribedDisplacement", "Traction", "Pressure", "Contact"),
         *("Frictionless", "Tresca", "Coulomb", "CohesiveCoulomb"),
         *("SemismoothNewton", "AugmentedLagrangian", "FixedPoint", "LemkePivoting"),

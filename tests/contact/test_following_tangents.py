@@ -17,7 +17,7 @@ from bemkit.model.prepared import prepare
 from bemkit.runs.run import UnsolvableSceneError
 from bemkit.solvers.base import ContactSolver, Status, solve
 
-FLOOR = bk.HalfPlane()
+FLOOR = bk.RigidHalfPlane()
 NEWTON = bk.SemismoothNewton()
 SMOOTH = bk.Frictionless()
 
@@ -46,7 +46,7 @@ def disc_in_cavity() -> bk.Scene:
         shape=bk.Disk(1.0),
         material=bk.Material(1.0, 0.3),
         parts=(
-            bk.Part("seat", bk.Contact(bk.Cavity((0.0, 0.05), 1.05)), where=bk.Expression("y < 0.3")),
+            bk.Part("seat", bk.Contact(bk.RigidCavity((0.0, 0.05), 1.05)), where=bk.Expression("y < 0.3")),
             bk.Part("load", bk.Traction(y=-0.02), where=bk.Expression("y > 0.8")),
         ),
         mesh=bk.MeshOptions(elements=40),
@@ -93,7 +93,9 @@ def test_a_block_on_a_smooth_floor_keeps_its_place_and_slides_under_the_smallest
 @pytest.mark.parametrize("radius", [0.3, 1e-3, 1e-6])
 def test_a_smooth_pin_may_be_small_against_the_plate_it_holds(radius: float) -> None:
     push = bk.Part("push", bk.Traction(x=1.0), sides=("right",))
-    pull = bk.Part("hole", bk.Contact(bk.Circle((0.0, 0.0), radius)), sides=tuple(f"hole-{k}" for k in range(1, 5)))
+    pull = bk.Part(
+        "hole", bk.Contact(bk.RigidCircle((0.0, 0.0), radius)), sides=tuple(f"hole-{k}" for k in range(1, 5))
+    )
     plate = bk.PlateWithHole(width=2.0, height=2.0, radius=radius, corner=(-1.0, -1.0))
     scene = replace(
         block(),
@@ -198,7 +200,7 @@ def slanted(friction_coefficient: float = 0.5, solver: ContactSolver = NEWTON) -
         material=bk.Material(1.0, 0.3),
         law=bk.Coulomb(friction_coefficient),
         parts=(
-            bk.Part("floor", bk.Contact(bk.HalfPlane((0.0, -1e-4))), sides=("bottom",)),
+            bk.Part("floor", bk.Contact(bk.RigidHalfPlane((0.0, -1e-4))), sides=("bottom",)),
             bk.Part("load", bk.Traction(y=-1e-3), sides=("top",)),
             bk.Part("guide", bk.Roller(), sides=("left",)),
         ),

@@ -53,7 +53,7 @@ def loose_block(travel: float = 0.0) -> bk.Scene:
         material=bk.Material(100.0, 0.3),
         law=bk.Coulomb(0.4),
         parts=(
-            bk.Part("floor", bk.Contact(bk.HalfPlane((0.0, -travel), (0.0, 1.0))), sides=("bottom",)),
+            bk.Part("floor", bk.Contact(bk.RigidHalfPlane((0.0, -travel), (0.0, 1.0))), sides=("bottom",)),
             bk.Part("press", bk.Traction(x=0.1, y=-1.0), sides=("top",)),
         ),
     )
@@ -62,7 +62,7 @@ def loose_block(travel: float = 0.0) -> bk.Scene:
 def on_floor() -> tuple[bk.Part, ...]:
     """The floor below a plate whose lower side is y = -1, and the press."""
     floor, press = loose_block().parts
-    return replace(floor, condition=bk.Contact(bk.HalfPlane((0.0, -1.0), (0.0, 1.0)))), press
+    return replace(floor, condition=bk.Contact(bk.RigidHalfPlane((0.0, -1.0), (0.0, 1.0)))), press
 
 
 def tilted() -> bk.Scene:
@@ -75,7 +75,7 @@ def tilted() -> bk.Scene:
         material=bk.Material(1.0, 0.45, bk.Plane.STRAIN),
         law=bk.CohesiveCoulomb(0.6, cohesion=1e-3),
         parts=(
-            bk.Part("floor", bk.Contact(bk.HalfPlane((0.0, 0.0), (-turn.imag, turn.real))), sides=("side-1",)),
+            bk.Part("floor", bk.Contact(bk.RigidHalfPlane((0.0, 0.0), (-turn.imag, turn.real))), sides=("side-1",)),
             bk.Part("roller", bk.Roller(), sides=("side-3",)),
             bk.Part("push", bk.Pressure(0.01), sides=("side-2",)),
             bk.Part("drag", bk.PrescribedDisplacement(x=0.004, y=-0.002), sides=("side-4",)),

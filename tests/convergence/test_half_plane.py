@@ -24,7 +24,7 @@ WITHIN = 1e-3
 def pressed(gap: str, half_width: float, far: bk.FarField, **changes: object) -> bk.Solution:
     changes = {"law": bk.Frictionless(), "mesh": bk.MeshOptions(accuracy=WITHIN)} | changes
     parts = (bk.Part("zone", bk.Contact(bk.Gap(bk.Expression(gap)))),)
-    shape = bk.HalfPlaneBody(-half_width, half_width)
+    shape = bk.ElasticHalfPlane(-half_width, half_width)
     solution = bk.run(bk.Scene(title="indenter", shape=shape, material=MATERIAL, parts=parts, far=far, **changes))  # type: ignore[arg-type]
     assert solution.is_converged, solution.message
     return solution
@@ -150,7 +150,7 @@ def test_a_punch_that_is_bonded() -> None:
     parts = (bk.Part("punch", bk.PrescribedDisplacement(x=0.0, y=-0.1)),)
     scene = bk.Scene(
         title="bonded",
-        shape=bk.HalfPlaneBody(-1.0, 1.0),
+        shape=bk.ElasticHalfPlane(-1.0, 1.0),
         material=MATERIAL,
         parts=parts,
         mesh=bk.MeshOptions(accuracy=WITHIN),
@@ -204,7 +204,7 @@ def test_two_equal_bodies_sheared_after_pressing_as_cattaneo_and_mindlin_say() -
     shear = 0.5 * 0.3  # half of what friction can carry
     scene = bk.Scene(
         title="two cylinders",
-        shape=bk.HalfPlaneBody(-1.05 * a, 1.05 * a),
+        shape=bk.ElasticHalfPlane(-1.05 * a, 1.05 * a),
         material=bk.Material(0.75 * composite, 0.5),
         law=FRICTION,
         parts=(bk.Part("zone", bk.Contact(bk.Gap(bk.Expression("x**2 / 2")))),),

@@ -113,7 +113,7 @@ def test_quadratic_elements_pass_the_contact_patch_test() -> None:
         material=bk.Material(5.0, 0.0),
         law=bk.Coulomb(0.3),
         parts=(
-            bk.Part("floor", bk.Contact(bk.HalfPlane()), sides=("bottom",)),
+            bk.Part("floor", bk.Contact(bk.RigidHalfPlane()), sides=("bottom",)),
             bk.Part("lid", bk.PrescribedDisplacement(y=-1e-3), sides=("top",)),
             bk.Part("wall", bk.Roller(), sides=("left",)),
         ),

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from bemkit.contact.laws import Coulomb, Frictionless
-from bemkit.contact.obstacle import Circle
+from bemkit.contact.obstacle import RigidCircle
 from bemkit.contact.problem import ContactProblem
 from bemkit.geometry import Disk, ExteriorOf, discretise
 from bemkit.operators.material import Material
@@ -28,7 +28,7 @@ def test_shrink_fit(kind: type[GalerkinElasticity | CollocationElasticity], tole
     elastic = kind(mesh, MATERIAL)
     body = condense(elastic, [], contact_along_normals(elastic.displacement_space, np.arange(64)), np.zeros((64, 2)))
     nodes = body.nodes
-    gap = Circle((0.0, 0.0), RADIUS + interference).gap(nodes.points, nodes.directions)
+    gap = RigidCircle((0.0, 0.0), RADIUS + interference).gap(nodes.points, nodes.directions)
     np.testing.assert_allclose(gap, -interference, rtol=1e-12)
     solution = solve(ContactProblem(body, gap, Coulomb(0.3)), SemismoothNewton())
     pressure = -solution.state.traction[:, 0]
@@ -42,7 +42,7 @@ def test_a_pushed_pin_separates_from_the_other_side_and_the_plate_carries_it() -
     elastic = GalerkinElasticity(mesh, MATERIAL)
     body = condense(elastic, [], contact_along_normals(elastic.displacement_space, np.arange(64)), np.zeros((64, 2)))
     nodes = body.nodes
-    gap = Circle((1e-3, 0.0), RADIUS).gap(nodes.points, nodes.directions)
+    gap = RigidCircle((1e-3, 0.0), RADIUS).gap(nodes.points, nodes.directions)
     solution = solve(ContactProblem(body, gap, Frictionless()), SemismoothNewton())
     traction = np.einsum("nk,nkc->nc", solution.state.traction, nodes.frame)
     force = nodes.weights @ traction

@@ -100,11 +100,11 @@ def test_cylinders_approach_each_other_as_the_closed_form_says() -> None:
     load, material = 2e-4, bk.Material(0.91, 0.3)  # E' = 1
     near, low, high = bk.Expression("abs(x) < 0.06"), ("arc-3", "arc-4"), ("arc-1", "arc-2")
     top = bk.Part("top", bk.Free(), high, near)
-    floor = bk.Part("floor", bk.Contact(bk.HalfPlane()), low, near)
+    floor = bk.Part("floor", bk.Contact(bk.RigidHalfPlane()), low, near)
     lower = bk.Body(name="lower", shape=bk.Disk(1.0, (0.0, 1.0)), material=material, parts=(top, floor))
     bottom = bk.Part("bottom", bk.Free(), low, near)
     upper = bk.Body(name="upper", shape=bk.Disk(1.0, (0.0, 3.0)), material=material, parts=(top, bottom))
-    plate = bk.RigidBody(name="plate", obstacle=bk.HalfPlane((0.0, 4.0), (0.0, -1.0)), force_y=-load)
+    plate = bk.RigidBody(name="plate", obstacle=bk.RigidHalfPlane((0.0, 4.0), (0.0, -1.0)), force_y=-load)
     solution = bk.run(
         bk.Assembly(
             title="Cylinders between plates",
@@ -188,7 +188,7 @@ def test_two_sides_of_one_body_touch_as_its_half_touches_a_wall() -> None:
         ),
         parts=(
             wall, press, bk.Part("line", bk.Roller(), ("middle",)),
-            bk.Part("contact", bk.Contact(bk.HalfPlane()), ("upper",)),
+            bk.Part("contact", bk.Contact(bk.RigidHalfPlane()), ("upper",)),
         ),
     )  # fmt: skip
     expected = bk.run(half)

@@ -24,7 +24,7 @@ from bemkit.solvers.base import solve
 from tests.slow import slow_except, slow_only
 
 MATERIAL = bk.Material(1.0, 0.3)
-FLOOR = bk.Part("floor", bk.Contact(bk.HalfPlane()), sides=("bottom",))
+FLOOR = bk.Part("floor", bk.Contact(bk.RigidHalfPlane()), sides=("bottom",))
 WALLS = bk.Part("walls", bk.Roller(), sides=("left", "right"))
 QUARTER = bk.Symmetry(x=0.0, y=0.0)
 WEIGHT = bk.Gravity(density=2.0, acceleration=(0.0, -0.5))
@@ -240,7 +240,9 @@ def test_a_ring_that_cools_shrinks_onto_its_shaft(plane: Plane) -> None:
             shape=bk.Ring(a, b),
             material=material,
             parts=(
-                bk.Part("shaft", bk.Contact(bk.Circle((0.0, 0.0), a)), sides=tuple(f"inner-{k}" for k in range(1, 5))),
+                bk.Part(
+                    "shaft", bk.Contact(bk.RigidCircle((0.0, 0.0), a)), sides=tuple(f"inner-{k}" for k in range(1, 5))
+                ),
             ),
             symmetry=QUARTER,
             body_forces=(bk.Heating(1e-5, -100.0),),

@@ -17,7 +17,7 @@ from bemkit.result_warning import ResultWarning
 from bemkit.solvers.base import solve
 from tests.slow import slow_except
 
-FLOOR = bk.HalfPlane()
+FLOOR = bk.RigidHalfPlane()
 ELEMENTS = [bk.ConstantCollocation(), bk.Galerkin(1), bk.Galerkin(2)]
 
 
@@ -46,7 +46,7 @@ def contact_of(scene: bk.Scene) -> Any:
 
 
 FLOOR_PART = bk.Part("floor", bk.Contact(FLOOR), sides=("bottom",))
-WALL_PART = bk.Part("wall", bk.Contact(bk.HalfPlane((1.0, 0.0), (-1.0, 0.0))), sides=("right",))
+WALL_PART = bk.Part("wall", bk.Contact(bk.RigidHalfPlane((1.0, 0.0), (-1.0, 0.0))), sides=("right",))
 
 
 @pytest.mark.parametrize("discretisation", ELEMENTS)
@@ -62,7 +62,7 @@ def test_every_length_of_the_contact_boundary_belongs_to_a_node(discretisation: 
 
 @pytest.mark.parametrize(("distance", "owner"), [(0.0, "floor"), (0.1, "floor"), (-0.1, "wall")])
 def test_a_corner_node_touches_the_nearer_obstacle_or_the_first(distance: float, owner: str) -> None:
-    wall = bk.Part("wall", bk.Contact(bk.HalfPlane((1.0 + distance, 0.0), (-1.0, 0.0))), sides=("right",))
+    wall = bk.Part("wall", bk.Contact(bk.RigidHalfPlane((1.0 + distance, 0.0), (-1.0, 0.0))), sides=("right",))
     contact = contact_of(block(FLOOR_PART, wall, law=bk.Coulomb(0.5)))
     right = np.isclose(contact.nodes.points[:, 0], contact.nodes.points[:, 0].max())
     low = np.isclose(contact.nodes.points[:, 1], contact.nodes.points[:, 1].min())
@@ -112,7 +112,7 @@ def test_a_smooth_floor_pushes_a_tilted_block_straight_up(degrees: float, discre
     corners = tuple(tuple(turn @ corner) for corner in ([0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]))
     lowest = min(y for _, y in corners)
     scene = block(
-        bk.Part("floor", bk.Contact(bk.HalfPlane((0.0, lowest))), sides=("bottom", "right", "left")),
+        bk.Part("floor", bk.Contact(bk.RigidHalfPlane((0.0, lowest))), sides=("bottom", "right", "left")),
         # so deep that the middle of the lowest element touches, which is where constants may touch
         bk.Part("press", bk.PrescribedDisplacement(y=-0.05), sides=("top",)),
         discretisation=discretisation,
@@ -195,7 +195,7 @@ def test_pressure_beside_a_roller_is_as_good_as_elsewhere(density: float, discre
 
 def test_obstacles_may_turn_their_directions_from_step_to_step() -> None:
     def seat(x: float) -> bk.Scene:
-        circle = bk.Circle((x, -2.0), 2.0)
+        circle = bk.RigidCircle((x, -2.0), 2.0)
         press = bk.Part("press", bk.PrescribedDisplacement(x=0.0, y=-0.01), sides=("top",))
         return block(bk.Part("seat", bk.Contact(circle), sides=("bottom",)), press)
 
@@ -214,7 +214,7 @@ def warnings_of(scene: bk.Scene) -> tuple[ResultWarning, ...]:
 
 def test_contact_at_a_large_angle_is_warned_of() -> None:
     press = bk.Part("press", bk.PrescribedDisplacement(y=-1e-3), sides=("top",))
-    steep = bk.Contact(bk.HalfPlane((1.0, 0.0), (-1.0, 1.0)))
+    steep = bk.Contact(bk.RigidHalfPlane((1.0, 0.0), (-1.0, 1.0)))
     (warning,) = warnings_of(
         block(bk.Part("chamfer", steep, sides=("bottom",)), press, bk.Part("guide", bk.Roller(), sides=("left",)))
     )

@@ -25,7 +25,7 @@ STRESS = {
     "yy": f"-{AMPLITUDE * WAVE**2} * cos({WAVE} * x) * (cosh({WAVE} * y) + {WAVE / 2} * y * sinh({WAVE} * y)) - 1",
     "xy": f"{AMPLITUDE * WAVE**2} * sin({WAVE} * x) * (1.5 * sinh({WAVE} * y) + {WAVE / 2} * y * cosh({WAVE} * y))",
 }
-FLOOR, WALL = bk.HalfPlane(), bk.HalfPlane((0.0, 0.0), (1.0, 0.0))
+FLOOR, WALL = bk.RigidHalfPlane(), bk.RigidHalfPlane((0.0, 0.0), (1.0, 0.0))
 TURNED = bk.Traction(bk.Expression(f"-({STRESS['xy']})"), bk.Expression(f"-({STRESS['yy']})"))
 PARTS = {
     "roller": (bk.Part("floor", bk.Contact(FLOOR), ("bottom",)), bk.Part("left", bk.Roller(), ("left",))),
@@ -99,7 +99,7 @@ def wedge(angle: float, degree: int, law: bk.FrictionLaw, overlap: float = 0.0) 
     """Return a parallelogram in a corner of its own shape under uniform pressure; the wall may be nearer."""
     along = np.array([np.cos(np.radians(angle)), np.sin(np.radians(angle))])
     corners = ((0.0, 0.0), (1.0, 0.0), (1.0 + along[0], along[1]), (along[0], along[1]))
-    wall = bk.HalfPlane((overlap, 0.0), (along[1], -along[0]))
+    wall = bk.RigidHalfPlane((overlap, 0.0), (along[1], -along[0]))
     return bk.Scene(
         title="wedge",
         shape=bk.Polygon(corners, side_names=("bottom", "right", "top", "left")),

@@ -30,7 +30,7 @@ def scene(
         law=bk.Coulomb(0.5),
         mesh=bk.MeshOptions(96, bk.Algebraic(1.5)),
         parts=(
-            bk.Part("floor", bk.Contact(bk.HalfPlane(point=(x, y))), sides=("bottom",)),
+            bk.Part("floor", bk.Contact(bk.RigidHalfPlane(point=(x, y))), sides=("bottom",)),
             bk.Part("wall", bk.Roller(), sides=(wall,)),
             bk.Part("top", bk.Traction(y=-stress), ("top",), lambda x, y: x < half_x if mirror else x > half_x),
             bk.Part("side", bk.Traction(x=-stress if mirror else stress), (pushed,), lambda x, y: y > half_y),
@@ -82,12 +82,12 @@ def test_an_interference_or_a_prescribed_motion_alone_sets_the_scale() -> None:
     block = dataclasses.replace(scene(), law=bk.Frictionless())
     wall = block.parts[1]
     pushed = bk.Part("top", bk.PrescribedDisplacement(y=-1e-3), sides=("top",))
-    floor = bk.Part("floor", bk.Contact(bk.HalfPlane(point=(0.0, 0.0))), sides=("bottom",))
+    floor = bk.Part("floor", bk.Contact(bk.RigidHalfPlane(point=(0.0, 0.0))), sides=("bottom",))
     oedometric = 1e4 * 0.8 / (1.2 * 0.6)
     left = bk.Part("left", bk.Roller(), sides=("left",))
     solution = bk.run(dataclasses.replace(block, parts=(floor, wall, pushed, left)))
     np.testing.assert_allclose(solution.contact.sigma_n, -1e-3 * oedometric, rtol=1e-10)
-    raised = bk.Part("floor", bk.Contact(bk.HalfPlane(point=(0.0, 1e-3))), sides=("bottom",))
+    raised = bk.Part("floor", bk.Contact(bk.RigidHalfPlane(point=(0.0, 1e-3))), sides=("bottom",))
     held = bk.Part("top", bk.Roller(), sides=("top",))
     squeezed = bk.run(dataclasses.replace(block, parts=(raised, wall, held, left)))
     np.testing.assert_allclose(squeezed.contact.sigma_n, -1e-3 * oedometric, rtol=1e-10)
@@ -108,7 +108,7 @@ def test_a_body_in_contact_all_round(discretisation: object) -> None:
         shape=bk.Disk(1.0),
         material=bk.Material(1e4, 0.3),
         law=bk.Coulomb(0.5),
-        parts=(bk.Part("all", bk.Contact(bk.Cavity((0.0, 0.0), 0.999))),),
+        parts=(bk.Part("all", bk.Contact(bk.RigidCavity((0.0, 0.0), 0.999))),),
         discretisation=discretisation,  # type: ignore[arg-type]
         mesh=bk.MeshOptions(60),
     )
@@ -156,7 +156,7 @@ def test_the_unit_of_stress_is_that_of_the_largest_overlap():
     """An overlap of 1e-3 of the body strains it by as much, a thousand times what a small load does; a gap does not."""
     plain = scene()
     for gap, expected in ((-1e-3, 1e-3), (1e-3, 1e-5)):
-        floor = bk.Part("floor", bk.Contact(bk.HalfPlane(point=(0.0, -gap))), sides=("bottom",))
+        floor = bk.Part("floor", bk.Contact(bk.RigidHalfPlane(point=(0.0, -gap))), sides=("bottom",))
         load = bk.Part("top", bk.Traction(y=-1e-5 * plain.material.plane_modulus), sides=("top",))
         loaded = dataclasses.replace(plain, parts=(floor, load))
         mesh = loaded.build_mesh()

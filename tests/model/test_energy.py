@@ -19,7 +19,7 @@ def thin_ring(inner_radius: float, elements: int, *parts: bk.Part, **options: ob
     return bk.Scene(title="ring", shape=shape, mesh=bk.MeshOptions(elements), parts=parts, **settings)  # type: ignore[arg-type]
 
 
-FLOOR = bk.Part("floor", bk.Contact(bk.HalfPlane((0.0, -1.0))), sides=("outer-3", "outer-4"))
+FLOOR = bk.Part("floor", bk.Contact(bk.RigidHalfPlane((0.0, -1.0))), sides=("outer-3", "outer-4"))
 LOAD = bk.Part("load", bk.Traction(y=-1.0), sides=("outer-1", "outer-2"))
 
 
@@ -114,7 +114,7 @@ def test_round_off_of_a_body_that_only_moves_is_no_negative_energy() -> None:
     assert negative_share(1e10 * astray, force, motions, sensitivity) > 0.1
 
 
-SLOPE = bk.HalfPlane((-2.0612446580203554, -0.01907209024256276), (0.9142617547626685, -0.4051239856862175))
+SLOPE = bk.RigidHalfPlane((-2.0612446580203554, -0.01907209024256276), (0.9142617547626685, -0.4051239856862175))
 HINGED = bk.Scene(
     title="ring on one element that is held",
     shape=bk.Ring(1.1116006796304891, 1.9659005601975807),
@@ -137,7 +137,9 @@ SHIFTED = bk.Scene(
     symmetry=bk.Symmetry(x=0.0),
     law=bk.Coulomb(0.5),
     parts=(
-        bk.Part("contact", bk.Contact(bk.Cavity((0.0, 2.2e-05), 0.006326395362193901)), sides=("outer-3", "outer-4")),
+        bk.Part(
+            "contact", bk.Contact(bk.RigidCavity((0.0, 2.2e-05), 0.006326395362193901)), sides=("outer-3", "outer-4")
+        ),
         bk.Part("top", bk.PrescribedDisplacement(y=-1.003295097364806e-07), sides=("outer-1", "outer-2")),
     ),
     discretisation=bk.ConstantCollocation(),

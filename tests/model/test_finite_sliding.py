@@ -19,8 +19,8 @@ BLOCK = bk.Body(
 SLIDES = "contact 'block.top / .*': the sides move by .* along each other, and contact forces displace by"
 
 
-def square(bottom: float) -> bk.PolygonalObstacle:
-    return bk.PolygonalObstacle(((-0.8, bottom), (0.8, bottom), (0.8, 1.0), (-0.8, 1.0)))
+def square(bottom: float) -> bk.RigidPolygon:
+    return bk.RigidPolygon(((-0.8, bottom), (0.8, bottom), (0.8, 1.0), (-0.8, 1.0)))
 
 
 def pressed(obstacle: bk.Obstacle, law: bk.FrictionLaw, **motion: float) -> bk.Assembly:
@@ -73,16 +73,16 @@ def test_a_punch_that_slides_until_its_side_meets_a_node_is_refused() -> None:
 
 @pytest.mark.parametrize("drag", [0.0, 1e-3])
 def test_a_rigid_cylinder_may_move_by_a_share_of_its_contact(drag: float) -> None:
-    assert bk.run(pressed(bk.Circle((0.0, 1.0), 1.0), bk.Frictionless(), x=drag, y=-1e-3)).is_converged
+    assert bk.run(pressed(bk.RigidCircle((0.0, 1.0), 1.0), bk.Frictionless(), x=drag, y=-1e-3)).is_converged
 
 
-@pytest.mark.parametrize("obstacle", [bk.Circle((0.0, 1.0), 1.0), square(0.0)])
+@pytest.mark.parametrize("obstacle", [bk.RigidCircle((0.0, 1.0), 1.0), square(0.0)])
 def test_a_rigid_body_moves_by_more_than_its_contact(obstacle: bk.Obstacle) -> None:
     refused(pressed(obstacle, bk.Frictionless(), x=0.1, y=-1e-3))
 
 
 def test_a_rigid_plane_moves_along_itself_without_limit_and_drags_by_friction() -> None:
-    plane = bk.HalfPlane((0.0, 0.0), (0.0, -1.0))
+    plane = bk.RigidHalfPlane((0.0, 0.0), (0.0, -1.0))
     solution = bk.run(pressed(plane, bk.Coulomb(0.3), x=0.5, y=-1e-3))
     assert solution.is_converged, solution.message
     punch = solution.rigid["punch"]
@@ -103,10 +103,10 @@ def test_two_bodies_are_dragged_by_more_than_their_contact() -> None:
 def test_the_rule_does_not_depend_on_units_and_position() -> None:
     """The same cylinder in millimetres and MPa, a hundred radii away."""
     for drag, status in ((1e-3, bk.Status.CONVERGED), (0.1, bk.Status.FINITE_SLIDING)):
-        near = pressed(bk.Circle((0.0, 1.0), 1.0), bk.Frictionless(), x=drag, y=-1e-3)
+        near = pressed(bk.RigidCircle((0.0, 1.0), 1.0), bk.Frictionless(), x=drag, y=-1e-3)
         block = replace(BLOCK, shape=bk.Rectangle(4e3, 1.5e3, (98e3, -1.5e3)), material=bk.Material(1e-6, 0.3))
         far_away = bk.RigidBody(
-            name="punch", obstacle=bk.Circle((1e5, 1e3), 1e3), centre=(1e5, 0.0), x=1e3 * drag, y=-1.0
+            name="punch", obstacle=bk.RigidCircle((1e5, 1e3), 1e3), centre=(1e5, 0.0), x=1e3 * drag, y=-1.0
         )
         assert bk.run(near).status is bk.run(replace(near, bodies=(block,), rigid=(far_away,))).status is status
 

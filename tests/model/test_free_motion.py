@@ -24,7 +24,7 @@ def complaint(scene: bk.Scene) -> str:
     return str(caught.value)
 
 
-def floating(load: bk.Traction, floor: bk.HalfPlane, side: str, opposite: str) -> bk.Scene:
+def floating(load: bk.Traction, floor: bk.RigidHalfPlane, side: str, opposite: str) -> bk.Scene:
     return bk.Scene(
         title="floating",
         shape=bk.Rectangle(2.0, 2.0),
@@ -50,12 +50,12 @@ def test_a_lifted_body(law: bk.FrictionLaw) -> None:
 @pytest.mark.parametrize(
     ("load", "floor", "side", "opposite", "words"),
     [
-        (bk.Traction(y=-5.0), bk.HalfPlane((0.0, 2.0), (0.0, -1.0)), "top", "bottom", "downward with 10"),
-        (bk.Traction(x=-5.0), bk.HalfPlane((2.0, 0.0), (-1.0, 0.0)), "right", "left", "to the left with 10"),
-        (bk.Traction(x=5.0), bk.HalfPlane((0.0, 0.0), (1.0, 0.0)), "left", "right", "to the right with 10"),
+        (bk.Traction(y=-5.0), bk.RigidHalfPlane((0.0, 2.0), (0.0, -1.0)), "top", "bottom", "downward with 10"),
+        (bk.Traction(x=-5.0), bk.RigidHalfPlane((2.0, 0.0), (-1.0, 0.0)), "right", "left", "to the left with 10"),
+        (bk.Traction(x=5.0), bk.RigidHalfPlane((0.0, 0.0), (1.0, 0.0)), "left", "right", "to the right with 10"),
     ],
 )
-def test_directions(load: bk.Traction, floor: bk.HalfPlane, side: str, opposite: str, words: str) -> None:
+def test_directions(load: bk.Traction, floor: bk.RigidHalfPlane, side: str, opposite: str, words: str) -> None:
     assert f"the load pushes the body {words}; nothing holds it" in complaint(floating(load, floor, side, opposite))
 
 
@@ -77,7 +77,7 @@ def test_a_tipping_body(push: float, pivot: str, sense: str, moment: float) -> N
 
 def test_forces_do_not_depend_on_the_size_of_the_body_or_its_stiffness() -> None:
     for factor in (1e-6, 1e6):
-        scene = floating(bk.Traction(y=1.0), bk.HalfPlane(), "bottom", "top")
+        scene = floating(bk.Traction(y=1.0), bk.RigidHalfPlane(), "bottom", "top")
         scene = dataclasses.replace(scene, shape=bk.Rectangle(2.0 * factor, 2.0 * factor))
         assert f"upward with {2.0 * factor:.4g}" in complaint(scene)
 
@@ -90,7 +90,7 @@ def test_a_free_disc_finds_its_rest_on_friction_alone() -> None:
         material=bk.Material(1.0, 0.3),
         law=bk.Coulomb(0.3),
         parts=(
-            bk.Part("floor", bk.Contact(bk.HalfPlane()), sides=("arc-3", "arc-4")),
+            bk.Part("floor", bk.Contact(bk.RigidHalfPlane()), sides=("arc-3", "arc-4")),
             bk.Part("load", bk.Traction(y=-0.01), sides=("arc-1", "arc-2"), where=bk.Expression("y > 1.9")),
         ),
         mesh=bk.MeshOptions(elements=160),
@@ -128,7 +128,7 @@ def column(push: float, law: bk.FrictionLaw, obstacle: bk.Obstacle) -> bk.Scene:
 def test_a_column_on_a_round_obstacle_stands_or_has_a_named_escape(push: float, law: bk.FrictionLaw, x: float) -> None:
     text = ""
     try:
-        bk.run(column(push, law, bk.Circle((x, -0.4), 0.4)))
+        bk.run(column(push, law, bk.RigidCircle((x, -0.4), 0.4)))
     except UnsolvableSceneError as error:
         text = str(error)
     assert re.match(r"the load (turns|pushes|slides) the body .* with \S+|$", text)
@@ -137,7 +137,7 @@ def test_a_column_on_a_round_obstacle_stands_or_has_a_named_escape(push: float, 
 @pytest.mark.parametrize("node", [0, 3])
 def test_a_body_that_turns_about_the_only_node_that_touches_does_not_slide(node: int) -> None:
     """It neither lifts nor moves there, so that the motion along the obstacle is none."""
-    scene = column(0.001, bk.Coulomb(0.3), bk.HalfPlane())
+    scene = column(0.001, bk.Coulomb(0.3), bk.RigidHalfPlane())
     model = build_model(prepare(scene, scene.build_mesh()))
     arms = model.prepared.contact_nodes.points - model.prepared.contact_nodes.points[node]
     turn = np.stack([-arms[:, 1], arms[:, 0]], axis=1)

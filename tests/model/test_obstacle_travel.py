@@ -9,8 +9,8 @@ import bemkit as bk
 from bemkit.model.obstacle_travel import shift_between
 
 FRICTION = 0.3
-PRESSED = bk.Circle((0.0, 0.999), 1.0)
-TABLE = bk.PolygonalObstacle(((-3.0, 0.0), (3.0, 0.0), (3.0, 1.0), (-3.0, 1.0)))
+PRESSED = bk.RigidCircle((0.0, 0.999), 1.0)
+TABLE = bk.RigidPolygon(((-3.0, 0.0), (3.0, 0.0), (3.0, 1.0), (-3.0, 1.0)))
 
 
 def pressed(*obstacles: bk.Obstacle, law: bk.FrictionLaw | None = None) -> bk.Scene:
@@ -38,7 +38,7 @@ def forces(solution: bk.Solution) -> tuple[float, float]:
 
 @pytest.mark.parametrize("way", [1.0, -1.0])
 def test_a_circle_that_moves_along_a_block_drags_it(way: float) -> None:
-    moved = [bk.Circle((way * 1e-3 * k, 0.999), 1.0) for k in (1, 2, 4)]
+    moved = [bk.RigidCircle((way * 1e-3 * k, 0.999), 1.0) for k in (1, 2, 4)]
     solution = bk.run(pressed(PRESSED, *moved))
     assert solution.is_converged, solution.message
     normal, tangential = forces(solution)
@@ -49,7 +49,7 @@ def test_a_circle_that_moves_along_a_block_drags_it(way: float) -> None:
 
 
 def test_a_plane_that_moves_along_itself_drags_as_a_rigid_body_does() -> None:
-    planes = [bk.HalfPlane((x, -1e-3), (0.0, -1.0)) for x in (0.0, 4e-4, 1.0)]
+    planes = [bk.RigidHalfPlane((x, -1e-3), (0.0, -1.0)) for x in (0.0, 4e-4, 1.0)]
     solution = bk.run(pressed(*planes))
     assert solution.is_converged, solution.message
     normal, tangential = forces(solution)
@@ -57,16 +57,16 @@ def test_a_plane_that_moves_along_itself_drags_as_a_rigid_body_does() -> None:
 
 
 def test_obstacles_are_shifted_or_have_no_known_way() -> None:
-    moved = bk.PolygonalObstacle(tuple((x + 0.5, y - 0.1) for x, y in TABLE.vertices))
+    moved = bk.RigidPolygon(tuple((x + 0.5, y - 0.1) for x, y in TABLE.vertices))
     np.testing.assert_allclose(shift_between(TABLE, moved), (0.5, -0.1), rtol=1e-12)
-    assert shift_between(TABLE, bk.HalfPlane()) is None
-    assert shift_between(bk.HalfPlane(), bk.HalfPlane(normal=(0.1, 1.0))) is None
+    assert shift_between(TABLE, bk.RigidHalfPlane()) is None
+    assert shift_between(bk.RigidHalfPlane(), bk.RigidHalfPlane(normal=(0.1, 1.0))) is None
     np.testing.assert_array_equal(shift_between(bk.Gap(0.0), bk.Gap(0.1)), (0.0, 0.0))
 
 
 def test_friction_cannot_follow_an_obstacle_that_turns() -> None:
-    tilted = bk.HalfPlane((0.0, -1e-3), (1e-3, -1.0))
-    flat = bk.HalfPlane((0.0, -1e-3), (0.0, -1.0))
+    tilted = bk.RigidHalfPlane((0.0, -1e-3), (1e-3, -1.0))
+    flat = bk.RigidHalfPlane((0.0, -1e-3), (0.0, -1.0))
     with pytest.raises(bk.InputError, match="contact 'top': its obstacle turns or changes its shape between two steps"):
         bk.run(pressed(flat, tilted))
     assert bk.run(pressed(flat, tilted, law=bk.Frictionless())).is_converged

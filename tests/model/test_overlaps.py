@@ -50,12 +50,12 @@ def test_a_rigid_body_inside_of_a_body_beside_their_contact_is_refused() -> None
         mesh=bk.MeshOptions(elements=40),
     )
     vertices = ((1.5, 1.0), (2.5, 1.0), (2.5, 0.6), (1.9, 0.6))
-    punch = bk.RigidBody(name="punch", obstacle=bk.PolygonalObstacle(vertices), centre=(2.0, 1.0), y=-1e-3)
+    punch = bk.RigidBody(name="punch", obstacle=bk.RigidPolygon(vertices), centre=(2.0, 1.0), y=-1e-3)
     scene = bk.Assembly(
         title="punch", bodies=(block,), rigid=(punch,), contacts=(bk.ContactPair(("block.left", "punch")),),
         law=bk.Frictionless(), discretisation=bk.Galerkin(1),
     )  # fmt: skip
     with pytest.raises(OverlapError, match="bodies 'block' and 'punch' overlap by"):
         bk.run(scene)
-    away = replace(punch, obstacle=bk.PolygonalObstacle(tuple((x + 2.0, y) for x, y in vertices)))
+    away = replace(punch, obstacle=bk.RigidPolygon(tuple((x + 2.0, y) for x, y in vertices)))
     assert bk.run(replace(scene, rigid=(away,))).is_converged

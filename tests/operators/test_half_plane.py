@@ -5,7 +5,7 @@ import pytest
 from mpmath import log, mpf, workdps
 
 from bemkit.geometry.mesh import BoundaryMesh
-from bemkit.geometry.shapes import HalfPlaneBody
+from bemkit.geometry.shapes import ElasticHalfPlane
 from bemkit.geometry.surface import Surface
 from bemkit.operators.half_plane.elasticity import HalfPlaneElasticity
 from bemkit.operators.half_plane.flexibility import mean_logarithms
@@ -112,12 +112,12 @@ def test_the_condensed_map_is_the_inverse_of_the_flexibility() -> None:
 
 
 def test_a_strip_has_open_ends_and_the_body_below() -> None:
-    mesh = BoundaryMesh(*_of(HalfPlaneBody(-1.0, 3.0)), is_exterior=True, surface=Surface())
+    mesh = BoundaryMesh(*_of(ElasticHalfPlane(-1.0, 3.0)), is_exterior=True, surface=Surface())
     np.testing.assert_array_equal(mesh.normals, [[0.0, 1.0]] * 2)
     assert mesh.area == np.inf
     assert mesh.diameter == 4.0
 
 
-def _of(shape: HalfPlaneBody) -> tuple[np.ndarray, np.ndarray]:
+def _of(shape: ElasticHalfPlane) -> tuple[np.ndarray, np.ndarray]:
     curve = shape.outline().sides[0].curve
     return curve.point(np.array([0.0, 0.5, 1.0])), np.array([[0, 1], [1, 2]])

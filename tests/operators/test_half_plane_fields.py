@@ -107,7 +107,7 @@ def test_the_fields_of_a_solved_scene_join_its_surface() -> None:
     far = bk.FarField(x=0.02, force_y=0.05, moment=0.002)
     scene = bk.Scene(
         title="strip",
-        shape=bk.HalfPlaneBody(-1.0, 1.0),
+        shape=bk.ElasticHalfPlane(-1.0, 1.0),
         material=MATERIAL,
         law=bk.Coulomb(0.3),
         parts=(bk.Part("zone", bk.Contact(bk.Gap(bk.Expression("0.1 * x**2")))),),

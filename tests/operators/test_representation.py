@@ -330,7 +330,7 @@ def test_fields_inside_a_solved_scene(discretisation: bk.scene.Discretisation) -
         material=Material(100.0, 0.0),
         law=bk.Frictionless(),
         parts=(
-            bk.Part("foundation", bk.Contact(bk.HalfPlane()), sides=("bottom",)),
+            bk.Part("foundation", bk.Contact(bk.RigidHalfPlane()), sides=("bottom",)),
             bk.Part("wall", bk.Roller(), sides=("left",)),
             bk.Part("load", bk.Pressure(3.0), sides=("top",)),
         ),

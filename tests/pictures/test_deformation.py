@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.quiver import Quiver
 
 import bemkit as bk
-from bemkit.geometry.shapes import HalfPlaneBody
+from bemkit.geometry.shapes import ElasticHalfPlane
 from bemkit.geometry.spaces import dof_points
 from bemkit.pictures import draw_deformation, draw_scene, draw_zoom, figures
 from bemkit.pictures.contact_map import is_short
@@ -45,7 +45,7 @@ def ring(interference: float) -> bk.Scene:
         title="ring on a mandrel",
         shape=bk.Ring(1.0, 2.0),
         material=STEEL,
-        parts=(bk.Part("hole", bk.Contact(bk.Circle((0.0, 0.0), 1.0 + interference)), INNER),),
+        parts=(bk.Part("hole", bk.Contact(bk.RigidCircle((0.0, 0.0), 1.0 + interference)), INNER),),
         law=bk.Coulomb(0.3),
         mesh=bk.MeshOptions(elements=48),
         discretisation=bk.Galerkin(2),
@@ -53,9 +53,9 @@ def ring(interference: float) -> bk.Scene:
 
 
 SCENES = {
-    "wedge": pressed(bk.PolygonalObstacle(((1.0, 0.97), (2.2, 1.37), (-0.2, 1.37)))),
-    "rounded punch": pressed(bk.Circle((1.0, 3.999), 3.0)),
-    "deep punch": pressed(bk.Circle((1.0, 3.95), 3.0)),
+    "wedge": pressed(bk.RigidPolygon(((1.0, 0.97), (2.2, 1.37), (-0.2, 1.37)))),
+    "rounded punch": pressed(bk.RigidCircle((1.0, 3.999), 3.0)),
+    "deep punch": pressed(bk.RigidCircle((1.0, 3.95), 3.0)),
     "thin ring": ring(1e-4),
     "ring": ring(0.02),
     "disc": with_overrides(load_scene("disc-between-plates"), elements=60),
@@ -134,7 +134,7 @@ def test_loads_are_arrows_with_their_heads_on_the_boundary_where_they_press() ->
         bk.Part("left", bk.Traction(x=2.0), ("left",)),
         bk.Part("right", bk.Pressure(bk.Expression("-1 * y")), ("right",)),
     )
-    axes = draw_scene(pressed(bk.HalfPlane((0.0, 1.5), (0.0, -1.0)), *parts))
+    axes = draw_scene(pressed(bk.RigidHalfPlane((0.0, 1.5), (0.0, -1.0)), *parts))
     push, pull = (each for each in axes.collections if isinstance(each, Quiver))
     np.testing.assert_allclose(push.X + push.U, 0.0, atol=1e-12)
     np.testing.assert_allclose(pull.X, 2.0, atol=1e-12)
@@ -149,7 +149,7 @@ def test_supports_have_their_symbols_outside_of_the_body() -> None:
         bk.Part("left", bk.Roller(), ("left",)),
         bk.Part("right", bk.PrescribedDisplacement(x=0.0, y=-0.1), ("right",)),
     )
-    axes = draw_scene(pressed(bk.HalfPlane((0.0, 1.5), (0.0, -1.0)), *parts))
+    axes = draw_scene(pressed(bk.RigidHalfPlane((0.0, 1.5), (0.0, -1.0)), *parts))
     legend = [text.get_text() for text in axes.get_legend().get_texts()]
     assert legend == ["clamped", "roller", "given displacement", "obstacle"]
     circles = next(each for each in axes.collections if type(each).__name__ == "EllipseCollection")
@@ -186,7 +186,7 @@ def test_bodies_without_an_end_fill_the_frame() -> None:
 def test_a_half_plane_is_filled_below_its_surface() -> None:
     scene = bk.Scene(
         title="half-plane",
-        shape=HalfPlaneBody(-0.08, 0.08),
+        shape=ElasticHalfPlane(-0.08, 0.08),
         material=STEEL,
         parts=(bk.Part("zone", bk.Contact(bk.Gap(bk.Expression("x**2 / 2")))),),
         far=FarField(force_y=1e-3, x=0.0, turn=0.0),

@@ -19,12 +19,12 @@ from bemkit.results.part_forces import RigidResult
 FRAME = np.array([[-3.0, 3.0], [-2.0, 2.0]])
 ROUND = tuple((float(np.cos(angle)), float(np.sin(angle))) for angle in np.linspace(0.0, 2.0 * np.pi, 64)[:-1])
 OUTLINES = [
-    (bk.HalfPlane((0.0, -0.5), (0.1, 1.0)), 1e-12),
-    (bk.Circle((0.2, 0.3), 1.0), 1e-12),
-    (bk.Cavity((0.2, 0.3), 1.5), 1e-12),
-    (bk.PolygonalObstacle(((0.0, 0.0), (1.0, 0.0), (0.0, 1.0))), 1e-12),
-    (bk.SplineObstacle(ROUND), 1e-12),
-    (bk.SplineObstacle(((2.0, 0.0), (1.0, 0.3), (-1.0, 0.3), (-2.0, 0.0)), is_closed=False), 1e-12),
+    (bk.RigidHalfPlane((0.0, -0.5), (0.1, 1.0)), 1e-12),
+    (bk.RigidCircle((0.2, 0.3), 1.0), 1e-12),
+    (bk.RigidCavity((0.2, 0.3), 1.5), 1e-12),
+    (bk.RigidPolygon(((0.0, 0.0), (1.0, 0.0), (0.0, 1.0))), 1e-12),
+    (bk.RigidSpline(ROUND), 1e-12),
+    (bk.RigidSpline(((2.0, 0.0), (1.0, 0.3), (-1.0, 0.3), (-2.0, 0.0)), is_closed=False), 1e-12),
     (bk.SignedDistance(bk.Expression("x**2 / 4 + y**2 - 1")), 1e-3),  # found on a grid
 ]
 """With the accuracy of their outlines."""
@@ -48,7 +48,7 @@ def block(obstacle: bk.Obstacle) -> bk.Scene:
 
 def with_rigid(body: bk.RigidBody, result: RigidResult) -> Shown:
     """A picture of a block and a rigid body."""
-    return replace(shown(block(bk.HalfPlane())), rigid=((body, result),))
+    return replace(shown(block(bk.RigidHalfPlane())), rigid=((body, result),))
 
 
 @pytest.mark.parametrize(("obstacle", "accuracy"), OUTLINES)
@@ -105,13 +105,13 @@ def is_filled(patch: Patch, points: np.ndarray) -> np.ndarray:
 
 def test_a_clockwise_spline_fills_its_outside() -> None:
     axes = Figure().add_subplot()
-    draw_obstacles(axes, shown(block(bk.SplineObstacle(ROUND[::-1]))))
+    draw_obstacles(axes, shown(block(bk.RigidSpline(ROUND[::-1]))))
     np.testing.assert_array_equal(is_filled(axes.patches[0], np.array([[0.2, 0.3], [0.0, 1.2]])), [False, True])
 
 
 def test_a_rigid_body_that_is_a_cavity_fills_its_outside_where_it_has_moved_to() -> None:
     axes = Figure().add_subplot()
-    body = bk.RigidBody(name="bearing", obstacle=bk.Cavity((0.5, 0.5), 2.0))
+    body = bk.RigidBody(name="bearing", obstacle=bk.RigidCavity((0.5, 0.5), 2.0))
     draw_rigid_bodies(axes, with_rigid(body, RigidResult("bearing", 0.0, 0.0, 0.0, 0.1, 0.0, 0.0)), 10.0)
     filled = is_filled(axes.patches[1], np.array([[-1.0, 0.5], [3.0, 0.5], [3.7, 0.5]]))
     np.testing.assert_array_equal(filled, [True, False, True])
@@ -121,20 +121,20 @@ def test_rigid_bodies_are_drawn_before_and_after_and_widen_the_frame() -> None:
     axes = Figure().add_subplot()
     axes.set_xlim(0.0, 1.0)
     axes.set_ylim(0.0, 1.0)
-    body = bk.RigidBody(name="disc", obstacle=bk.Circle((0.5, 1.2), 0.2), centre=(0.5, 1.2))
+    body = bk.RigidBody(name="disc", obstacle=bk.RigidCircle((0.5, 1.2), 0.2), centre=(0.5, 1.2))
     result = RigidResult("disc", 0.0, 0.0, 0.0, 0.01, -0.02, 0.0)
     draw_rigid_bodies(axes, with_rigid(body, result), 10.0)
     before, after = (patch.get_path().vertices for patch in axes.patches)
     np.testing.assert_allclose(after - before, np.broadcast_to([0.1, -0.2], after.shape), atol=1e-12)
     assert axes.get_xlim() == (0.0, 1.0)
     assert axes.get_ylim() == pytest.approx((0.0, 1.4), rel=1e-3)
-    draw_rigid_bodies(axes, with_rigid(replace(body, obstacle=bk.HalfPlane((0.0, 3.0))), result), 10.0)
+    draw_rigid_bodies(axes, with_rigid(replace(body, obstacle=bk.RigidHalfPlane((0.0, 3.0))), result), 10.0)
     assert axes.get_ylim() == pytest.approx((0.0, 1.4), rel=1e-3)
 
 
 def test_a_turn_is_drawn_about_the_centre() -> None:
     axes = Figure().add_subplot()
-    body = bk.RigidBody(name="bar", obstacle=bk.PolygonalObstacle(((0.0, 0.0), (2.0, 0.0), (2.0, 0.1))))
+    body = bk.RigidBody(name="bar", obstacle=bk.RigidPolygon(((0.0, 0.0), (2.0, 0.0), (2.0, 0.1))))
     draw_rigid_bodies(axes, with_rigid(body, RigidResult("bar", 0.0, 0.0, 0.0, 0.0, 0.0, 0.01)), 5.0)
     np.testing.assert_allclose(axes.patches[1].get_path().vertices[1], [2.0, 0.1], atol=1e-12)
 
@@ -142,9 +142,9 @@ def test_a_turn_is_drawn_about_the_centre() -> None:
 @pytest.mark.parametrize(
     "obstacle",
     [
-        bk.SplineObstacle(tuple((0.5 + x, y - 1.0) for x, y in ROUND)),
+        bk.RigidSpline(tuple((0.5 + x, y - 1.0) for x, y in ROUND)),
         bk.SignedDistance(bk.Expression("hypot(x - 0.5, y + 1) - 1")),
-        bk.PolygonalObstacle(tuple((0.5 + x, y - 1.0) for x, y in ROUND)),
+        bk.RigidPolygon(tuple((0.5 + x, y - 1.0) for x, y in ROUND)),
     ],
 )
 def test_scenes_of_one_body_take_and_draw_them(obstacle: bk.Obstacle) -> None:
@@ -153,7 +153,9 @@ def test_scenes_of_one_body_take_and_draw_them(obstacle: bk.Obstacle) -> None:
     solution = bk.run(block(obstacle))
     assert solution.is_converged
     # 63 corners reach within 1.2e-3 of the circle, an eighth of the motion
-    accuracy = 0.2 if isinstance(obstacle, bk.PolygonalObstacle) else 1e-4
-    assert solution.force_normal == pytest.approx(bk.run(block(bk.Circle((0.5, -1.0), 1.0))).force_normal, rel=accuracy)
+    accuracy = 0.2 if isinstance(obstacle, bk.RigidPolygon) else 1e-4
+    assert solution.force_normal == pytest.approx(
+        bk.run(block(bk.RigidCircle((0.5, -1.0), 1.0))).force_normal, rel=accuracy
+    )
     axes = draw_deformation(solution)
     assert "obstacle" in [text.get_text() for text in axes.get_legend().get_texts()]

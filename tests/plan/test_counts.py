@@ -14,7 +14,7 @@ from bemkit.plan import make_plan
 from bemkit.results.result_file import read_result, write_result
 from bemkit.scene.toml import load_scene, with_overrides
 
-LAW_OF_ITS_OWN = bk.Contact(bk.HalfPlane((1.0, 0.0), (-1.0, 0.0)), law=bk.Frictionless())
+LAW_OF_ITS_OWN = bk.Contact(bk.RigidHalfPlane((1.0, 0.0), (-1.0, 0.0)), law=bk.Frictionless())
 
 
 def paper(word: str = "constant", **changes: object) -> bk.Scene:
@@ -28,7 +28,10 @@ def with_part(scene: bk.Scene, name: str, condition: object) -> bk.Scene:
 
 def block(word: str, poisson_ratio: float = 0.3, symmetry: bk.Symmetry | None = None) -> bk.Scene:
     """A block between a frictional floor and an even load, alike left and right of x = 1."""
-    parts = (bk.Part("floor", bk.Contact(bk.HalfPlane()), ("bottom",)), bk.Part("load", bk.Pressure(1.0), ("top",)))
+    parts = (
+        bk.Part("floor", bk.Contact(bk.RigidHalfPlane()), ("bottom",)),
+        bk.Part("load", bk.Pressure(1.0), ("top",)),
+    )
     scene = bk.Scene(
         title="block",
         shape=bk.Rectangle(2.0, 1.0),

@@ -164,7 +164,7 @@ def test_a_ratio_of_meshes_below_two_is_refused() -> None:
 def test_a_body_of_many_sides_takes_no_mesh_that_is_too_coarse_for_it(monkeypatch: pytest.MonkeyPatch) -> None:
     """A plate with 40 holes in place of one with 1000, whose 2004 sides are more than 20000 elements divided by 16."""
     parts = (
-        bk.Part("floor", bk.Contact(bk.HalfPlane((0.0, -1.0), (0.0, 1.0))), sides=("bottom",)),
+        bk.Part("floor", bk.Contact(bk.RigidHalfPlane((0.0, -1.0), (0.0, 1.0))), sides=("bottom",)),
         bk.Part("press", bk.Pressure(0.1), sides=("top",)),
     )
     scene = scene_of(900, shape=Perforated(8, 5), parts=parts, linear_solver=bk.Hierarchical())

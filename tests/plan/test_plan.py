@@ -13,7 +13,7 @@ import bemkit as bk
 import bemkit.plan.plan
 from bemkit.cli.main import main
 from bemkit.contact.laws import Frictionless
-from bemkit.contact.obstacle import HalfPlane
+from bemkit.contact.obstacle import RigidHalfPlane
 from bemkit.geometry.shapes import Disk, Rectangle
 from bemkit.operators.material import Material
 from bemkit.operators.steklov_poincare.needs import physical_memory
@@ -38,7 +38,7 @@ def reasons(scene: Scene) -> dict[str, str]:
 
 
 def block(*conditions: tuple[str, Condition]) -> Scene:
-    parts = [Part("foundation", Contact(HalfPlane()), ("bottom",))]
+    parts = [Part("foundation", Contact(RigidHalfPlane()), ("bottom",))]
     parts += [Part(side, condition, (side,)) for side, condition in conditions]
     return Scene(
         title="t", shape=Rectangle(2.0, 1.0), material=Material(1.0, 0.3), parts=tuple(parts), mesh=MeshOptions(24)
@@ -69,7 +69,7 @@ def test_numbers_and_verbs_agree() -> None:
 
 def test_a_disc_on_rollers_all_round_may_still_turn() -> None:
     arcs = ("arc-1", "arc-2", "arc-3")
-    parts = (Part("floor", Contact(HalfPlane()), ("arc-4",)), Part("ring", Roller(), arcs))
+    parts = (Part("floor", Contact(RigidHalfPlane()), ("arc-4",)), Part("ring", Roller(), arcs))
     scene = Scene(title="t", shape=Disk(1.0), material=Material(1.0, 0.3), parts=parts, mesh=MeshOptions(64))
     assert plan_of(scene).sizes.n_free_motions == 1
     assert needed(scene)["quadrature on curved elements"]

@@ -172,7 +172,7 @@ def test_an_obstacle_that_moves_is_measured_where_it_is() -> None:
         parts=(bk.Part("base", bk.Clamped(), ("bottom",)),),
         mesh=bk.MeshOptions(elements=60),
     )
-    disc = bk.RigidBody(name="disc", obstacle=bk.Circle((1.0, 2.0), 1.0), centre=(1.0, 2.0), x=0.0, turn=0.0)
+    disc = bk.RigidBody(name="disc", obstacle=bk.RigidCircle((1.0, 2.0), 1.0), centre=(1.0, 2.0), x=0.0, turn=0.0)
     pair = bk.ContactPair(("block.top", "disc"))
     pressed = bk.Assembly(
         title="x", bodies=(block,), rigid=(replace(disc, y=-0.01),), contacts=(pair,), discretisation=bk.Galerkin(2)
@@ -228,7 +228,7 @@ def test_bodies_that_only_touch_between_their_nodes_are_warned_of() -> None:
 
 
 def test_one_body_that_touches_between_its_nodes_is_not_converged() -> None:
-    floor = bk.Part("floor", bk.Contact(bk.HalfPlane()), ("arc-3", "arc-4"))
+    floor = bk.Part("floor", bk.Contact(bk.RigidHalfPlane()), ("arc-3", "arc-4"))
     press = bk.Part("press", bk.PrescribedDisplacement(0.0, -5e-4), ("arc-1", "arc-2"))
     scene = bk.Scene(
         title="x",

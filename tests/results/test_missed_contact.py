@@ -29,7 +29,7 @@ def roll(approach: float, degrees: float, discretisation: Any, mesh: bk.MeshOpti
         material=STEEL,
         parts=(
             bk.Part("load", bk.PrescribedDisplacement(*shift.tolist()), ("start", "end")),
-            bk.Part("tip", bk.Contact(bk.HalfPlane(tuple(-normal), tuple(normal))), ("arc",), where),
+            bk.Part("tip", bk.Contact(bk.RigidHalfPlane(tuple(-normal), tuple(normal))), ("arc",), where),
         ),
         law=bk.Frictionless(),
         discretisation=discretisation,
@@ -95,7 +95,7 @@ def test_a_rigid_body_that_meets_no_node_ends_by_name(approach: float) -> None:
         parts=(bk.Part("base", bk.Clamped(), ("bottom",)),),
         mesh=bk.MeshOptions(elements=26),
     )
-    ball = bk.RigidBody(name="ball", obstacle=bk.Circle((0.013, 1.0), 1.0), centre=(0.013, 1.0), y=-approach)
+    ball = bk.RigidBody(name="ball", obstacle=bk.RigidCircle((0.013, 1.0), 1.0), centre=(0.013, 1.0), y=-approach)
     contact = bk.ContactPair(("block.top", "ball"))
     solution = bk.run(
         bk.Assembly(
@@ -183,7 +183,7 @@ def test_an_overlap_beside_a_contact_zone_belongs_to_its_end() -> None:
 
 def test_places_that_move_after_a_missed_contact_take_one_mesh_more() -> None:
     """The first mesh in layers only finds the zone; the fifth one has its ends, and a sixth one the accuracy."""
-    plane = bk.HalfPlane((-0.3420201433256687, -0.9396926207859084), (0.3420201433256687, 0.9396926207859084))
+    plane = bk.RigidHalfPlane((-0.3420201433256687, -0.9396926207859084), (0.3420201433256687, 0.9396926207859084))
     scene = bk.Scene(
         title="half disc on a tilted plane",
         shape=bk.Sector(1.0, 180.0, 360.0),

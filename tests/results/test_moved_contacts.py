@@ -9,7 +9,7 @@ import pytest
 import bemkit as bk
 from bemkit.results.assembly_solution import AssemblySolution
 
-CYLINDER = bk.Circle((0.5, -1.0), 1.0)
+CYLINDER = bk.RigidCircle((0.5, -1.0), 1.0)
 
 
 def block(x: float, obstacle: bk.Obstacle = CYLINDER) -> bk.Scene:
@@ -43,7 +43,7 @@ def test_sliding_far_along_a_curved_obstacle_is_doubted() -> None:
     assert solution.force_normal > 1.2 * there.force_normal  # the doubt is right
 
 
-@pytest.mark.parametrize("scene", [block(0.01), block(0.1, bk.HalfPlane()), block(0.1, bk.Gap(0.0))])
+@pytest.mark.parametrize("scene", [block(0.01), block(0.1, bk.RigidHalfPlane()), block(0.1, bk.Gap(0.0))])
 def test_small_motions_and_straight_obstacles_are_not_doubted(scene: bk.Scene) -> None:
     assert not doubts(bk.run(scene))
 
@@ -71,8 +71,8 @@ def test_bodies_of_an_assembly_are_judged_where_they_are_placed() -> None:
 
 
 def test_a_part_that_does_not_face_its_obstacle_is_not_doubted() -> None:
-    floor = bk.Part("floor", bk.Contact(bk.HalfPlane()), ("bottom",))
-    side = bk.Part("side", bk.Contact(bk.HalfPlane((0.0, -1.0))), ("right",))
+    floor = bk.Part("floor", bk.Contact(bk.RigidHalfPlane()), ("bottom",))
+    side = bk.Part("side", bk.Contact(bk.RigidHalfPlane((0.0, -1.0))), ("right",))
     load = bk.Part("load", bk.Pressure(1e-3), ("top",))
     scene = replace(
         block(0.0), shape=bk.Rectangle(1.0, 1.0), parts=(floor, side, load), discretisation=bk.Galerkin(1),

@@ -26,7 +26,7 @@ def blocks(push: float, gap: float, *, in_contact: bool) -> bk.Assembly:
         parts=(bk.Part("base", bk.Clamped(), ("right",)),),
         mesh=mesh,
     )
-    floor = bk.RigidBody(name="floor", obstacle=bk.HalfPlane((0.0, 1.0), (0.0, -1.0)), centre=(0.0, 1.0))
+    floor = bk.RigidBody(name="floor", obstacle=bk.RigidHalfPlane((0.0, 1.0), (0.0, -1.0)), centre=(0.0, 1.0))
     contacts = (bk.ContactPair(("left.top", "floor")),)
     if in_contact:
         contacts += (bk.ContactPair(("left.right", "right.left")),)

@@ -24,7 +24,7 @@ BLOCK = bk.Scene(
     material=bk.Material(1.0, 0.3),
     law=bk.Coulomb(0.3),
     parts=(
-        bk.Part("floor", bk.Contact(bk.HalfPlane()), sides=("bottom",)),
+        bk.Part("floor", bk.Contact(bk.RigidHalfPlane()), sides=("bottom",)),
         bk.Part("top", bk.PrescribedDisplacement(x=2e-3, y=-1e-2), sides=("top",)),
     ),
     discretisation=bk.Galerkin(4),
@@ -81,7 +81,7 @@ def test_half_of_a_symmetric_block_has_one() -> None:
 
 def test_the_end_of_a_part_that_is_pressed_is_the_edge_of_a_punch() -> None:
     """The floor goes on, but the part ends inside of the side."""
-    part = bk.Part("floor", bk.Contact(bk.HalfPlane()), sides=("bottom",), where=lambda x, y: x < 0.5)
+    part = bk.Part("floor", bk.Contact(bk.RigidHalfPlane()), sides=("bottom",), where=lambda x, y: x < 0.5)
     found = exponents(with_part("floor", part, replace(BLOCK, law=bk.Frictionless())))
     assert found == [(0.5, 0.5)]
 

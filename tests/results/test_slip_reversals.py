@@ -59,7 +59,7 @@ def pushed(law: bk.FrictionLaw, accuracy: float) -> bk.Scene:
         material=bk.Material(1.0, 0.3),
         law=law,
         parts=(
-            bk.Part("floor", bk.Contact(bk.HalfPlane()), sides=("bottom",)),
+            bk.Part("floor", bk.Contact(bk.RigidHalfPlane()), sides=("bottom",)),
             bk.Part("top", bk.PrescribedDisplacement(x=2e-3, y=-1e-2), sides=("top",)),
         ),
         discretisation=bk.Galerkin(2),

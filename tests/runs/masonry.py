@@ -25,7 +25,7 @@ def wall(courses: int, per_course: int, *, push: bool, elements: int = 24) -> bk
     weight = bk.Gravity(1.0, (0.0, -1.0), is_constant=True)
     forces = (weight,) if push else (weight, bk.Gravity(1.0, (1.0, 0.0)))
     floor, pushed = (
-        bk.Part("floor", bk.Contact(bk.HalfPlane()), ("bottom",)),
+        bk.Part("floor", bk.Contact(bk.RigidHalfPlane()), ("bottom",)),
         bk.Part("push", bk.Pressure(1.0), ("left",)),
     )
     whole, half = bk.Rectangle(2.0, 1.0), bk.Rectangle(1.0, 1.0)

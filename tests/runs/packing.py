@@ -73,11 +73,11 @@ def packing(n: int, width: float, *, seed: int = 0, elements: int = 48) -> bk.As
         cap, free = _CAP * radius, []
         for x, y, _ in discs[discs[:, 2] == radius].tolist():
             walls = {
-                "floor": (y < radius + _NEAR, bk.HalfPlane(), f"y < {-cap}", f"y >= {-cap}"),
-                "left": (x < radius + _NEAR, bk.HalfPlane((0.0, 0.0), (1.0, 0.0)), f"x < {-cap}", f"x >= {-cap}"),
+                "floor": (y < radius + _NEAR, bk.RigidHalfPlane(), f"y < {-cap}", f"y >= {-cap}"),
+                "left": (x < radius + _NEAR, bk.RigidHalfPlane((0.0, 0.0), (1.0, 0.0)), f"x < {-cap}", f"x >= {-cap}"),
                 "right": (
                     x > width - radius - _NEAR,
-                    bk.HalfPlane((width, 0.0), (-1.0, 0.0)),
+                    bk.RigidHalfPlane((width, 0.0), (-1.0, 0.0)),
                     f"x > {cap}",
                     f"x <= {cap}",
                 ),

@@ -178,7 +178,7 @@ def test_columns_between_smooth_walls_settle_under_their_weight() -> None:
         )
 
     lower = column("lower", 0.0, 1.5, 2.0, 0.2, 2.0)
-    lower = replace(lower, parts=(*lower.parts, bk.Part("floor", bk.Contact(bk.HalfPlane()), ("bottom",))))
+    lower = replace(lower, parts=(*lower.parts, bk.Part("floor", bk.Contact(bk.RigidHalfPlane()), ("bottom",))))
     upper = column("upper", 1.5, 1.0, 1.0, 0.3, 1.0)
     pair = bk.ContactPair(("upper.bottom", "lower.top"))
     solution = bk.run(
@@ -304,7 +304,7 @@ def arch(n: int, thickness: float) -> bk.Assembly:
     }
 
     def on_floor(side: str) -> tuple[bk.Part, ...]:
-        return (bk.Part("floor", bk.Contact(bk.HalfPlane()), (side,)),)
+        return (bk.Part("floor", bk.Contact(bk.RigidHalfPlane()), (side,)),)
 
     bodies = (
         bk.Body(name="first", parts=on_floor("before"), **common),

@@ -60,7 +60,7 @@ def assembly_of(
     weight = bk.Gravity(1.0, down, is_constant=True)
     forces = (weight,) if push else (weight, bk.Gravity(1.0, right))
     ground, pushed = (
-        bk.Part("ground", bk.Contact(bk.HalfPlane((0.0, 0.0), up)), ("bottom",)),
+        bk.Part("ground", bk.Contact(bk.RigidHalfPlane((0.0, 0.0), up)), ("bottom",)),
         bk.Part("push", bk.Pressure(1.0), ("left",)),
     )
     bodies = tuple(
@@ -169,7 +169,7 @@ def test_coulomb_factors_without_bound_and_what_is_refused(monkeypatch) -> None:
 
 def test_a_block_that_overhangs_a_table_tips_about_its_edge() -> None:
     """A load on the right end of a block whose middle is 0.3 inside of the edge, between two nodes."""
-    table = bk.PolygonalObstacle(((-2.0, 0.0), (1.3, 0.0), (1.3, -1.0), (-2.0, -1.0)))
+    table = bk.RigidPolygon(((-2.0, 0.0), (1.3, 0.0), (1.3, -1.0), (-2.0, -1.0)))
     block = bk.Body(
         name="block",
         shape=bk.Rectangle(2.0, 1.0),
@@ -205,7 +205,7 @@ def test_a_rigid_punch_slides_off_under_what_friction_holds() -> None:
         material=bk.Material(1.0, 0.3),
         parts=(bk.Part("foot", bk.Clamped(), ("bottom",)),),
     )
-    square = bk.PolygonalObstacle(((0.53, 1.0), (1.5, 1.0), (1.5, 1.5), (0.53, 1.5)))
+    square = bk.RigidPolygon(((0.53, 1.0), (1.5, 1.0), (1.5, 1.5), (0.53, 1.5)))
     punch = bk.RigidBody(name="punch", obstacle=square, centre=(1.0, 1.0), force_y=-0.01, force_x=0.001, moment=0.0)
     assembly = bk.Assembly(
         title="Punch",
@@ -230,7 +230,7 @@ def test_a_block_under_a_ceiling_slides_without_dilation_though_forces_can_wedge
     """Weight 2 and friction 0.4 hold 0.8 unless the ceiling presses; sliding that dilates is impossible."""
     block = assembly_of(np.array([[0.0, 0.0, 2.0, 1.0]]), 0.4, 4, push=True)
     (body,) = block.bodies
-    ceiling = bk.Part("ceiling", bk.Contact(bk.HalfPlane((0.0, 1.0), (0.0, -1.0))), ("top",))
+    ceiling = bk.Part("ceiling", bk.Contact(bk.RigidHalfPlane((0.0, 1.0), (0.0, -1.0))), ("top",))
     found = bk.coulomb_load_factor(replace(block, bodies=(replace(body, parts=(*body.parts, ceiling)),)))
     assert found.associative == np.inf
     assert found.factor == pytest.approx(0.8, rel=1e-6)

@@ -38,7 +38,7 @@ def triangle(nu: float, discretisation: bk.Discretisation) -> bk.Scene:
         material=bk.Material(1.0, nu),
         law=bk.Coulomb(0.01),
         parts=(
-            bk.Part("foot", bk.Contact(bk.HalfPlane()), ("foot",)),
+            bk.Part("foot", bk.Contact(bk.RigidHalfPlane()), ("foot",)),
             bk.Part("held", squeeze, ("held",)),
             bk.Part("push", bk.Pressure(0.002 * (lame + shear)), ("free",)),
         ),
@@ -104,7 +104,7 @@ def floating(law: bk.FrictionLaw) -> bk.Scene:
         material=bk.Material(1.0, 0.3),
         law=law,
         parts=(
-            bk.Part("floor", bk.Contact(bk.HalfPlane()), ("bottom",)),
+            bk.Part("floor", bk.Contact(bk.RigidHalfPlane()), ("bottom",)),
             bk.Part("load", bk.Pressure(1.0), ("top",)),
         ),
         mesh=bk.MeshOptions(elements=24),

@@ -79,7 +79,7 @@ def test_collocation_has_no_estimate() -> None:
 
 def test_a_body_at_rest_has_no_error() -> None:
     parts = (
-        bk.Part("floor", bk.Contact(bk.HalfPlane()), sides=("bottom",)),
+        bk.Part("floor", bk.Contact(bk.RigidHalfPlane()), sides=("bottom",)),
         bk.Part("lid", bk.Clamped(), sides=("top",)),
     )
     scene = bk.Scene(
@@ -93,7 +93,7 @@ def test_a_body_at_rest_has_no_error() -> None:
 @pytest.mark.parametrize("motion", [(0.0, 1e-3), (0.3, 1.0)])
 def test_a_body_that_only_moves_as_a_whole_has_no_error(degree: int, motion: tuple[float, float]) -> None:
     parts = (
-        bk.Part("floor", bk.Contact(bk.HalfPlane((0.0, 2.0))), sides=("bottom",)),
+        bk.Part("floor", bk.Contact(bk.RigidHalfPlane((0.0, 2.0))), sides=("bottom",)),
         bk.Part("lid", bk.PrescribedDisplacement(*motion), sides=("top",)),
     )
     scene = bk.Scene(

@@ -28,7 +28,7 @@ def test_below_a_contact_the_stress_follows_a_power_of_the_load() -> None:
         shape=bk.Disk(1.0, (0.0, 1.0)),
         material=bk.Material(100.0, 0.3),
         parts=(
-            bk.Part("contact", bk.Contact(bk.HalfPlane()), ("arc-3", "arc-4")),
+            bk.Part("contact", bk.Contact(bk.RigidHalfPlane()), ("arc-3", "arc-4")),
             bk.Part("load", bk.Traction(y=-0.05), ("arc-1", "arc-2")),
         ),
         law=bk.Frictionless(),

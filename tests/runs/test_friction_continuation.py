@@ -25,7 +25,7 @@ def bonded_punch(discretisation, friction_coefficient):
         mesh=bk.MeshOptions(480),
         discretisation=discretisation,
         parts=(
-            bk.Part("floor", bk.Contact(bk.Circle(centre=(0.5, -1.0), radius=1.0)), sides=("bottom",)),
+            bk.Part("floor", bk.Contact(bk.RigidCircle(centre=(0.5, -1.0), radius=1.0)), sides=("bottom",)),
             bk.Part(
                 "punch",
                 bk.PrescribedDisplacement(x=0.003, y=-0.002),

@@ -188,7 +188,7 @@ def moved(number: int, **changes: object) -> tuple[bk.Body, ...]:
         ({"bodies": moved(1, placement=bk.Placement((0.1, 0.0)))}, "body 'upper' has a placement, and x = 0 halves it"),
         (
             {
-                "rigid": (bk.RigidBody(name="punch", obstacle=bk.HalfPlane((0.0, 1.0), (0.0, -1.0))),),
+                "rigid": (bk.RigidBody(name="punch", obstacle=bk.RigidHalfPlane((0.0, 1.0), (0.0, -1.0))),),
                 "contacts": (*blocks().contacts, bk.ContactPair(("upper.left", "punch"))),
             },
             "symmetry goes only with elastic bodies: remove it, or the rigid bodies",

@@ -15,7 +15,7 @@ from bemkit.results.error_indicators import blind_elements, element_errors, trac
 from bemkit.runs.adaptive import run_adaptive
 from tests.runs.truth import cauchy_error
 
-FLOOR = bk.Contact(bk.HalfPlane())
+FLOOR = bk.Contact(bk.RigidHalfPlane())
 LOAD = bk.Traction(x=bk.Expression("x"), y=-1.0)
 
 

@@ -436,7 +436,7 @@ def half_of_two_blocks(accuracy: float) -> bk.Scene:
         shape=BLOCK,
         material=bk.Material(youngs_modulus=1.0, poisson_ratio=0.3),
         law=bk.Frictionless(),
-        parts=(bk.Part("base", bk.Contact(bk.HalfPlane()), sides=("bottom",)), pushed("top", -1e-3)),
+        parts=(bk.Part("base", bk.Contact(bk.RigidHalfPlane()), sides=("bottom",)), pushed("top", -1e-3)),
         discretisation=bk.Galerkin(2),
         mesh=bk.MeshOptions(rising_degrees=True, accuracy=accuracy),
     )

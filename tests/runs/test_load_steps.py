@@ -83,7 +83,7 @@ def test_obstacles_that_move_do_work() -> None:
 
 def test_what_contact_exerts_on_a_held_node_is_not_its_reaction() -> None:
     """A side that is pushed ends in a corner that presses obliquely onto a slope."""
-    slope = bk.Contact(bk.HalfPlane(normal=(0.3, 1.0)))
+    slope = bk.Contact(bk.RigidHalfPlane(normal=(0.3, 1.0)))
     pushed = bk.Part("left", bk.PrescribedDisplacement(x=0.01, y=None), ("left",))
     top = bk.Part("top", bk.Traction(y=-0.1), ("top",))
     steps = tuple(
@@ -126,7 +126,7 @@ def test_bodies_and_a_punch_balance_too() -> None:
 
 HALF_PLANE = bk.Scene(
     title="Cylinder on a half-plane",
-    shape=bk.HalfPlaneBody(-0.07, 0.07),
+    shape=bk.ElasticHalfPlane(-0.07, 0.07),
     material=bk.Material(1.0, 0.3),
     law=bk.Coulomb(0.3),
     far=bk.FarField(x=0.0, force_y=1e-3, turn=0.0),

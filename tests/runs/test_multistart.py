@@ -26,7 +26,7 @@ def leg(friction: float) -> bk.Scene:
         material=bk.Material(1.0, 0.3),
         law=bk.Coulomb(friction),
         parts=(
-            bk.Part("foot", bk.Contact(bk.HalfPlane()), sides=("side-1",)),
+            bk.Part("foot", bk.Contact(bk.RigidHalfPlane()), sides=("side-1",)),
             bk.Part("top", bk.Clamped(), sides=("side-3",)),
             bk.Part(
                 "load",

@@ -26,7 +26,7 @@ HELD = bk.Scene(  # friction acts at the node that the support guides
     material=bk.Material(1.0, 0.3),
     law=bk.Coulomb(0.3),
     parts=(
-        bk.Part("floor", bk.Contact(bk.HalfPlane()), sides=("bottom",)),
+        bk.Part("floor", bk.Contact(bk.RigidHalfPlane()), sides=("bottom",)),
         bk.Part("press", bk.Traction(y=-1.0), sides=("top",)),
         bk.Part("push", bk.PrescribedDisplacement(x=0.05), sides=("left",)),
     ),

@@ -28,7 +28,7 @@ def block(
         shape=bk.Rectangle(size, size),
         material=bk.Material(modulus, 0.2),
         parts=(
-            bk.Part("floor", bk.Contact(bk.HalfPlane()) if is_contact else bk.Clamped(), sides=("bottom",)),
+            bk.Part("floor", bk.Contact(bk.RigidHalfPlane()) if is_contact else bk.Clamped(), sides=("bottom",)),
             bk.Part("wall", bk.Roller(), sides=("right",)),
             bk.Part("top", top, sides=("top",)),
         ),

@@ -30,7 +30,7 @@ BLOCK = bk.Body(
     parts=(bk.Part("base", bk.Clamped(), ("bottom",)),),
     mesh=bk.MeshOptions(elements=60),
 )
-SQUARE = bk.PolygonalObstacle(((0.5, 1.0), (1.5, 1.0), (1.5, 1.5), (0.5, 1.5)))
+SQUARE = bk.RigidPolygon(((0.5, 1.0), (1.5, 1.0), (1.5, 1.5), (0.5, 1.5)))
 PUNCH = bk.RigidBody(name="punch", obstacle=SQUARE, centre=(1.0, 1.0), force_y=-FORCE)
 PRESSED = bk.Assembly(
     title="Punch",
@@ -110,7 +110,7 @@ V = bk.Assembly(
     rigid=(
         bk.RigidBody(
             name="disc",
-            obstacle=bk.Circle((0.0, np.sqrt(2.0)), 1.0),
+            obstacle=bk.RigidCircle((0.0, np.sqrt(2.0)), 1.0),
             centre=(0.0, np.sqrt(2.0)),
             force_x=0.0,
             force_y=-1e-3,
@@ -139,7 +139,7 @@ def test_a_disc_in_a_v_is_carried_by_both_sides() -> None:
 @pytest.mark.parametrize("push", [0.0, 3e-4])
 def test_a_square_in_a_v_divides_its_weight_by_statics(push: float) -> None:
     """On its edge, so that contact forces are at 45 degrees exactly; a push from the side shifts them."""
-    diamond = bk.PolygonalObstacle(((0.0, 0.0), (1.0, 1.0), (0.0, 2.0), (-1.0, 1.0)))
+    diamond = bk.RigidPolygon(((0.0, 0.0), (1.0, 1.0), (0.0, 2.0), (-1.0, 1.0)))
     body = replace(V.rigid[0], obstacle=diamond, force_x=push)
     left, right = solved(replace(V, rigid=(body,))).contacts
     assert left.force_normal == pytest.approx((1e-3 - push) / np.sqrt(2.0), rel=1e-10)
@@ -156,7 +156,12 @@ def test_a_disc_that_contact_alone_holds_rests_between_two_blocks() -> None:
         placement=bk.Placement((0.0, 2.0)),
     )
     disc = bk.RigidBody(
-        name="disc", obstacle=bk.Circle((1.0, 1.5), 0.5), centre=(1.0, 1.5), force_x=0.0, force_y=-weight, moment=0.0
+        name="disc",
+        obstacle=bk.RigidCircle((1.0, 1.5), 0.5),
+        centre=(1.0, 1.5),
+        force_x=0.0,
+        force_y=-weight,
+        moment=0.0,
     )
     stack = replace(
         PRESSED,
@@ -189,7 +194,7 @@ def test_a_rigid_body_that_does_not_move_is_an_obstacle(law: bk.FrictionLaw, tur
     shear = 0.0 if law.is_frictionless else 0.2
     load = bk.Part("load", bk.Traction(*(FORCE * np.array([shear * ny - nx, -ny - shear * nx])).tolist()), ("top",))
     free = replace(BLOCK, parts=(load,), placement=placement)
-    plane = bk.HalfPlane((0.0, 0.0), (nx, ny))
+    plane = bk.RigidHalfPlane((0.0, 0.0), (nx, ny))
     floor = bk.RigidBody(name="floor", obstacle=plane)
     pair = bk.ContactPair(("block.bottom", "floor"))
     rigid = solved(replace(PRESSED, bodies=(free,), rigid=(floor,), contacts=(pair,), law=law))
@@ -213,7 +218,7 @@ def test_a_given_motion_is_felt_like_that_of_a_support() -> None:
     results = []
     for motion in ((0.0, 0.0, 0.0), (0.02, -0.05, 0.001)):
         x, y, turn = motion
-        floor = bk.RigidBody(name="floor", obstacle=bk.HalfPlane(), x=x, y=y, turn=turn)
+        floor = bk.RigidBody(name="floor", obstacle=bk.RigidHalfPlane(), x=x, y=y, turn=turn)
         results.append(solved(replace(PRESSED, bodies=bodies, rigid=(floor,), contacts=(pair,), law=SOME)))
     still, moved = results
     atol = 1e-10 * FORCE  # of motions a few times as large as the deformation
@@ -226,7 +231,7 @@ def test_a_given_motion_is_felt_like_that_of_a_support() -> None:
 
 def test_a_turning_disc_drags_each_node_by_its_radius() -> None:
     """Whatever the gap: what a node may touch is a point of the disc, at the end of the gap."""
-    disc = bk.RigidBody(name="punch", obstacle=bk.Circle((1.0, 1.6), 0.5), centre=(1.0, 1.6), turn=0.01)
+    disc = bk.RigidBody(name="punch", obstacle=bk.RigidCircle((1.0, 1.6), 0.5), centre=(1.0, 1.6), turn=0.01)
     (rows,) = prepare_steps([replace(PRESSED, rigid=(disc,), law=SOME)])[0].rows
     assert np.ptp(rows.gap) > 0.1
     assert rows.motions is not None
@@ -238,7 +243,7 @@ def test_a_turning_disc_drags_each_node_by_its_radius() -> None:
 def test_a_circle_sticks_below_the_friction_and_is_refused_above() -> None:
     """A flat one: its normals at the nodes differ by 0.02, which friction of 0.3 turns into 2 % of its force."""
     middle = bk.Part("middle", bk.Free(), ("top",), bk.Expression("abs(x - 1) < 0.2"))
-    roll = bk.RigidBody(name="roll", obstacle=bk.Circle((1.0, 11.0), 10.0), centre=(1.0, 1.0), force_y=-FORCE)
+    roll = bk.RigidBody(name="roll", obstacle=bk.RigidCircle((1.0, 11.0), 10.0), centre=(1.0, 1.0), force_y=-FORCE)
     pair = bk.ContactPair(("block.middle", "roll"))
     block = replace(BLOCK, parts=(*BLOCK.parts, middle))
     on_block = replace(PRESSED, bodies=(block,), rigid=(roll,), contacts=(pair,), law=SOME)
@@ -277,11 +282,11 @@ def test_shapes_of_one_circle_press_alike() -> None:
         return tuple(map(tuple, at.tolist()))
 
     shapes = (
-        (bk.Circle((1.0, 2.0), 1.0), 0.0),
+        (bk.RigidCircle((1.0, 2.0), 1.0), 0.0),
         (bk.SignedDistance(bk.Expression("hypot(x - 1, y - 2) - 1")), 1e-10),
         (bk.SignedDistance(bk.Expression("(x - 1)**2 + (y - 2)**2 - 1")), 1e-10),
-        (bk.SplineObstacle(points(100)), 1e-4),
-        (bk.PolygonalObstacle(points(400)), 1e-2),
+        (bk.RigidSpline(points(100)), 1e-4),
+        (bk.RigidPolygon(points(400)), 1e-2),
     )
     body = replace(PUNCH, centre=(1.0, 2.0))
     pressures = [solved(replace(PRESSED, rigid=(replace(body, obstacle=shape),), law=SOME)) for shape, _ in shapes]
@@ -295,7 +300,7 @@ def test_shapes_of_one_circle_press_alike() -> None:
 
 def test_one_side_touches_the_nearest_of_several_rigid_bodies() -> None:
     rolls = tuple(
-        bk.RigidBody(name=name, obstacle=bk.Circle((x, 1.5), 0.5), centre=(x, 1.5), force_y=-force)
+        bk.RigidBody(name=name, obstacle=bk.RigidCircle((x, 1.5), 0.5), centre=(x, 1.5), force_y=-force)
         for name, x, force in (("one", 0.5, FORCE), ("two", 1.5, FORCE / 2.0))
     )
     pairs = tuple(bk.ContactPair(("block.top", roll.name)) for roll in rolls)
@@ -317,7 +322,7 @@ def test_a_side_between_an_elastic_and_a_rigid_body_passes_on_both_tractions() -
         mesh=bk.MeshOptions(elements=40),
     )
     pairs = (*PRESSED.contacts, bk.ContactPair(("small.bottom", "block.top")))
-    punch = replace(PUNCH, obstacle=bk.Circle((1.5, 1.3), 0.3), centre=(1.5, 1.3))
+    punch = replace(PUNCH, obstacle=bk.RigidCircle((1.5, 1.3), 0.3), centre=(1.5, 1.3))
     solution = solved(replace(PRESSED, bodies=(BLOCK, small), rigid=(punch,), contacts=pairs))
     top = next(force for force in solution.bodies["block"].part_forces if force.name.endswith("top"))
     # nodal forces are spread over whole elements: at the end of the small block over one that it does not touch
@@ -339,7 +344,7 @@ def test_steps_of_motions_and_forces_follow_each_other() -> None:
     assert pushed[1].rigid["punch"].y == pytest.approx(2.0 * pushed[0].rigid["punch"].y, rel=1e-10)
     with pytest.raises(bk.InputError, match="rigid body 'punch' changes its shape, its place or what is given of it"):
         bk.run([driven(), driven(force_y=None, y=-1e-3)])
-    more, pair = bk.RigidBody(name="more", obstacle=bk.HalfPlane()), bk.ContactPair(("block.left", "more"))
+    more, pair = bk.RigidBody(name="more", obstacle=bk.RigidHalfPlane()), bk.ContactPair(("block.left", "more"))
     longer = replace(PRESSED, rigid=(PUNCH, more), contacts=(*PRESSED.contacts, pair))
     with pytest.raises(bk.InputError, match="rigid body 'more' changes its shape"):
         bk.run([driven(), longer])
@@ -387,7 +392,7 @@ def test_the_unit_of_stress_is_that_of_the_largest_force_or_motion(
 
 
 def test_a_body_that_hangs_above_comes_down_and_one_without_force_stays() -> None:
-    high = replace(PUNCH, obstacle=bk.PolygonalObstacle(((0.5, 1.1), (1.5, 1.1), (1.5, 1.5), (0.5, 1.5))))
+    high = replace(PUNCH, obstacle=bk.RigidPolygon(((0.5, 1.1), (1.5, 1.1), (1.5, 1.5), (0.5, 1.5))))
     down = solved(replace(PRESSED, rigid=(high,))).rigid["punch"]
     assert down.y + 0.1 == pytest.approx(solved(PRESSED).rigid["punch"].y, rel=1e-10)
     still = solved(driven(force_y=0.0))
@@ -396,11 +401,11 @@ def test_a_body_that_hangs_above_comes_down_and_one_without_force_stays() -> Non
 
 
 def test_what_overlaps_unmeant_is_refused_and_an_interference_presses() -> None:
-    deep = replace(PUNCH, obstacle=bk.Circle((1.0, 1.499), 0.5), force_y=None)
+    deep = replace(PUNCH, obstacle=bk.RigidCircle((1.0, 1.499), 0.5), force_y=None)
     with pytest.raises(OverlapError, match=r"contact 'block.top / punch': the bodies overlap by 0.001 at \(1, 1\)"):
         bk.run(replace(PRESSED, rigid=(deep,)))
     meant = replace(PRESSED, rigid=(deep,), contacts=(bk.ContactPair(("block.top", "punch"), interference=2e-3),))
-    apart = replace(deep, obstacle=bk.Circle((1.0, 1.5), 0.5))
+    apart = replace(deep, obstacle=bk.RigidCircle((1.0, 1.5), 0.5))
     by_gap = replace(PRESSED, rigid=(apart,), contacts=(bk.ContactPair(("block.top", "punch"), gap=-1e-3),))
     by_motion = replace(PRESSED, rigid=(replace(apart, y=-1e-3),))
     forces = [solved(each).rigid["punch"].force_y for each in (meant, by_gap, by_motion)]
@@ -409,7 +414,7 @@ def test_what_overlaps_unmeant_is_refused_and_an_interference_presses() -> None:
 
 
 def test_meshes_follow_the_solution_under_a_rigid_body() -> None:
-    roll = replace(PUNCH, obstacle=bk.Circle((1.0, 2.0), 1.0))
+    roll = replace(PUNCH, obstacle=bk.RigidCircle((1.0, 2.0), 1.0))
     block = replace(BLOCK, mesh=None)
     assembly = replace(PRESSED, bodies=(block,), rigid=(roll,), mesh=bk.MeshOptions(accuracy=0.03))
     last = run_adaptive(assembly)[-1]

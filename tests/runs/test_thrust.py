@@ -22,7 +22,7 @@ def block_at_a_wall() -> bk.Assembly:
     """Return a block, 4 wide, 1 high, of weight 4, on ground and against a wall on its left."""
     assembly = assembly_of(np.array([[0.0, 0.0, 4.0, 1.0]]), FRICTION, 4)
     (body,) = assembly.bodies
-    wall = bk.Part("wall", bk.Contact(bk.HalfPlane((0.0, 0.0), (1.0, 0.0))), ("left",))
+    wall = bk.Part("wall", bk.Contact(bk.RigidHalfPlane((0.0, 0.0), (1.0, 0.0))), ("left",))
     return replace(
         assembly, bodies=(replace(body, parts=(*body.parts, wall), body_forces=(bk.Gravity(1.0, (0.0, -1.0)),)),)
     )

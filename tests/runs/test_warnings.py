@@ -302,7 +302,7 @@ def test_elements_that_stand_alone_have_no_estimate(elements: int, is_doubted: b
         shape=bk.Rectangle(1.0, 1.0),
         material=bk.Material(1.0, 0.3),
         parts=(
-            bk.Part("floor", bk.Contact(bk.HalfPlane()), sides=("bottom",)),
+            bk.Part("floor", bk.Contact(bk.RigidHalfPlane()), sides=("bottom",)),
             bk.Part("load", bk.Traction(y=-1e-3), sides=("top",)),
         ),
         mesh=bk.MeshOptions(elements=elements),
@@ -374,7 +374,7 @@ def test_warnings_of_an_earlier_step_name_it() -> None:
         law=bk.Coulomb(0.3),
         parts=(
             bk.Part("load", bk.PrescribedDisplacement(x=0.0, y=-1e-2), ("start", "end")),
-            bk.Part("tip", bk.Contact(bk.HalfPlane((0, -1))), ("arc",)),
+            bk.Part("tip", bk.Contact(bk.RigidHalfPlane((0, -1))), ("arc",)),
         ),
         steps=(bk.Step(1.0), *(bk.Step(t, {"parts.load.condition.y": 1e-3}) for t in (2.0, 3.0))),
         discretisation=bk.Galerkin(1),

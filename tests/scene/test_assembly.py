@@ -17,7 +17,6 @@ from bemkit import (
     Galerkin,
     Gravity,
     GridCopies,
-    HalfPlane,
     InputError,
     ListedCopies,
     Material,
@@ -27,8 +26,9 @@ from bemkit import (
     Pressure,
     Rectangle,
     RigidBody,
+    RigidHalfPlane,
+    RigidSpline,
     SignedDistance,
-    SplineObstacle,
     Touching,
     load_scene,
     scene_from_toml,
@@ -47,7 +47,7 @@ UPPER = Body(
     placement=Placement((0.0, 1.0)),
 )
 PAIR = ContactPair(("upper.bottom", "lower.top"))
-PUNCH = RigidBody(name="punch", obstacle=HalfPlane((0.0, 2.0), (0.0, -1.0)), force_y=-2.0, turn=0.01)
+PUNCH = RigidBody(name="punch", obstacle=RigidHalfPlane((0.0, 2.0), (0.0, -1.0)), force_y=-2.0, turn=0.01)
 SMALL = replace(UPPER, parts=UPPER.parts[:1])
 BLOCKS = Assembly(title="Two blocks", bodies=(LOWER, SMALL), contacts=(PAIR,))
 
@@ -90,7 +90,9 @@ def test_every_key_survives_its_text() -> None:
         discretisation=ConstantCollocation(),
         mesh=MeshOptions(elements=24),
     )
-    held = replace(LOWER, parts=(Part("base", Contact(HalfPlane(), Coulomb(0.2)), ("bottom",)),), copies=GridCopies(2))
+    held = replace(
+        LOWER, parts=(Part("base", Contact(RigidHalfPlane(), Coulomb(0.2)), ("bottom",)),), copies=GridCopies(2)
+    )
     scene = Assembly(
         title="All keys",
         description="Two lines\nof text.",
@@ -105,7 +107,7 @@ def test_every_key_survives_its_text() -> None:
         rigid=(
             RigidBody(
                 name="curve",
-                obstacle=SplineObstacle(((0.0, 0.0), (1.0, 0.5), (0.0, 1.0)), is_closed=False),
+                obstacle=RigidSpline(((0.0, 0.0), (1.0, 0.5), (0.0, 1.0)), is_closed=False),
                 centre=(1.0, 2.0),
                 x=0.0,
                 force_y=-3.0,

@@ -103,7 +103,7 @@ def test_load_factors_multiply_what_is_not_constant() -> None:
 
 def test_transforms_scale_forces_like_stresses_over_lengths() -> None:
     points = np.random.default_rng(2).normal(size=(5, 2))
-    floor = bk.Part("floor", bk.Contact(bk.HalfPlane()), sides=("bottom",))
+    floor = bk.Part("floor", bk.Contact(bk.RigidHalfPlane()), sides=("bottom",))
     given, affine = scene(*FORCES, parts=(floor,)), AffineMap((3.0, 3.0), (0.5, -2.0))
     moved = transformed_scene(given, affine, stress=10.0, modulus=7.0)
     there = affine.forward(points)

@@ -20,7 +20,7 @@ from bemkit.studies.stability.sweep import condition_number
 
 PUNCH = bk.Scene(
     title="punch",
-    shape=bk.HalfPlaneBody(-1.0, 1.0),
+    shape=bk.ElasticHalfPlane(-1.0, 1.0),
     material=bk.Material(1.0, 0.3),
     law=bk.Coulomb(0.3),
     parts=(bk.Part("zone", bk.Contact(bk.Gap(bk.Expression("0.1 * x**2"))), where=bk.Expression("x < 0.5")),),
@@ -154,10 +154,10 @@ def test_a_far_field_says_one_thing_of_each_motion(far: dict[str, object], messa
 
 
 def test_shapes_and_meshes_that_are_no_half_plane() -> None:
-    with pytest.raises(GeometryError, match=r"left is 1\.0, not less than right, -1\.0"):
-        bk.HalfPlaneBody(1.0, -1.0)
+    with pytest.raises(GeometryError, match=r"left is 1\.0, not below right, -1\.0"):
+        bk.ElasticHalfPlane(1.0, -1.0)
     with pytest.raises(GeometryError, match="period"):
-        bk.PeriodicHalfPlaneBody(0.0)
+        bk.PeriodicHalfPlane(0.0)
     with pytest.raises(GeometryError, match="a half-plane has the sides bottom, right, top, left: give one straight"):
         Outline(bk.Rectangle(1.0, 1.0).outline().loops, surface=Surface())
     arc = bk.Disk(1.0).outline().loops[0][0]
@@ -203,7 +203,7 @@ def test_an_elastic_disk_on_an_elastic_half_plane() -> None:
         parts=(load,),
         placement=bk.Placement((0.0, 1.0)),
     )
-    ground = bk.Body(name="ground", shape=bk.HalfPlaneBody(-0.4, 0.4), material=bk.Material(1.0, 0.3))
+    ground = bk.Body(name="ground", shape=bk.ElasticHalfPlane(-0.4, 0.4), material=bk.Material(1.0, 0.3))
     pairs = tuple(bk.ContactPair(("ground.surface", f"disk.arc-{quarter}")) for quarter in (3, 4))
     assembly = bk.Assembly(title="disk", bodies=(disk, ground), contacts=pairs, mesh=bk.MeshOptions(elements=320))
     solution = bk.run(assembly)

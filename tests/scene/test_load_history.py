@@ -26,7 +26,7 @@ def block(*, push: Any = 0.2, press: Any = -1.0, law: bk.FrictionLaw | None = No
         material=bk.Material(100.0, 0.3),
         law=bk.Coulomb(0.4) if law is None else law,
         parts=(
-            bk.Part("floor", bk.Contact(bk.HalfPlane()), sides=("bottom",)),
+            bk.Part("floor", bk.Contact(bk.RigidHalfPlane()), sides=("bottom",)),
             bk.Part("load", bk.Traction(x=push, y=press), sides=("top",)),
         ),
         mesh=bk.MeshOptions(elements=60),

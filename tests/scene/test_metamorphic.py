@@ -59,7 +59,7 @@ def example_1(change: Change, discretisation: str, driver: str, **options: Any) 
         corners, sides = corners[::-1], [*sides[-2::-1], sides[-1]]
     origin = change.points(np.zeros((1, 2)))[0]
     press, push = (change.vector(*load) for load in ((0.0, -change.stress), (change.stress, 0.0)))
-    floor = bk.HalfPlane((float(origin[0]), float(origin[1])), change.vector(0.0, 1.0))
+    floor = bk.RigidHalfPlane((float(origin[0]), float(origin[1])), change.vector(0.0, 1.0))
     return bk.Scene(
         title="example 1",
         shape=bk.Polygon(tuple((float(x), float(y)) for x, y in corners), side_names=tuple(sides)),
@@ -134,7 +134,7 @@ def test_frictionless_pressure_does_not_depend_on_poissons_ratio() -> None:
             shape=bk.Rectangle(1.0, 1.0),
             material=bk.Material(1.0, ratio),
             parts=(
-                bk.Part("floor", bk.Contact(bk.HalfPlane()), sides=("bottom",)),
+                bk.Part("floor", bk.Contact(bk.RigidHalfPlane()), sides=("bottom",)),
                 bk.Part("load", bk.Traction(y=-1.0), sides=("top",), where=bk.Expression("abs(x - 0.5) < 0.1")),
             ),
             mesh=bk.MeshOptions(elements=160, grading=bk.Algebraic(2.0)),

@@ -40,7 +40,7 @@ PAIR = bk.ContactPair(("upper.bottom", "lower.top"))
         (lambda: replace(WALL, condition=bk.Roller), "^part 'wall': condition is the class Roller: give an object"),
         (lambda: replace(WALL, sides="right"), r"^part 'wall': sides is 'right': give a tuple, such as \('right',\)"),
         (lambda: replace(WALL, where="y > 0.5"), r"^part 'wall': where is the text 'y > 0.5': give Expression\("),
-        (lambda: bk.Contact("half-plane"), r"^obstacle is 'half-plane': give an object, such as HalfPlane\(\)"),
+        (lambda: bk.Contact("half-plane"), r"^obstacle is 'half-plane': give an object, such as RigidHalfPlane\(\)"),
         (lambda: bk.Touching(0.1, law="frictionless"), "^touching: law is 'frictionless': give an object"),
         (lambda: replace(PAIR, law="frictionless"), "^contact: law is 'frictionless': give an object"),
         (

@@ -8,7 +8,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from bemkit.contact.obstacle import HalfPlane
+from bemkit.contact.obstacle import RigidHalfPlane
 from bemkit.formulas import Expression
 from bemkit.geometry.errors import GeometryError
 from bemkit.geometry.shapes import Polygon, Rectangle
@@ -17,7 +17,7 @@ from bemkit.scene.conditions import Clamped, Contact, Part, PrescribedDisplaceme
 from bemkit.scene.mesh_options import MeshOptions
 from bemkit.scene.scene import Scene
 
-FOUNDATION = Part("foundation", Contact(HalfPlane()), ("bottom",))
+FOUNDATION = Part("foundation", Contact(RigidHalfPlane()), ("bottom",))
 
 
 def scene(**changes: object) -> Scene:

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from bemkit.contact.further_laws import CohesiveCoulomb
 from bemkit.contact.laws import Coulomb, Frictionless, Tresca
-from bemkit.contact.obstacle import Cavity, Circle, Gap, HalfPlane
+from bemkit.contact.obstacle import Gap, RigidCavity, RigidCircle, RigidHalfPlane
 from bemkit.formulas import Expression
 from bemkit.geometry.meshing.discretise import Algebraic, Geometric, Uniform
 from bemkit.geometry.shapes import Disk, ExteriorOf, PlateWithHole, Polygon, Rectangle, Ring, Sector
@@ -91,9 +91,9 @@ shapes = st.one_of(
     st.builds(lambda a: Polygon(((0.0, 0.0), (a, 0.0), (0.0, a)), ("one", "two", "three")), positive),
 )
 obstacles = st.one_of(
-    st.builds(HalfPlane, points, st.sampled_from([(0.0, 1.0), (3.0, -4.0)])),
-    st.builds(Circle, points, positive),
-    st.builds(Cavity, points, positive),
+    st.builds(RigidHalfPlane, points, st.sampled_from([(0.0, 1.0), (3.0, -4.0)])),
+    st.builds(RigidCircle, points, positive),
+    st.builds(RigidCavity, points, positive),
     st.builds(Gap, fields),
 )
 conditions = st.one_of(

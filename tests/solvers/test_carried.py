@@ -22,7 +22,7 @@ from tests.slow import slow_except
 
 DRIVERS = [bk.SemismoothNewton(), bk.AugmentedLagrangian(), bk.FixedPoint(), bk.LemkePivoting()]
 TILT = 0.6
-WALL = bk.HalfPlane((math.cos(TILT), math.sin(TILT)), (-math.cos(TILT), -math.sin(TILT)))
+WALL = bk.RigidHalfPlane((math.cos(TILT), math.sin(TILT)), (-math.cos(TILT), -math.sin(TILT)))
 """Touches a unit disc at the origin, and gives way to none that moves up: it slides aside, where nothing holds it."""
 
 

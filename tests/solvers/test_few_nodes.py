@@ -32,7 +32,7 @@ def block(discretisation, solver, feet, friction_coefficient, gap, height):
         discretisation=discretisation,
         solver=solver,
         parts=(
-            bk.Part("feet", bk.Contact(bk.HalfPlane(point=(0.0, -gap))), ("bottom",), bk.Expression(FEET[feet])),
+            bk.Part("feet", bk.Contact(bk.RigidHalfPlane(point=(0.0, -gap))), ("bottom",), bk.Expression(FEET[feet])),
             bk.Part("load", bk.Traction(y=-1.0), sides=("top",)),
             *guide,
         ),

@@ -14,7 +14,7 @@ import numpy as np
 
 from bemkit.arrays import FloatArray
 from bemkit.contact.laws import Coulomb
-from bemkit.contact.obstacle import Gap, HalfPlane
+from bemkit.contact.obstacle import Gap, RigidHalfPlane
 from bemkit.errors import InputError
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.meshing.discretise import Uniform
@@ -174,7 +174,7 @@ def _pushed(baseline: Solution, value: float) -> Case:
     if baseline.mesh.surface is not None:
         return _pushed_half_plane(baseline, value)
     parts = (
-        Part("floor", Contact(HalfPlane()), sides=("bottom",)),
+        Part("floor", Contact(RigidHalfPlane()), sides=("bottom",)),
         Part("press", Traction(y=-1.0), sides=("top",)),
         Part("push", Pressure(2.0 * _BLOCK_FRICTION * value), sides=("left",)),
     )

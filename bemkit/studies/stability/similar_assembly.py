@@ -9,9 +9,9 @@ import numpy as np
 from bemkit.arrays import FloatArray
 from bemkit.contact.further_laws import CohesiveCoulomb, RateStrengthening, SlipWeakening
 from bemkit.contact.laws import Coulomb, FrictionLaw, Frictionless, Tresca
-from bemkit.contact.obstacle import Cavity, Circle, Gap, HalfPlane, Obstacle
-from bemkit.contact.polygon import PolygonalObstacle
-from bemkit.contact.spline import SplineObstacle
+from bemkit.contact.obstacle import Gap, Obstacle, RigidCavity, RigidCircle, RigidHalfPlane
+from bemkit.contact.polygon import RigidPolygon
+from bemkit.contact.spline import RigidSpline
 from bemkit.errors import InputError
 from bemkit.geometry.placement import Placement
 from bemkit.geometry.shapes import Disk, ExteriorOf, PlateWithHole, Polygon, Rectangle, Ring, Sector, Shape
@@ -223,16 +223,16 @@ class AssemblySimilarity:
 
     def _obstacle(self, obstacle: Obstacle) -> Obstacle:
         match obstacle:
-            case HalfPlane(point, (x, y)):
-                return HalfPlane(self._point(point), self._vector(x, y, 1.0))
-            case Circle(centre, radius):
-                return Circle(self._point(centre), self.length * radius)
-            case Cavity(centre, radius):
-                return Cavity(self._point(centre), self.length * radius)
-            case PolygonalObstacle(vertices):
-                return PolygonalObstacle(tuple(self._point(vertex) for vertex in vertices))
-            case SplineObstacle(points, is_closed):
-                return SplineObstacle(tuple(self._point(point) for point in points), is_closed)
+            case RigidHalfPlane(point, (x, y)):
+                return RigidHalfPlane(self._point(point), self._vector(x, y, 1.0))
+            case RigidCircle(centre, radius):
+                return RigidCircle(self._point(centre), self.length * radius)
+            case RigidCavity(centre, radius):
+                return RigidCavity(self._point(centre), self.length * radius)
+            case RigidPolygon(vertices):
+                return RigidPolygon(tuple(self._point(vertex) for vertex in vertices))
+            case RigidSpline(points, is_closed):
+                return RigidSpline(tuple(self._point(point) for point in points), is_closed)
             case Gap(value, None):
                 return Gap(self.length * _number(value))
         raise InputError(

@@ -139,7 +139,7 @@ class Surface:
     def _logarithms(self, element: int) -> FloatArray:
         """Return the mean logarithms (n_elements,) of |x - s|, x on one element and s on all, images included.
 
-        At rest is what `HalfPlaneBody` and `PeriodicHalfPlaneBody` say.
+        At rest is what `ElasticHalfPlane` and `PeriodicHalfPlane` say.
         """
         if self.is_periodic:  # of equal elements all rows are alike
             return np.roll(self._first_logarithms, element)

@@ -9,8 +9,8 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from bemkit.arrays import BoolArray, FloatArray, IntArray
-from bemkit.contact.obstacle import Cavity, Circle, DirectedObstacle, Gap, HalfPlane, Obstacle
-from bemkit.contact.polygon import PolygonalObstacle
+from bemkit.contact.obstacle import DirectedObstacle, Gap, Obstacle, RigidCavity, RigidCircle, RigidHalfPlane
+from bemkit.contact.polygon import RigidPolygon
 from bemkit.formulas import evaluate_field
 from bemkit.results.solution import Solution
 from bemkit.scene.conditions import Clamped, Contact, PrescribedDisplacement, Roller
@@ -160,16 +160,16 @@ def distance_to(obstacle: Obstacle, points: FloatArray, normals: FloatArray) -> 
         Of the body; the normals point out of it.
     """
     match obstacle:
-        case HalfPlane(point, normal):
+        case RigidHalfPlane(point, normal):
             outward = np.array(normal) / np.hypot(*normal)
             return (points - np.array(point)) @ outward, np.broadcast_to(-outward, points.shape)
-        case Circle(centre, radius):
+        case RigidCircle(centre, radius):
             away, distance = _polar(points, centre, normals)
             return distance - radius, -away
-        case Cavity(centre, radius):
+        case RigidCavity(centre, radius):
             away, distance = _polar(points, centre, -normals)
             return radius - distance, away
-        case PolygonalObstacle(vertices):
+        case RigidPolygon(vertices):
             return _to_polygon(np.array(vertices, dtype=float), points, normals)
         case Gap(value=value, direction=None):
             return evaluate_field(value, points), normals

@@ -43,7 +43,7 @@ def patch(
         law=bk.Coulomb(friction),
         discretisation=bk.Galerkin(1) if discretisation is None else discretisation,
         parts=(
-            bk.Part("floor", bk.Contact(bk.HalfPlane()), sides=("bottom",)),
+            bk.Part("floor", bk.Contact(bk.RigidHalfPlane()), sides=("bottom",)),
             bk.Part("top", top, sides=("top",)),
             bk.Part("right", bk.Traction(x=side, y=shear), sides=("right",)),
             bk.Part("left", bk.Traction(x=-side, y=-shear), sides=("left",)),
@@ -163,7 +163,7 @@ def test_the_tie_on_the_whole_body_ends_whatever_the_driver() -> None:
         material=bk.Material(YOUNG, POISSON),
         law=bk.Coulomb(0.25),
         parts=(
-            bk.Part("floor", bk.Contact(bk.HalfPlane()), sides=("bottom",)),
+            bk.Part("floor", bk.Contact(bk.RigidHalfPlane()), sides=("bottom",)),
             bk.Part("top", bk.Traction(x=0.125, y=-0.5), sides=("top",)),
             bk.Part(
                 "ends", bk.Traction(x=0.0, y=bk.Expression("where(x > 1, 0.125, -0.125)")), sides=("right", "left")

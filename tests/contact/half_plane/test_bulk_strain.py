@@ -23,7 +23,7 @@ def specimen(strain: float, n_elements: int = 500, **changes: object) -> bk.Scen
     steps = (bk.Step(1.0), bk.Step(2.0, {"far.force_x": f"{shear} * (t - 1)", "far.strain": f"{strain} * (t - 1)"}))
     scene = bk.Scene(
         title="fretting",
-        shape=bk.HalfPlaneBody(-1.2 * HALF_WIDTH, 1.2 * HALF_WIDTH),
+        shape=bk.ElasticHalfPlane(-1.2 * HALF_WIDTH, 1.2 * HALF_WIDTH),
         material=MATERIAL,
         law=bk.Coulomb(FRICTION),
         parts=(bk.Part("zone", bk.Contact(bk.Gap(bk.Expression("x**2 / 2")))),),
@@ -65,7 +65,7 @@ def test_strain_scales_with_units_and_load_factors() -> None:
     plain = bk.run(scene)
     larger = replace(
         scene,
-        shape=bk.HalfPlaneBody(-1200.0 * HALF_WIDTH, 1200.0 * HALF_WIDTH),
+        shape=bk.ElasticHalfPlane(-1200.0 * HALF_WIDTH, 1200.0 * HALF_WIDTH),
         material=bk.Material(1e-6, 0.5),
         far=replace(scene.far, force_y=1e-3 * LOAD),
         parts=(bk.Part("zone", bk.Contact(bk.Gap(bk.Expression("x**2 / 2000")))),),

@@ -24,7 +24,7 @@ CYLINDER = bk.load_scene("cylinder-on-half-plane")
 def bodies(far: bk.FarField | None, grading: float = 1.5) -> tuple[LargeStripBody, StripBody]:
     scene = bk.Scene(
         title="strip",
-        shape=bk.HalfPlaneBody(-1.0, 1.0),
+        shape=bk.ElasticHalfPlane(-1.0, 1.0),
         material=bk.Material(1.0, 0.3),
         law=bk.Coulomb(0.3),
         parts=(bk.Part("zone", bk.Contact(bk.Gap(0.0)), where=bk.Expression("abs(x) < 0.5")), LOAD),

@@ -33,7 +33,7 @@ DRIVES = {
 def scene(n_elements: int, far: bk.FarField | None = DRIVES["force"], **changes: object) -> bk.Scene:
     given = {
         "title": "wave",
-        "shape": bk.PeriodicHalfPlaneBody(1.0, -0.5),
+        "shape": bk.PeriodicHalfPlane(1.0, -0.5),
         "material": MATERIAL,
         "law": bk.Coulomb(0.3),
         "parts": (bk.Part("zone", bk.Contact(bk.Gap(bk.Expression("0.01 * (1 - cos(2 * pi * x))")))),),
@@ -119,7 +119,7 @@ def test_units_and_places_change_nothing() -> None:
     plain = bk.run(scene(256))
     shifted = replace(
         scene(256),
-        shape=bk.PeriodicHalfPlaneBody(1000.0, -500.0),
+        shape=bk.PeriodicHalfPlane(1000.0, -500.0),
         material=bk.Material(2e-6, 0.2),
         far=bk.FarField(force_x=2e-4 * PRESSURE, force_y=1e-3 * PRESSURE),
         parts=(bk.Part("zone", bk.Contact(bk.Gap(bk.Expression("10 * (1 - cos(2 * pi * x / 1000))")))),),

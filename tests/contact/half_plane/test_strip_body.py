@@ -34,7 +34,7 @@ def body_of(far: bk.FarField | None, *parts: bk.Part, towards: tuple[str, str] =
     contact = bk.Part("zone", bk.Contact(gap), where=bk.Expression("abs(x) < 0.5"))
     scene = bk.Scene(
         title="strip",
-        shape=bk.HalfPlaneBody(-1.0, 1.0),
+        shape=bk.ElasticHalfPlane(-1.0, 1.0),
         material=bk.Material(1.0, 0.3),
         law=bk.Coulomb(0.3),
         parts=(contact, *parts),

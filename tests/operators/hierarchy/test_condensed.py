@@ -30,7 +30,7 @@ def prepared(scene: bk.Scene, n_elements: int = 240, *, slopes: bool = True) -> 
 
 def loose(shape: object, **changes: object) -> bk.Scene:
     parts = (
-        bk.Part("floor", bk.Contact(bk.HalfPlane()), sides=("bottom",)),
+        bk.Part("floor", bk.Contact(bk.RigidHalfPlane()), sides=("bottom",)),
         bk.Part("press", bk.Traction(x=0.1, y=-1.0), sides=("top",)),
     )
     return bk.Scene(title="block", shape=shape, material=bk.Material(1.0, 0.3), law=bk.Coulomb(0.4), parts=parts)  # type: ignore[arg-type]

@@ -169,7 +169,7 @@ def test_results_depend_neither_on_units_nor_on_position(discretisation: object)
     here = bk.run(replace(square(discretisation=discretisation), symmetry=bk.Symmetry(x=0.5)))
     unit, x, y = 1e3, 7e4, -2e4
     parts = (
-        bk.Part("foundation", bk.Contact(bk.HalfPlane((x, y))), sides=("bottom",)),
+        bk.Part("foundation", bk.Contact(bk.RigidHalfPlane((x, y))), sides=("bottom",)),
         bk.Part(
             "top load", bk.Traction(y=lambda a, b: -(((a - x) / unit) ** 2) * (1 - (a - x) / unit) ** 2), sides=("top",)
         ),

@@ -95,7 +95,7 @@ def sheared():
         mesh=bk.MeshOptions(elements=60),
     )
     disc = bk.RigidBody(
-        name="disc", obstacle=bk.Circle((1.0, 2.0), 1.0), centre=(1.0, 2.0), force_x=0.0, force_y=-0.01, turn=0.0
+        name="disc", obstacle=bk.RigidCircle((1.0, 2.0), 1.0), centre=(1.0, 2.0), force_x=0.0, force_y=-0.01, turn=0.0
     )
     shear = {"rigid.disc.force_x": "2.2e-3 * (1 - (t - 2)**2)"}
     return Assembly(

@@ -31,7 +31,7 @@ def test_a_strip_of_1000_to_1_bends_as_beam_theory_says(load: str) -> None:
     length, modulus, inertia = 1000.0, 1.0 / (1.0 - 0.3**2), 1.0 / 12.0
     tip = bk.Traction(y=-1e-9) if load == "shear" else bk.Traction(x=bk.Expression("1.2e-8 * (y - 0.5)"))
     scene = block(
-        bk.Part("floor", bk.Contact(bk.HalfPlane(point=(0.0, -1e6))), sides=("bottom",)),
+        bk.Part("floor", bk.Contact(bk.RigidHalfPlane(point=(0.0, -1e6))), sides=("bottom",)),
         bk.Part("clamp", bk.Clamped(), sides=("left",)),
         bk.Part("tip", tip, sides=("right",)),
         shape=bk.Rectangle(length, 1.0),
@@ -52,7 +52,7 @@ def test_a_strip_of_1000_to_1_bends_as_beam_theory_says(load: str) -> None:
 def test_a_strip_too_thin_for_double_precision_is_not_called_solved() -> None:
     # the stiffnesses of a strip differ by (length / height)^3 = 1e15
     scene = block(
-        bk.Part("floor", bk.Contact(bk.HalfPlane(point=(0.0, -1e9))), sides=("bottom",)),
+        bk.Part("floor", bk.Contact(bk.RigidHalfPlane(point=(0.0, -1e9))), sides=("bottom",)),
         bk.Part("clamp", bk.Clamped(), sides=("left",)),
         bk.Part("tip", bk.Traction(y=-1e-12), sides=("right",)),
         shape=bk.Rectangle(1e5, 1.0),
@@ -83,7 +83,9 @@ def test_one_node_grazes_a_bump_and_carries_everything(discretisation: bk.Galerk
 def test_a_ring_that_fits_its_cavity_neatly(discretisation: bk.Galerkin, law: bk.Coulomb) -> None:
     inner, outer, nu = 1.0, 2.0, 0.3
     parts = [
-        bk.Part("cavity", bk.Contact(bk.Cavity((0.0, 0.0), outer)), sides=tuple(f"outer-{k}" for k in range(1, 5))),
+        bk.Part(
+            "cavity", bk.Contact(bk.RigidCavity((0.0, 0.0), outer)), sides=tuple(f"outer-{k}" for k in range(1, 5))
+        ),
         bk.Part("hole", bk.Pressure(1e-3), sides=tuple(f"inner-{k}" for k in range(1, 5))),
     ]
     scene = block(*parts, shape=bk.Ring(inner, outer), law=law, discretisation=discretisation, mesh=bk.MeshOptions(96))
@@ -129,7 +131,7 @@ def test_no_load_gives_no_answer_but_zero(discretisation: bk.Galerkin) -> None:
 @DISCRETISATIONS
 @pytest.mark.parametrize("distance", [1e-3, 1.0, 1e12])
 def test_a_contact_part_that_never_touches(discretisation: bk.Galerkin, distance: float) -> None:
-    low = bk.Part("floor", bk.Contact(bk.HalfPlane(point=(0.0, -distance))), sides=("bottom",))
+    low = bk.Part("floor", bk.Contact(bk.RigidHalfPlane(point=(0.0, -distance))), sides=("bottom",))
     parts = (low, bk.Part("held", bk.Clamped(), sides=("top",)), bk.Part("pull", bk.Traction(x=1e-5), sides=("right",)))
     solution = bk.run(block(*parts, discretisation=discretisation))
     assert solution.is_converged
@@ -196,7 +198,7 @@ def test_a_roller_and_a_sticking_corner_hold_one_direction_twice(discretisation:
 
 def test_a_body_too_far_from_the_origin_is_refused_and_a_far_one_is_not_held_by_round_off() -> None:
     def lifted(distance: float) -> bk.Scene:
-        floor = bk.Part("floor", bk.Contact(bk.HalfPlane(point=(distance, distance))), sides=("bottom",))
+        floor = bk.Part("floor", bk.Contact(bk.RigidHalfPlane(point=(distance, distance))), sides=("bottom",))
         return block(floor, WALL, press(-1.0), shape=bk.Rectangle(1.0, 1.0, corner=(distance, distance)))
 
     with pytest.raises(ValueError, match=r"times its size from the origin.*subtract about"):
@@ -216,7 +218,7 @@ def test_rollers_on_a_far_slanted_wall_do_not_hold_a_body_that_is_pulled_off(
         axes = np.array([[np.cos(0.3), np.sin(0.3)], [-np.sin(0.3), np.cos(0.3)]])
         corners = [0.7 * distance, 0.6 * distance] + np.array([[0, 0], [1, 0], [1, 1], [0, 1]]) @ axes
         vertices = tuple((x, y) for x, y in corners.tolist())
-        floor = bk.Contact(bk.HalfPlane(point=vertices[0], normal=tuple(axes[1].tolist())))
+        floor = bk.Contact(bk.RigidHalfPlane(point=vertices[0], normal=tuple(axes[1].tolist())))
         parts = (
             bk.Part("floor", floor, sides=("side-1",)),
             bk.Part("wall", bk.Roller(), sides=("side-2",)),
@@ -234,7 +236,7 @@ def test_rollers_on_a_far_slanted_wall_do_not_hold_a_body_that_is_pulled_off(
 @DISCRETISATIONS
 @pytest.mark.parametrize(("gap", "pressure"), [(1e9, 1e-2), (1e3, 1e-6)])
 def test_a_gap_that_hides_the_deformation_is_named(discretisation: bk.Galerkin, gap: float, pressure: float) -> None:
-    low = bk.Part("floor", bk.Contact(bk.HalfPlane(point=(0.0, -gap))), sides=("bottom",))
+    low = bk.Part("floor", bk.Contact(bk.RigidHalfPlane(point=(0.0, -gap))), sides=("bottom",))
     solution = bk.run(block(low, WALL, press(pressure), discretisation=discretisation))
     assert solution.status is Status.TOO_FAR
     assert re.search(r"move body and obstacle together.*the travel is \d\.\de\+\d\d times", solution.message)
@@ -246,10 +248,10 @@ def loose_scenes() -> dict[str, bk.Scene]:
     rollers = [bk.Part(name, bk.Roller(), sides=(name,)) for name in ("arc-3", "arc-4")]
     far = bk.Part("far", bk.Contact(bk.Gap(0.2)), sides=("arc-2",))
     tight = bk.Part("tight", bk.Contact(bk.Gap(-6.3e-3)), sides=("arc-3",))
-    below = bk.Part("below", bk.Contact(bk.Circle((0.0, -20.0), 20.0)), sides=("arc-1",))
+    below = bk.Part("below", bk.Contact(bk.RigidCircle((0.0, -20.0), 20.0)), sides=("arc-1",))
     pulls = [bk.Part(name, bk.Pressure(-3.1e-5), sides=(name,)) for name in ("arc-2", "arc-4")]
     bump, dent = (bk.Contact(bk.Gap(bk.Expression(f"{gap} + x**2"))) for gap in (-1e-2, 0.0))
-    level = bk.Contact(bk.HalfPlane(point=(0.0, 1e-2)))
+    level = bk.Contact(bk.RigidHalfPlane(point=(0.0, 1e-2)))
     sides = [bk.Part(f"side-{k}", each, sides=(f"side-{k}",)) for k, each in enumerate((bump, level, dent), 1)]
     lifted = bk.Part("right", bk.PrescribedDisplacement(y=5e-4), sides=("right",))
     sticky, rough = bk.CohesiveCoulomb(0.0, 4e-9, cap=4e-8), bk.CohesiveCoulomb(100.0, 2.7e-4, cap=2.7e-3)
@@ -311,7 +313,7 @@ def test_rollers_along_a_circle_do_not_hold_a_rotation(discretisation: bk.Galerk
 def test_a_body_on_its_way_to_infinity_is_not_in_equilibrium() -> None:
     # the only contact node would have to be wedged by a turn that never closes its gap
     parts = (
-        bk.Part("c", bk.Contact(bk.HalfPlane()), sides=("inner-2",)),
+        bk.Part("c", bk.Contact(bk.RigidHalfPlane()), sides=("inner-2",)),
         bk.Part("t", bk.Traction(x=1e-4), sides=("outer-1",)),
         bk.Part("rollers", bk.Roller(), sides=("outer-2", "outer-3")),
         bk.Part("p", bk.Pressure(1e-2), sides=("inner-4",)),

@@ -25,7 +25,7 @@ def disc() -> bk.Scene:
         shape=bk.Disk(1.0, centre=(0.0, 1.0)),
         material=bk.Material(1.0, 0.3, bk.Plane.STRESS),
         parts=(
-            bk.Part("floor", bk.Contact(bk.HalfPlane()), sides=("arc-3", "arc-4"), where=bk.Expression("y < 0.5")),
+            bk.Part("floor", bk.Contact(bk.RigidHalfPlane()), sides=("arc-3", "arc-4"), where=bk.Expression("y < 0.5")),
             bk.Part("press", bk.PrescribedDisplacement(x=0.0, y=-0.01), ("arc-1", "arc-2"), bk.Expression("y > 1.8")),
         ),
         law=bk.Coulomb(bk.Expression("0.2 + x**2")),
@@ -45,7 +45,7 @@ def test_results_of_a_similar_scene_follow_by_its_factors(scene: bk.Scene) -> No
 
 
 def test_interference_scales_like_every_other_length() -> None:
-    raised = bk.Part("floor", bk.Contact(bk.HalfPlane(point=(0.0, 1e-3))), sides=("bottom",))
+    raised = bk.Part("floor", bk.Contact(bk.RigidHalfPlane(point=(0.0, 1e-3))), sides=("bottom",))
     scene = block(raised, bk.Part("top", bk.Clamped(), sides=("top",)))
     one, other = bk.run(scene), bk.run(SIMILARITY.apply(scene))
     # displacements of a clamped body scale with the gap alone, and tractions with E gap / size

@@ -35,7 +35,7 @@ def assembly(*, reflects: bool = False) -> bk.Assembly:
             **options,  # type: ignore[arg-type]
         )
 
-    floor = (bk.Part("floor", bk.Contact(bk.HalfPlane()), ("bottom",)),)
+    floor = (bk.Part("floor", bk.Contact(bk.RigidHalfPlane()), ("bottom",)),)
     load = bk.Part("load", bk.Traction(sign * 1.2e-4, -1e-3), ("top",))
     cohesive = bk.CohesiveCoulomb(FRICTION, cohesion=1e-5)
     return bk.Assembly(

@@ -33,7 +33,7 @@ def solved(*, is_symmetric: bool = False) -> bk.Solution:
         title="block",
         shape=bk.Rectangle(1.0, 1.5),
         material=bk.Material(1.0, 0.3),
-        parts=(bk.Part("floor", bk.Contact(bk.HalfPlane()), sides=("bottom",)),),
+        parts=(bk.Part("floor", bk.Contact(bk.RigidHalfPlane()), sides=("bottom",)),),
         law=bk.Coulomb(0.5),
         symmetry=bk.Symmetry(x=0.5) if is_symmetric else None,
         body_forces=symmetric if is_symmetric else FORCES,

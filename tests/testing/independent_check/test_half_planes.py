@@ -24,7 +24,7 @@ SIMILARITY = Similarity(length=3.0, modulus=70.0, stress=11.0, shift=(5.0, -7.0)
 BUMP = bk.Gap(bk.Expression("0.1 * x**2"))
 PUNCH = bk.Scene(
     title="a bump, a bonded punch and loads beside them",
-    shape=bk.HalfPlaneBody(-1.0, 1.5),
+    shape=bk.ElasticHalfPlane(-1.0, 1.5),
     material=bk.Material(1.0, 0.3, bk.Plane.STRESS),
     law=bk.Coulomb(0.3),
     parts=(
@@ -198,7 +198,9 @@ def test_a_half_plane_is_pushed_to_the_edge_of_sliding() -> None:
 def test_a_half_plane_among_several_bodies_is_checked_too() -> None:
     press = bk.Part("top", bk.Traction(0.0, -1e-3), sides=("top",))
     material = bk.Material(1.0, 0.3)
-    base = bk.Body(name="base", shape=bk.HalfPlaneBody(-2.0, 2.0), material=material, parts=(), mesh=bk.MeshOptions(30))
+    base = bk.Body(
+        name="base", shape=bk.ElasticHalfPlane(-2.0, 2.0), material=material, parts=(), mesh=bk.MeshOptions(30)
+    )
     shape = bk.Rectangle(1.0, 0.5, (-0.4, 0.0))
     block = bk.Body(name="block", shape=shape, material=material, parts=(press,), mesh=bk.MeshOptions(40))
     contacts = (bk.ContactPair(("block.bottom", "base.surface")),)

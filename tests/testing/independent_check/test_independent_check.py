@@ -230,7 +230,7 @@ def test_tresca_friction_across_a_gap_and_loose_bodies_pass() -> None:
 
 
 def test_a_body_that_an_overlap_pushed_aside_shows_the_smallest_traction_left_on_it() -> None:
-    inside = bk.Part("inside", bk.Contact(bk.Circle((0.5, -9.99), 10.0)), sides=("bottom",))
+    inside = bk.Part("inside", bk.Contact(bk.RigidCircle((0.5, -9.99), 10.0)), sides=("bottom",))
     solution = bk.run(block(inside))
     table = solution.contact
     assert violations_of_body(solution).is_good
@@ -254,7 +254,7 @@ def test_polygonal_obstacles_and_given_directions_are_measured_anew() -> None:
     points = np.array([[0.3, 1.5], [-1.0, 1.4], [2.0, 0.2], [0.5, 0.9], [0.0, 1.0], [0.4, 1.0]])
     normals = np.tile([0.0, -1.0], (len(points), 1))
     for vertices in ([[0, 0], [1, 0], [1, 1], [0, 1]], [[0, 1], [1, 1], [1, 0], [0, 0]]):
-        square = bk.PolygonalObstacle(tuple((float(x), float(y)) for x, y in vertices))
+        square = bk.RigidPolygon(tuple((float(x), float(y)) for x, y in vertices))
         distance, direction = distance_to(square, points, normals)
         assert distance == pytest.approx([0.5, np.hypot(1.0, 0.4), 1.0, -0.1, 0.0, 0.0], abs=1e-15)
         corner = np.array([1.0, -0.4]) / np.hypot(1.0, 0.4)
