@@ -211,17 +211,26 @@ def coarse_disc(elements: int) -> bk.Assembly:
     )
 
 
-def test_bodies_that_only_touch_between_their_nodes_are_warned_of() -> None:
-    """No node touches at half of 1e-3, the lowest elements are farther away on average: nothing is pressed."""
+def test_bodies_that_only_touch_between_their_nodes_are_warned_of_or_named() -> None:
+    """No node touches at half of 1e-3, the lowest elements are farther away on average: all forces are round-off.
+
+    Whether they count as forces depends on the last bits.
+    """
     solution = bk.run(coarse_disc(28))
-    assert solution.is_converged
+    assert solution.status in (bk.Status.CONVERGED, bk.Status.MISSED_CONTACT)
     assert measured(solution).penetration_depth == pytest.approx(5e-4, rel=1e-3)
     assert measured(solution).penetration > LARGEST_PENETRATION
-    told = [text for text in map(str, solution.warnings) if "between the nodes (more than the displacement" in text]
-    assert len(told) == 2, solution.warnings
-    assert "Contact 'low.top / disc.down': the sides overlap by 0.0005 between" in told[0]
+    if solution.is_converged:
+        found = [
+            text for text in map(str, solution.warnings) if "between the nodes (more than the displacement" in text
+        ]
+        assert len(found) == 2, solution.warnings
+        assert "Contact 'low.top / disc.down': the sides overlap by 0.0005 between" in found[0]
+    else:
+        assert "Contact 'low.top / disc.down' overlaps by 0.0005 at (" in solution.message
     nothing = np.zeros_like(solution.contact.s)  # instead of round-off
-    idle = replace(solution, contact=replace(solution.contact, sigma_n=nothing, sigma_t=nothing))
+    contact = replace(solution.contact, sigma_n=nothing, sigma_t=nothing)
+    idle = replace(solution, status=bk.Status.CONVERGED, contact=contact)
     assert any(
         "(50 % of how far bodies move, without contact forces)" in text for text in map(str, find_warnings(idle))
     )

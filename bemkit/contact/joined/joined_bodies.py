@@ -195,7 +195,10 @@ class JoinedBodies(CoupledMembers, LinearBody):
         eps = float(np.finfo(float).eps)
         sizes = abs(self.relative) @ np.abs(displacement) + np.abs(self.offset) + np.abs(state.displacement.ravel())
         of_sums = eps * self._over_members(np.add, terms) / total
-        round_off = max((eps * sizes * force_by_displacement).max(), of_sums.max())
+        n_roundings = 3 + np.diff(
+            self.relative.indptr
+        )  # of products and sums of a row, and of what it is compared with
+        round_off = max((0.5 * eps * n_roundings * sizes * force_by_displacement).max(), of_sums.max())
         return Imbalance(float(missing.max()), float(np.max(work, initial=0.0)), float(round_off))
 
     def _over_members(self, operation: np.ufunc, values: FloatArray) -> FloatArray:

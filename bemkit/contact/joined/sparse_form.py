@@ -32,9 +32,12 @@ _SMALLEST_RCOND = 1e-15
 """Reciprocal condition number from which on the system counts as singular; free motions are found before."""
 _LARGEST_RESIDUAL = 1e-13
 """Residual, relative to its terms, from which on a factorisation counts as failed."""
-_PENALTIES = (1e-8, 1e-12)
-"""Diagonal entries of the motions in the factored matrix; refinement removes their influence. Large ones take more
-rounds, small ones cost more digits in each round."""
+_POOR_RCOND = 1e-9
+"""Reciprocal condition number below which residuals are computed with more digits: bodies that are 1e7 times stiffer
+than their neighbours move by that much more than they deform."""
+_ATTEMPTS = ((1e-8, np.double), (1e-12, np.double), (1e-12, np.longdouble))
+"""Diagonal entries of the motions in the factored matrix, and the precision of residuals. Refinement removes the
+influence of these entries: large ones take more rounds, small ones cost more digits in each round."""
 _MOST_ROUNDS = 12
 """Rounds of refinement; three are usual."""
 _TINY = float(np.finfo(float).tiny)
@@ -253,32 +256,38 @@ def _solved(matrix: sparse.csr_array, right_side: FloatArray, n_motions: int) ->
     probe = 0.5 + spread_fractions(len(right_side))
     right_sides, is_motion = np.stack([right_side, probe], axis=1), np.arange(len(right_side)) >= len(probe) - n_motions
     rcond = 0.0
-    for penalty in _PENALTIES:
-        solutions, residual = _refined(scaled, terms, right_sides, np.where(is_motion, -penalty, 0.0))
+    for penalty, precision in _ATTEMPTS:
+        solutions, residual = _refined(scaled, terms, right_sides, np.where(is_motion, -penalty, 0.0), precision)
         if residual <= _LARGEST_RESIDUAL:
             rcond = 1.0 / (float(terms.sum(axis=1).max()) * float(np.abs(solutions[:, 1]).max()))
-            if rcond > _SMALLEST_RCOND:
-                return np.asarray(solutions[:, 0])
-            break
+            if rcond > _POOR_RCOND or (rcond > _SMALLEST_RCOND and precision is np.longdouble):
+                return np.asarray(solutions[:, 0], dtype=float)
+            if rcond <= _SMALLEST_RCOND:
+                break
     raise SingularResponse(f"the contact conditions do not hold the bodies (reciprocal condition {rcond:.1e})")
 
 
 def _refined(
-    matrix: sparse.csr_array, terms: sparse.csr_array, right_sides: FloatArray, penalty: FloatArray
+    matrix: sparse.csr_array,
+    terms: sparse.csr_array,
+    right_sides: FloatArray,
+    penalty: FloatArray,
+    precision: type[np.floating[Any]],
 ) -> tuple[FloatArray, float]:
     """Solve by iterative refinement with the factors of a matrix with a penalty; return also the largest residual.
 
     `terms` are the absolute values of the entries; residuals are relative to them.
     """
+    exact, right_sides = matrix.astype(precision), right_sides.astype(precision)
     solutions, before = np.zeros_like(right_sides), np.inf
     try:
         with factored(sparse.csr_array(matrix + sparse.diags_array(penalty))) as solve:
             for _ in range(_MOST_ROUNDS):
-                following = solutions + solve(right_sides - matrix @ solutions)
+                following = solutions + solve((right_sides - exact @ solutions).astype(float))
                 if not np.isfinite(following).all():
                     break
                 sizes = (terms @ np.abs(following) + np.abs(right_sides)).max(axis=0)
-                residuals = np.abs(right_sides - matrix @ following).max(axis=0)
+                residuals = np.abs(right_sides - exact @ following).max(axis=0)
                 residual = float((residuals / np.maximum(sizes, _TINY)).max())
                 if residual < before:
                     solutions = following
