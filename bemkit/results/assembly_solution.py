@@ -245,13 +245,20 @@ class AssemblySolution(SolvedProblem):
     def estimated_traction_error(self) -> float | None:
         """Estimated error of the contact tractions of all bodies in L2, relative to their norm.
 
-        From degree 3 on; None for other elements, and if there are no such tractions. Elements at edges that press into
-        another side, and at singular corners, are excluded; see `contact_elements`.
+        None if a body has no error estimate, if there are no such tractions, or fewer than three nodes carry them. From
+        degree 3 on elements at edges that press into another side, and at singular corners, are excluded; see
+        `contact_elements`.
         """
         size, errors_of_bodies = self.contact_traction_size, [body.coefficient_errors for body in self.solved_bodies]
-        if size == 0.0 or any(errors is None for errors in errors_of_bodies):
+        if size == 0.0 or not all(body.scene.discretisation.estimates_error for body in self.solved_bodies):
             return None
-        from bemkit.results.error_indicators import place_error
+        from bemkit.results.error_indicators import nodal_error, place_error
+
+        if any(errors is None for errors in errors_of_bodies):
+            bodies = self.solved_bodies
+            degree = min(body.scene.discretisation.displacement_space(body.mesh).degree for body in bodies)
+            of_nodes = nodal_error(self.contact, degree, self.n_sides)
+            return None if of_nodes is None else float(np.sqrt(of_nodes)) / size
 
         elements = {name: self.contact_elements(name) for name in self.bodies}
         squared = sum(

@@ -76,12 +76,15 @@ class Solution(SolvedProblem, SolvedBody):
             return self.surface_errors.in_the_mean
         if not self.scene.discretisation.estimates_error or self.contact_traction_size == 0.0:
             return None
-        from bemkit.results.error_indicators import contact_errors, place_error
+        from bemkit.results.error_indicators import nodal_error, place_error
         from bemkit.results.zone_ends import zone_end
 
         if self.coefficient_errors is None:
-            degree = max(self.scene.discretisation.displacement_space(self.mesh).degree, 1)
-            squared = float(contact_errors(self.contact, degree).sum())
+            degree = self.scene.discretisation.displacement_space(self.mesh).degree
+            of_nodes = nodal_error(self.contact, degree, self.n_sides)
+            if of_nodes is None:
+                return None
+            squared = of_nodes
         else:
             squared = float(self.coefficient_errors.traction[self.contact_elements].sum())
             squared += sum(

@@ -40,10 +40,10 @@ def summary_rows(solution: Solution | AssemblySolution) -> Iterator[tuple[str, s
     """Yield names and texts of all that a summary says of a result, numbers with their units."""
     yield "status", _status(solution)
     if isinstance(solution, Solution):
-        solver, of_tractions = solution.scene.solver, _traction_errors(solution)
+        solver = solution.scene.solver
         yield from _body_rows(solution)
     else:
-        solver, of_tractions = solution.assembly.solver, ""
+        solver = solution.assembly.solver
         yield from _bodies_rows(solution)
     if has_contact := solution.contact.n_contact > 0:
         yield "contact nodes", _node_counts(solution)
@@ -54,7 +54,8 @@ def summary_rows(solution: Solution | AssemblySolution) -> Iterator[tuple[str, s
     yield "elastic energy", f"{_amount(solution.energy, 'energy', solution.units)}  per unit thickness"
     yield from _history_rows(solution)
     if solution.estimated_error is not None:
-        yield "estimated error", f"{solution.estimated_error:.1e}  relative, in the energy norm{of_tractions}"
+        words = f"{solution.estimated_error:.1e}  relative, in the energy norm{_traction_errors(solution)}"
+        yield "estimated error", words
     if has_contact:
         yield "transitions", "\n".join(_transition_lines(solution))
         drivers = drivers_at_work(solver, (record.message for record in solution.history))
@@ -142,8 +143,9 @@ def _part_rows(solution: Solution | AssemblySolution) -> Iterator[tuple[str, str
         yield "", f"and {len(rigid) - _MANY_CONTACTS} rigid bodies more (--json -)"
 
 
-def _traction_errors(solution: Solution) -> str:
-    tractions, local = solution.estimated_traction_error, solution.estimated_local_traction_error
+def _traction_errors(solution: Solution | AssemblySolution) -> str:
+    tractions = solution.estimated_traction_error
+    local = solution.estimated_local_traction_error if isinstance(solution, Solution) else None
     words = "" if tractions is None else f", {tractions:.1e} of contact tractions"
     return words if local is None else f"{words}, {local:.1e} of single ones"
 

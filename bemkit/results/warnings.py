@@ -28,6 +28,8 @@ if TYPE_CHECKING:
 
 LARGEST_ERROR = 0.05
 """Estimated relative error above which a solution carries a warning."""
+LARGEST_TRACTION_ERROR = 0.2
+"""The same for contact tractions, of which single elements in a zone may be wrong by more."""
 LARGEST_SHARE_ALONE = 0.2
 """Share of the boundary without an estimate above which the estimate of the whole is unreliable."""
 LARGEST_TURN = 50.0
@@ -57,7 +59,7 @@ def find_warnings(solution: Solution | AssemblySolution) -> tuple[ResultWarning,
     of_all: list[Iterator[ResultWarning]]
     titled: dict[str, SolvedBody]
     if isinstance(solution, Solution):
-        laws, of_all = solution.scene.laws, [_error(solution), _turned(solution)]
+        laws, of_all = solution.scene.laws, [_error(solution)]
         titled = {"": solution}
     else:
         from bemkit.results.overlaps import overlap_warnings  # only of several bodies
@@ -69,6 +71,7 @@ def find_warnings(solution: Solution | AssemblySolution) -> tuple[ResultWarning,
     of_bodies = [_in_body(name, found) for name, body in titled.items() for found in _of_body(solution, body)]
     found = [
         *of_all,
+        _large_of_tractions(solution.estimated_traction_error, remedy),
         *of_bodies,
         _no_load(solution),
         _narrow_zones(solution.contact, smooth, remedy),
@@ -80,6 +83,8 @@ def find_warnings(solution: Solution | AssemblySolution) -> tuple[ResultWarning,
 def _of_body(solution: Solution | AssemblySolution, body: SolvedBody) -> tuple[Iterator[ResultWarning], ...]:
     """Return the kinds of warnings about one body."""
     return (
+        _without_estimate(body),
+        _turned(body),
         _coarse_curves(body.mesh),
         _large_strains(body),
         _unbounded_tractions(solution, body),
@@ -132,6 +137,12 @@ def _large(error: float | None, remedy: str) -> Iterator[ResultWarning]:
         yield ResultWarning("large estimated error", "", text, error)
 
 
+def _large_of_tractions(error: float | None, remedy: str) -> Iterator[ResultWarning]:
+    if error is not None and error > LARGEST_TRACTION_ERROR:
+        text = f"The estimated error of contact tractions is {100.0 * error:.2g} %: {remedy}."
+        yield ResultWarning("large estimated error of tractions", "", text, error)
+
+
 def _error(solution: Solution) -> Iterator[ResultWarning]:
     """Warn of a large estimated error, and of an error that could not be estimated."""
     discretisation = solution.scene.discretisation
@@ -144,10 +155,14 @@ def _error(solution: Solution) -> Iterator[ResultWarning]:
         text = f"No error could be estimated, because {energy}: {remedy}."
         yield ResultWarning("no estimated error", "", text, solution.energy)
     yield from _large(error, _remedy((solution,)))
-    if solution.coefficient_errors is not None:
+
+
+def _without_estimate(body: SolvedBody) -> Iterator[ResultWarning]:
+    """Warn of elements without a neighbour on their piece, which have no jumps of strains; of degree 1 and 2."""
+    discretisation = body.scene.discretisation
+    if not discretisation.estimates_error or body.coefficient_errors is not None:
         return  # elements of high degree are judged by themselves
-    # elements without a neighbour on their piece have no jumps of strains
-    whole = solution.mesh.whole
+    whole = body.mesh.whole
     is_alone = break_nodes(whole)[whole.elements].all(axis=1)
     if (share := whole.lengths[is_alone].sum() / whole.lengths.sum()) > LARGEST_SHARE_ALONE:
         yield ResultWarning(
@@ -159,9 +174,9 @@ def _error(solution: Solution) -> Iterator[ResultWarning]:
         )
     from bemkit.results.error_indicators import blind_elements
 
-    is_blind = blind_elements(solution.mesh, discretisation.traction_space(solution.mesh).degree)
-    for part in solution.scene.parts:
-        elements = solution.mesh.part(part.name)
+    is_blind = blind_elements(body.mesh, discretisation.traction_space(body.mesh).degree)
+    for part in body.scene.parts:
+        elements = body.mesh.part(part.name)
         if isinstance(part.condition, Clamped | Roller | PrescribedDisplacement) and is_blind[elements].any():
             count = "1 element" if elements.size == 1 else f"{elements.size} elements"
             yield ResultWarning(
@@ -173,12 +188,12 @@ def _error(solution: Solution) -> Iterator[ResultWarning]:
             )
 
 
-def _turned(solution: Solution) -> Iterator[ResultWarning]:
+def _turned(body: SolvedBody) -> Iterator[ResultWarning]:
     """Warn of constant elements without slopes, which take rotation for strain, if the rotation is larger."""
-    discretisation, mesh = solution.scene.discretisation, solution.mesh
+    discretisation, mesh = body.scene.discretisation, body.mesh
     if discretisation.keeps_rotations:
         return
-    points, displacement = solution.boundary.points, solution.boundary.displacement
+    points, displacement = body.boundary.points, body.boundary.displacement
     strained = without_motion(mesh, points, displacement)
     motion = displacement - strained
     turn = np.hypot(*(motion - motion.mean(axis=0)).T).max() / np.hypot(*(points - points.mean(axis=0)).T).max()
