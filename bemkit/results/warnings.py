@@ -18,6 +18,7 @@ from bemkit.operators.rigid_modes import without_motion
 from bemkit.result_warning import ResultWarning, first_of_each_kind
 from bemkit.results.between_nodes import BetweenNodes
 from bemkit.results.contact_table import ContactTable
+from bemkit.results.law_jumps import law_jumps
 from bemkit.results.solution import Solution
 from bemkit.results.solved_body import SolvedBody
 from bemkit.scene.conditions import Clamped, PrescribedDisplacement, Roller
@@ -73,6 +74,7 @@ def find_warnings(solution: Solution | AssemblySolution) -> tuple[ResultWarning,
         *of_all,
         _large_of_tractions(solution.estimated_traction_error, remedy),
         *of_bodies,
+        law_jumps(solution.contact, laws),
         _no_load(solution),
         _narrow_zones(solution.contact, smooth, remedy),
         _hidden_overlaps(solution.contacts_between_nodes, solution.contact, solution.units, remedy),

@@ -1,0 +1,48 @@
+"""Friction coefficients that jump inside an element."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+import bemkit as bk
+from tests.scenes import paper
+
+
+def warned(coefficient: bk.Expression, scene: bk.Scene | bk.Assembly) -> list[str]:
+    solution = bk.run(replace(scene, law=bk.Coulomb(coefficient)))
+    return [str(each) for each in solution.warnings if each.kind == "jump of friction"]
+
+
+@pytest.mark.parametrize("elements", [bk.ConstantCollocation(), bk.Galerkin(1), bk.Galerkin(2)])
+def test_a_jump_inside_an_element_is_named_with_its_place(elements: bk.Galerkin | bk.ConstantCollocation) -> None:
+    scene = paper(2, elements, bk.MeshOptions(elements=60))
+    (text,) = warned(bk.Expression("where(x < 0.234, 0.2, 0.9)"), scene)
+    assert text.startswith("Friction of contact 'foundation' jumps at (0.234, 0), inside an element: divide"), text
+
+
+@pytest.mark.parametrize("formula", ["0.1 + 0.3 * x", "0.2 + 0.2 * tanh(40 * (x - 0.25))", "where(x < 99, 0.2, 0.9)"])
+def test_what_varies_without_a_jump_is_not(formula: str) -> None:
+    assert not warned(bk.Expression(formula), paper(2, bk.Galerkin(1), bk.MeshOptions(elements=60)))
+
+
+def test_a_jump_between_two_bodies_is_named() -> None:
+    scene = bk.load_scene("pin-in-plate")
+    texts = warned(bk.Expression("where(x < 0.15, 0.1, 0.6)"), scene)
+    assert texts
+    assert all("Friction of contact 'pin.surface / plate.hole' jumps at (" in text for text in texts), texts
+    assert all("jumps at (0.15, " in text for text in texts), texts
+
+
+def test_a_jump_where_a_part_ends_is_none() -> None:
+    """Two parts that meet there, each with its own law, as the warning advises."""
+    scene = paper(2, bk.Galerkin(1), bk.MeshOptions(elements=60))
+    contact = next(part for part in scene.parts if part.name == "foundation")
+    halves = tuple(
+        bk.Part(name, bk.Contact(bk.RigidHalfPlane(), bk.Coulomb(friction)), contact.sides, bk.Expression(where))
+        for name, friction, where in (("left", 0.2, "x < 0.234"), ("right", 0.9, "x >= 0.234"))
+    )
+    others = tuple(part for part in scene.parts if part is not contact)
+    solution = bk.run(replace(scene, parts=(*halves, *others)))
+    assert not [each for each in solution.warnings if each.kind == "jump of friction"]
