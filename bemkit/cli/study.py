@@ -1,10 +1,11 @@
-"""The commands of studies: ``bemkit study errors | solutions``."""
+"""The commands of studies: ``bemkit study errors | solutions | increments``."""
 
 from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from dataclasses import asdict
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -158,6 +159,32 @@ def solutions(scene: str, starts: int, elements: int | None, json_file: str | No
     if json_file != STDOUT:
         _print_solutions(found, starts)
     return 0 if found else NOT_CONVERGED
+
+
+@study.command()
+@click.argument("scene")
+@options.elements_option
+@options.json_option
+def increments(scene: str, elements: int | None, json_file: str | None) -> None:
+    """Solve the load history of SCENE with every increment halved, and compare."""
+    with shown_progress(quiet=False), concerning(scene):
+        from bemkit.scene.toml import load_scene, with_overrides
+        from bemkit.studies.increments import IncrementErrors, increment_errors
+
+        def as_json(errors: IncrementErrors) -> str:
+            return json_text(asdict(errors))
+
+        output = TextFile(json_file, as_json)
+        output.check()
+        chosen: Any = load_scene(scene)
+        errors = increment_errors(with_overrides(chosen, elements=elements))
+    output.write(errors)
+    if json_file != STDOUT:
+        print(f"{errors.n_increments} increments; halving all of them changes")
+        for name in ("external_work", "dissipation", "tractions"):
+            change = getattr(errors, name)
+            shown = "none" if change is None else f"{change:.1e}"
+            print(f"{name.replace('_', ' '):14} {shown}")
 
 
 def _print_solutions(found: Sequence[Solution], n_starts: int) -> None:

@@ -9,6 +9,7 @@ import numpy as np
 from bemkit.arrays import BoolArray, FloatArray
 from bemkit.contact.laws import FrictionLaw, LawOfCoefficients
 from bemkit.geometry.errors import format_point
+from bemkit.geometry.vectors import norms
 from bemkit.result_warning import ResultWarning
 from bemkit.results.contact_table import ContactTable
 
@@ -37,8 +38,10 @@ def law_jumps(contact: ContactTable, laws: Mapping[str, FrictionLaw]) -> Iterato
         if not _varies(law) or rows.size < 2 or pressure == 0.0:
             continue
         points = np.stack([contact.x[rows], contact.y[rows]], axis=1)
-        is_pressed = contact.sigma_n[rows] != 0.0
-        for place in _jumps(law, pressure, points, is_pressed[:-1] | is_pressed[1:]):
+        is_pressed, arc = contact.sigma_n[rows] != 0.0, np.diff(contact.s[rows])
+        # between two pieces of a contact the arc length stays, and nothing is blurred
+        is_on_piece = norms(np.diff(points, axis=0)) <= (1.0 + _AT_NODE) * arc
+        for place in _jumps(law, pressure, points, is_on_piece & (is_pressed[:-1] | is_pressed[1:])):
             text = (
                 f"Friction of contact {name!r} jumps at {format_point(place)}, inside an element: divide the contact "
                 "there into parts, each with a law of its own."

@@ -46,3 +46,17 @@ def test_a_jump_where_a_part_ends_is_none() -> None:
     others = tuple(part for part in scene.parts if part is not contact)
     solution = bk.run(replace(scene, parts=(*halves, *others)))
     assert not [each for each in solution.warnings if each.kind == "jump of friction"]
+
+
+def test_a_jump_between_two_pieces_of_a_part_is_none() -> None:
+    pads = bk.Part("pads", bk.Contact(bk.RigidHalfPlane()), ("bottom",), bk.Expression("abs(x - 2) > 1"))
+    scene = bk.Scene(
+        title="Two pads",
+        shape=bk.Rectangle(4.0, 1.0),
+        material=bk.Material(1.0, 0.3),
+        parts=(pads, bk.Part("top", bk.PrescribedDisplacement(0.002, -0.01), ("top",))),
+        discretisation=bk.Galerkin(1),
+        mesh=bk.MeshOptions(elements=80),
+    )
+    assert not warned(bk.Expression("where(x < 2, 0.2, 0.9)"), scene)
+    assert warned(bk.Expression("where(x < 0.7, 0.2, 0.9)"), scene)

@@ -46,7 +46,7 @@ def test_the_estimate_is_near_the_error(degree: int, n_elements: int, reference:
 
 
 def test_tractions_that_a_few_nodes_carry_are_warned_of() -> None:
-    """The estimate in energy is 2 %: tractions are wrong by a third."""
+    """Tractions are wrong by a third; the estimate of coarse zones is on the safe side."""
     solution = solved("two-cylinders", 2, bk.MeshOptions(elements=80))
     texts = [str(warning) for warning in solution.warnings]
     assert any(text.startswith("The estimated error of contact tractions is 88 %: use more") for text in texts), texts
