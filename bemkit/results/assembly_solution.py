@@ -252,13 +252,9 @@ class AssemblySolution(SolvedProblem):
         size, errors_of_bodies = self.contact_traction_size, [body.coefficient_errors for body in self.solved_bodies]
         if size == 0.0 or not all(body.scene.discretisation.estimates_error for body in self.solved_bodies):
             return None
-        from bemkit.results.error_indicators import nodal_error, place_error
-
         if any(errors is None for errors in errors_of_bodies):
-            bodies = self.solved_bodies
-            degree = min(body.scene.discretisation.displacement_space(body.mesh).degree for body in bodies)
-            of_nodes = nodal_error(self.contact, degree, self.n_sides)
-            return None if of_nodes is None else float(np.sqrt(of_nodes)) / size
+            return self._error_of_nodal_tractions()
+        from bemkit.results.error_indicators import place_error
 
         elements = {name: self.contact_elements(name) for name in self.bodies}
         squared = sum(

@@ -76,21 +76,16 @@ class Solution(SolvedProblem, SolvedBody):
             return self.surface_errors.in_the_mean
         if not self.scene.discretisation.estimates_error or self.contact_traction_size == 0.0:
             return None
-        from bemkit.results.error_indicators import nodal_error, place_error
+        if self.coefficient_errors is None:
+            return self._error_of_nodal_tractions()
+        from bemkit.results.error_indicators import place_error
         from bemkit.results.zone_ends import zone_end
 
-        if self.coefficient_errors is None:
-            degree = self.scene.discretisation.displacement_space(self.mesh).degree
-            of_nodes = nodal_error(self.contact, degree, self.n_sides)
-            if of_nodes is None:
-                return None
-            squared = of_nodes
-        else:
-            squared = float(self.coefficient_errors.traction[self.contact_elements].sum())
-            squared += sum(
-                place_error(self.contact, each, self.transitions, zone_end(self.mesh, self.contact, each))
-                for each in self.transitions
-            )
+        squared = float(self.coefficient_errors.traction[self.contact_elements].sum())
+        squared += sum(
+            place_error(self.contact, each, self.transitions, zone_end(self.mesh, self.contact, each))
+            for each in self.transitions
+        )
         return float(np.sqrt(squared)) / self.contact_traction_size
 
     @cached_property

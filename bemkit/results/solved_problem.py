@@ -187,6 +187,15 @@ class SolvedProblem(Explorable):
         squared = table.weight * (table.sigma_n**2 + table.sigma_t**2)
         return float(np.sqrt(sum(self.n_sides(name) * squared[table.rows(name)].sum() for name in table.parts)))
 
+    def _error_of_nodal_tractions(self) -> float | None:
+        """Return the error of contact tractions by `nodal_error`, relative to `contact_traction_size`."""
+        from bemkit.results.error_indicators import nodal_error
+
+        bodies = self.solved_bodies
+        degree = min(body.scene.discretisation.displacement_space(body.mesh).degree for body in bodies)
+        squared = nodal_error(self.contact, degree, self.n_sides)
+        return None if squared is None else float(np.sqrt(squared)) / self.contact_traction_size
+
     @property
     def units(self) -> UnitNames | None:
         """Names of units, if what was solved has them."""
