@@ -278,12 +278,12 @@ def _refined(
 
     `terms` are the absolute values of the entries; residuals are relative to them.
     """
-    exact, right_sides = matrix.astype(precision), right_sides.astype(precision)
+    exact, right_sides = matrix.astype(precision, copy=False), right_sides.astype(precision, copy=False)
     solutions, before = np.zeros_like(right_sides), np.inf
     try:
         with factored(sparse.csr_array(matrix + sparse.diags_array(penalty))) as solve:
             for _ in range(_MOST_ROUNDS):
-                following = solutions + solve((right_sides - exact @ solutions).astype(float))
+                following = solutions + solve((right_sides - exact @ solutions).astype(float, copy=False))
                 if not np.isfinite(following).all():
                     break
                 sizes = (terms @ np.abs(following) + np.abs(right_sides)).max(axis=0)
