@@ -63,9 +63,6 @@ from bemkit.runs.critical_friction import critical_friction as critical_friction
 from bemkit.runs.distinct_solutions import distinct_solutions as distinct_solutions
 from bemkit.runs.first_yield import first_yield as first_yield
 from bemkit.runs.run import run as run
-from bemkit.scene.assembly import Assembly as Assembly
-from bemkit.scene.assembly import ContactPair as ContactPair
-from bemkit.scene.assembly import Touching as Touching
 from bemkit.scene.body import Body as Body
 from bemkit.scene.body_forces import Gravity as Gravity
 from bemkit.scene.body_forces import Heating as Heating
@@ -79,6 +76,8 @@ from bemkit.scene.conditions import PrescribedDisplacement as PrescribedDisplace
 from bemkit.scene.conditions import Pressure as Pressure
 from bemkit.scene.conditions import Roller as Roller
 from bemkit.scene.conditions import Traction as Traction
+from bemkit.scene.contacts import ContactPair as ContactPair
+from bemkit.scene.contacts import Touching as Touching
 from bemkit.scene.copies import CircleCopies as CircleCopies
 from bemkit.scene.copies import GridCopies as GridCopies
 from bemkit.scene.copies import ListedCopies as ListedCopies

@@ -53,7 +53,7 @@ def main(courses: int = 20, per_course: int = 50) -> None:
     lap(f"{found.status.name} after {found.linear_solves} responses")
 
 
-def assembled(assembly: bk.Assembly) -> None:
+def assembled(assembly: bk.Scene) -> None:
     """Print steps, stages and memory of an assembly."""
     begin = time.perf_counter()
 

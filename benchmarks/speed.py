@@ -106,7 +106,7 @@ def main() -> None:
     keep_memory()
     sizes = [int(word) for word in sys.argv[1:]] or [320, 1000, 2000]
     console = Console()
-    table = Table(title="Assembly and solve against LAPACK (medians)")
+    table = Table(title="Scene and solve against LAPACK (medians)")
     columns = ("N", "LU [ms]", "Chol. [ms]", "colloc. / LU", "Galerkin / LU", "colloc. run [ms]", "Galerkin run [ms]")
     for column in (*columns, "Galerkin run / (10 Chol. + 50 ms)"):
         table.add_column(column, justify="right")

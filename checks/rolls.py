@@ -27,9 +27,9 @@ from bemkit.formulas import Expression
 from bemkit.geometry.shapes import Rectangle, Sector
 from bemkit.operators.material import Material
 from bemkit.runs.run import run
-from bemkit.scene.assembly import Assembly, ContactPair
 from bemkit.scene.body import Body
 from bemkit.scene.conditions import Clamped, Contact, Part, PrescribedDisplacement
+from bemkit.scene.contacts import ContactPair
 from bemkit.scene.discretisation import ConstantCollocation, Galerkin
 from bemkit.scene.mesh_options import MeshOptions
 from bemkit.scene.scene import Scene
@@ -48,7 +48,7 @@ DISCRETISATIONS = {
 class Roll:
     """A body or two, and by how much they overlap if nothing gives way; negative where they stay apart."""
 
-    scene: Scene | Assembly
+    scene: Scene
     approach: float
     words: str
 
@@ -67,7 +67,7 @@ def drawn_roll(seed: int, index: int) -> Roll:
     law = draw.one_of((Frictionless(), Coulomb(0.3)))
     make = _at_block if draw.chance(0.4) else _at_obstacle
     scene = make(draw, radius, approach, material, DISCRETISATIONS[name], mesh, law)
-    n_bodies = 2 if isinstance(scene, Assembly) else 1
+    n_bodies = len(scene.placed_bodies)
     return Roll(scene, approach, f"{n_bodies} bodies, {name}, {accuracy or elements}, approach {approach / radius:.2e}")
 
 
@@ -92,7 +92,7 @@ def _at_obstacle(draw, radius, approach, material, discretisation, mesh, law) ->
     )  # fmt: skip
 
 
-def _at_block(draw, radius, approach, material, discretisation, mesh, law) -> Assembly:
+def _at_block(draw, radius, approach, material, discretisation, mesh, law) -> Scene:
     centre = (radius * draw.between(-0.5, 0.5), radius)
     own = {} if mesh.accuracy is not None else {"mesh": mesh}
     block = Body(
@@ -111,7 +111,7 @@ def _at_block(draw, radius, approach, material, discretisation, mesh, law) -> As
     )
     sides = draw.one_of((("disc.arc", "block.top"), ("block.top", "disc.arc")))
     options = {"mesh": mesh} if mesh.accuracy is not None else {}
-    return Assembly(
+    return Scene(
         title="roll", bodies=(block, disc), contacts=(ContactPair(sides),), law=law, discretisation=discretisation,
         **options,
     )  # fmt: skip

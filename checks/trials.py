@@ -13,11 +13,8 @@ from pathlib import Path
 from typing import Any
 
 from bemkit.errors import BemkitError
-from bemkit.results.assembly_solution import AssemblySolution
 from bemkit.results.solution import Solution
 from bemkit.runs.run import run
-from bemkit.scene.assembly import Assembly
-from bemkit.scene.scene import Scene
 from bemkit.studies.engine import Task
 from bemkit.testing.independent_check import energy_fault, violations_of
 from checks.random_assemblies import random_assembly
@@ -73,7 +70,7 @@ class Trial:
         return self.outcome in (Outcome.WRONG, Outcome.TRACEBACK)
 
 
-def drawn_case(seed: int, index: int) -> RandomCase[Scene] | RandomCase[Assembly]:
+def drawn_case(seed: int, index: int) -> RandomCase | RandomCase:
     """Draw what a trial solves; see `random_case` and `random_assembly`."""
     return random_assembly(seed, index) if index % EVERY == EVERY - 1 else random_case(seed, index)
 
@@ -92,16 +89,16 @@ def try_case(seed: int, index: int) -> Trial:
 
 
 def solved_steps(
-    case: RandomCase[Scene] | RandomCase[Assembly],
-) -> Sequence[Solution] | Sequence[AssemblySolution]:
+    case: RandomCase | RandomCase,
+) -> Sequence[Solution] | Sequence[Solution]:
     """Solve the scenes of a case; one solution for each load step."""
     scenes: Any = case.scenes
     return [run(scenes[0])] if len(scenes) == 1 and scenes[0].n_steps == 1 else run(scenes)
 
 
-def judge(steps: Iterable[Solution] | Iterable[AssemblySolution]) -> tuple[Outcome, str, str]:
+def judge(steps: Iterable[Solution]) -> tuple[Outcome, str, str]:
     """Judge the steps of a load history by the independent check; return outcome, reason and message, see `Trial`."""
-    solutions: tuple[Solution | AssemblySolution, ...] = tuple(steps)
+    solutions: tuple[Solution, ...] = tuple(steps)
     for before, step in pairwise((None, *solutions)):
         if step is None or not step.is_converged:
             continue
@@ -111,7 +108,7 @@ def judge(steps: Iterable[Solution] | Iterable[AssemblySolution]) -> tuple[Outco
         if fault := energy_fault(step):
             return Outcome.WRONG, "energy of the load history", fault
         # meshes of which an earlier step has warned stay what they are when the load goes
-        warned = solutions if isinstance(step, AssemblySolution) else (step,)
+        warned = solutions if step.scene.bodies else (step,)
         if check.needs_warning and not any(each.warnings for each in warned):
             return Outcome.WRONG, check.needs_warning, check.description
     last = solutions[-1]

@@ -20,7 +20,6 @@ from matplotlib.figure import Figure
 
 import bemkit as bk
 from bemkit.pictures.catalogue import default_pictures, figures
-from bemkit.results.assembly_solution import AssemblySolution
 from bemkit.scene.toml import shipped_files
 
 FOLDER = Path(__file__).parent / "gallery"
@@ -98,7 +97,7 @@ def run_scene(entry: Entry, folder: Path) -> tuple[str, str, Mapping[str, Figure
     return scene.title, text, chosen(solution)
 
 
-def chosen(solution: bk.Solution | AssemblySolution) -> dict[str, Figure]:
+def chosen(solution: bk.Solution) -> dict[str, Figure]:
     """Draw the deformation and the most informative other picture."""
     suiting = [picture.name for picture in default_pictures(solution)]
     second = next(name for name in SECOND if name in suiting)

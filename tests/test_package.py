@@ -23,8 +23,8 @@ NOT_NEEDED = (
     *("operators.particular_solutions", "model.particular", "model.free_motion", "model.untouched_body"),
     *("geometry.drawn", "geometry.nurbs", "geometry.files", "geometry.arclength"),
     *("geometry.reflection", "geometry.meshing.partition", "geometry.meshing.layers"),
-    *("scene.assembly", "model.joined", "contact.joined", "scene.places", "scene.symmetry"),
-    *("results.assembly_solution", "results.part_forces", "results.zone_ends"),
+    *("model.joined", "contact.joined", "scene.places", "scene.symmetry"),
+    *("results.between_bodies", "results.contact_places", "results.zone_ends"),
     *("runs.warm_start", "solvers.homotopy", "solvers.multistart"),
 )
 """Of a scene with one body of straight sides on one obstacle, solved by collocation from a number of elements."""

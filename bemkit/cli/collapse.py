@@ -42,12 +42,11 @@ def collapse(
         raise click.UsageError("--plot draws the line of thrust: add --thrust CONTACT")
     with shown_progress(quiet=False), concerning(scene):
         from bemkit.runs.collapse import coulomb_load_factor, thrust
-        from bemkit.scene.assembly import Assembly
         from bemkit.scene.places import with_settings
         from bemkit.scene.toml import load_scene
 
         chosen = with_settings(load_scene(scene), settings)
-        if not isinstance(chosen, Assembly):
+        if not chosen.bodies:
             raise InputError("the scene is a single body: give one with tables [bodies.NAME]")
 
         def pictures(states: tuple[JointForces, JointForces]) -> Mapping[str, Figure]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING
 
 from rich.console import Console, Group
 from rich.table import Table
@@ -17,11 +16,8 @@ from bemkit.results.solution import Solution
 from bemkit.results.summary_rows import summary_rows
 from bemkit.solvers.base import StepRecord
 
-if TYPE_CHECKING:
-    from bemkit.results.assembly_solution import AssemblySolution
 
-
-def print_summary(solution: Solution | AssemblySolution, console: Console | None = None) -> None:
+def print_summary(solution: Solution, console: Console | None = None) -> None:
     """Print a solution as a compact table, to standard output by default."""
     console = stdout_console(console)
     table = Table(box=None, show_header=False, padding=(0, 2, 0, 0), title_justify="left")
@@ -34,7 +30,7 @@ def print_summary(solution: Solution | AssemblySolution, console: Console | None
     _print_warnings(solution.warnings, console)
 
 
-def _status(solution: Solution | AssemblySolution, text: str) -> Text:
+def _status(solution: Solution, text: str) -> Text:
     colour = "green" if solution.is_converged else "yellow" if solution.is_certified else "red"
     words = len(solution.status_words)
     return Text.assemble((text[:words], f"bold {colour}"), text[words:])
@@ -80,7 +76,7 @@ class ConvergenceTable:
         self._console.print(Text(f"{line}  {record.message}".rstrip()))
 
 
-def print_explanation(solution: Solution | AssemblySolution, output_seconds: float, *, to_stderr: bool = False) -> None:
+def print_explanation(solution: Solution, output_seconds: float, *, to_stderr: bool = False) -> None:
     """Print planned and measured time and memory, the counts, and what was skipped.
 
     Memory was traced in the run, which makes small scenes about twice as slow. Standard output may be taken by data.
@@ -90,7 +86,7 @@ def print_explanation(solution: Solution | AssemblySolution, output_seconds: flo
     console.print(_left_out(solution))
 
 
-def _stages(solution: Solution | AssemblySolution, output_seconds: float) -> Table:
+def _stages(solution: Solution, output_seconds: float) -> Table:
     table = plain_table(("stage",), ("time", "memory"), gap=2)
     for name, seconds in solution.timings.items():
         if name != "total" and seconds > 0.0:  # a stage that this run did not need is not listed
@@ -124,7 +120,7 @@ def _lines(work: OperationCounts) -> Iterator[tuple[str, str]]:
     yield "unknowns of the contact system", f"{work.contact_unknowns:,}"
 
 
-def _left_out(solution: Solution | AssemblySolution) -> Table:
+def _left_out(solution: Solution) -> Table:
     table = plain_table(("skipped", "why"), gap=2)
     for item in solution.plan.items:
         if not item.is_needed:

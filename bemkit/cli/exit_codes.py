@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from bemkit.results.assembly_solution import AssemblySolution
     from bemkit.results.solution import Solution
 
 NOT_CONVERGED = 1
@@ -17,7 +16,7 @@ INACCURATE = 3
 INTERRUPTED, PIPE_CLOSED, TERMINATED = 130, 141, 143
 
 
-def exit_code_of(solution: Solution | AssemblySolution) -> int:
+def exit_code_of(solution: Solution) -> int:
     """Return the exit code of a command that solves, draws or reports one solution."""
     if solution.is_converged:
         return 0

@@ -15,7 +15,6 @@ from bemkit.cli.outputs import Content, Outputs, TableFile, TextFile
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from bemkit.results.assembly_solution import AssemblySolution
     from bemkit.results.solution import Solution
     from bemkit.solvers.base import StepRecord
     from bemkit.studies.engine import Task
@@ -80,7 +79,7 @@ def outputs_of(
     folder: str | None,
     table: str = "contact",
     what: tuple[str, ...] | None = None,
-) -> Outputs[Solution | AssemblySolution]:
+) -> Outputs[Solution]:
     """Return where the command line sends a solution, besides a result file."""
     if what is not None and folder is None:
         raise click.UsageError("--what names figures: add --plot DIR")
@@ -88,10 +87,10 @@ def outputs_of(
         return Outputs()
     from bemkit.results.tables import to_csv, to_json
 
-    def as_csv(solution: Solution | AssemblySolution) -> str:
+    def as_csv(solution: Solution) -> str:
         return to_csv(solution, table)
 
-    def pictures(solution: Solution | AssemblySolution) -> Mapping[str, Figure]:
+    def pictures(solution: Solution) -> Mapping[str, Figure]:
         from bemkit.pictures.catalogue import figures
 
         return figures(solution, what if what is None else [name for name in what if name != "animation"])
@@ -114,7 +113,7 @@ def result_target(output: str | None, inside: int) -> list[Path]:
     return [format_of(output, inside).check(Path(output))]
 
 
-def write_animation(solution: Solution | AssemblySolution, folder: str | None, what: tuple[str, ...] | None) -> None:
+def write_animation(solution: Solution, folder: str | None, what: tuple[str, ...] | None) -> None:
     """Write the load steps of a solution as a moving picture into the folder of its figures, if it is named."""
     if folder is None or "animation" not in (what or ()):
         return

@@ -52,7 +52,7 @@ def outline(
             if output or scale or only or corner_angle is not None or tolerance:
                 raise click.UsageError("a scene file says how its shape is read: give no other option than --plot")
             scene = load_single_body(file)
-            shape, units = scene.shape, scene.units
+            shape, units = scene.only.shape, scene.units
         else:
             shape, units = shape_file(file, scale, only, corner_angle, tolerance), None
         text = TextFile[str](output, str)

@@ -14,7 +14,6 @@ from bemkit.table import json_text
 
 if TYPE_CHECKING:
     from bemkit.plan import Plan
-    from bemkit.scene.assembly import Assembly
     from bemkit.scene.scene import Scene
 
 
@@ -62,12 +61,11 @@ def _as_json(made: Plan) -> str:
     return json_text(made.as_dict())
 
 
-def _planned(scene: Scene | Assembly) -> Plan:
+def _planned(scene: Scene) -> Plan:
     """Return the plan of a scene, with a symmetry that it could use."""
     from bemkit.plan import check_elements, make_plan
-    from bemkit.scene.scene import Scene
     from bemkit.scene.symmetry import find_symmetry
 
     check_elements(scene)
-    proposal = find_symmetry(scene) if isinstance(scene, Scene) and scene.symmetry is None else None
+    proposal = find_symmetry(scene.only) if not scene.bodies and scene.symmetry is None else None
     return make_plan(scene, proposal=proposal)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 from rich.text import Text
 
@@ -15,7 +14,7 @@ from bemkit.studies.stability.records import StabilityRecord, Verdict, cells
 _STYLES = {"right": "green", "coarse": "yellow", "ambiguous": "yellow", "named": "cyan", "wrong": "bold red"}
 
 
-def print_axis(axis: Axis[Any], records: Sequence[StabilityRecord]) -> None:
+def print_axis(axis: Axis, records: Sequence[StabilityRecord]) -> None:
     """Print the table of one axis, and the reasons of records that are not right."""
     console = stdout_console()
     heads = ("value", "verdict", "solves", "cert.", "check", "Betti", "cond.", "drift", "twin", "s")

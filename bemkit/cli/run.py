@@ -17,9 +17,7 @@ from bemkit.cli.options import outputs_of, reserve, result_target, shown_progres
 from bemkit.errors import concerning
 
 if TYPE_CHECKING:
-    from bemkit.results.assembly_solution import AssemblySolution
     from bemkit.results.solution import Solution
-    from bemkit.scene.assembly import Assembly
     from bemkit.scene.scene import Scene
     from bemkit.solvers.base import StepRecord
 
@@ -110,7 +108,7 @@ def run(
     return exit_code_of(solution)
 
 
-def _history_file(scene: Scene | Assembly, output: str | None) -> str | None:
+def _history_file(scene: Scene, output: str | None) -> str | None:
     """Return the result file of a load history, which is written step by step; None of other runs."""
     return (
         output if scene.n_steps > 1 and output is not None and Path(output).suffix.lower() in (".h5", ".hdf5") else None
@@ -118,12 +116,12 @@ def _history_file(scene: Scene | Assembly, output: str | None) -> str | None:
 
 
 def _solve(
-    scene: Scene | Assembly, *, cascade: bool, callback: Callable[[StepRecord], None] | None, history_file: str | None
-) -> Solution | AssemblySolution:
+    scene: Scene, *, cascade: bool, callback: Callable[[StepRecord], None] | None, history_file: str | None
+) -> Solution:
     from bemkit.runs.run import run as solve_scene
 
     file, coarsest = (None, _COARSEST) if cascade else (history_file, None)
-    solution: Solution | AssemblySolution = solve_scene(scene, coarsest=coarsest, file=file, callback=callback)
+    solution: Solution = solve_scene(scene, coarsest=coarsest, file=file, callback=callback)
     return solution
 
 

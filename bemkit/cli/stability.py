@@ -45,7 +45,6 @@ def stability(
     """
     with StudyProgress(quiet) as progress:
         from bemkit.cli.printed_stability import print_axis, print_left_out, print_verdicts
-        from bemkit.scene.assembly import Assembly
         from bemkit.scene.toml import load_scene, scene_to_toml, with_overrides
         from bemkit.studies.stability.assembly_axes import ASSEMBLY_AXES
         from bemkit.studies.stability.axes import AXES, find_axes
@@ -54,7 +53,7 @@ def stability(
         from bemkit.studies.stability.sweep import sweep
 
         chosen = with_overrides(load_scene(scene or "paper-1"), elements=elements, discretisation=discretisation)
-        every = find_axes(axis, ASSEMBLY_AXES if isinstance(chosen, Assembly) else AXES)
+        every = find_axes(axis, ASSEMBLY_AXES if chosen.bodies else AXES)
         # an axis that is asked for by its name is refused by the sweep
         axes = every if axis else tuple(each for each in every if not each.reason_against(chosen))
         rows, table = study_output(output, table_of)

@@ -21,8 +21,8 @@ from bemkit.geometry.symmetry import Symmetry
 from bemkit.model.contacts import ContactRows, approaches, check_overlap
 from bemkit.model.placed import PlacedBody
 from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions
-from bemkit.scene.assembly import ContactPair
-from bemkit.scene.steps import Stated
+from bemkit.scene.contacts import ContactPair
+from bemkit.scene.scene import Scene
 from bemkit.scene.symmetry import check_law_symmetry
 
 _FACES_LINE = 0.5
@@ -31,7 +31,7 @@ _DIGITS = 9
 """Decimals of lengths of contacts relative to the longest: round-off shall not decide which of two is longer."""
 
 
-def touching_pairs(scene: Stated, bodies: Sequence[PlacedBody]) -> tuple[ContactPair, ...]:
+def touching_pairs(scene: Scene, bodies: Sequence[PlacedBody]) -> tuple[ContactPair, ...]:
     """Return the contacts of free sides that face each other, besides those that are listed; see `Touching`."""
     touching = scene.touching
     if touching is None:
@@ -67,7 +67,7 @@ def _check_images(sides: Sequence[ContactSide], names: Sequence[str], symmetry: 
 
 
 def body_rows(
-    scene: Stated,
+    scene: Scene,
     bodies: Sequence[PlacedBody],
     conditions: Sequence[NodalConditions],
     with_obstacles: Sequence[ContactRows],

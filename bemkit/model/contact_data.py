@@ -14,8 +14,8 @@ from bemkit.geometry.local_values import dof_weights
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.neighbours import along_boundary
 from bemkit.geometry.spaces import BoundarySpace, dof_points, element_nodes
+from bemkit.scene.body_scene import BodyScene
 from bemkit.scene.conditions import Contact
-from bemkit.scene.scene import Scene
 
 SMOOTH_SIDE_COSINE = 0.866
 """Cosine of 30 degrees. Directions of contact at one node that differ by less belong to one smooth side."""
@@ -73,13 +73,13 @@ class FacingPart:
 
 
 def find_contact(
-    scene: Scene, mesh: BoundaryMesh, space: BoundarySpace, further: Sequence[FacingPart] = ()
+    scene: BodyScene, mesh: BoundaryMesh, space: BoundarySpace, further: Sequence[FacingPart] = ()
 ) -> ContactData:
     """Find the nodes that may touch an obstacle, held by supports or not.
 
     Parameters
     ----------
-    scene : Scene
+    scene : BodyScene
     mesh : BoundaryMesh
         In physical units.
     space : BoundarySpace

@@ -14,12 +14,12 @@ from bemkit.errors import InputError
 from bemkit.model.contact_data import ContactData, FacingPart, find_contact
 from bemkit.model.placed import PlacedBody, groups
 from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions
-from bemkit.scene.steps import Stated
+from bemkit.scene.scene import Scene
 
 if TYPE_CHECKING:
     from scipy import sparse
 
-    from bemkit.scene.assembly import ContactPair
+    from bemkit.scene.contacts import ContactPair
 
 OVERLAP_TOLERANCE = 1e-6
 """Share of the size of the smaller body by which shapes may overlap without anybody meaning it: round-off of curves."""
@@ -150,7 +150,7 @@ def check_overlap(pair: ContactPair, overlap: float, deepest: FloatArray, size: 
         )
 
 
-def candidates_of(scene: Stated, body: PlacedBody) -> ContactData:
+def candidates_of(scene: Scene, body: PlacedBody) -> ContactData:
     """Return the nodes of a body that may touch an obstacle or a rigid body, held by supports or not."""
     own = [pair for pair in scene.contacts if pair.rigid_body is not None and pair.elastic_parts[0][0] == body.name]
     obstacles = {each.name: each.obstacle for each in scene.rigid}
@@ -162,7 +162,7 @@ def candidates_of(scene: Stated, body: PlacedBody) -> ContactData:
 
 
 def obstacle_rows(
-    scene: Stated,
+    scene: Scene,
     bodies: Sequence[PlacedBody],
     candidates: Sequence[ContactData],
     conditions: Sequence[NodalConditions],
@@ -234,7 +234,7 @@ def retained_for(
     return tuple(replace(of_body, is_retained=nodes[:, None] & ~of_body.is_fixed) for of_body, nodes in pairs)
 
 
-def _law_of(scene: Stated, pair: ContactPair) -> FrictionLaw:
+def _law_of(scene: Scene, pair: ContactPair) -> FrictionLaw:
     return scene.law if pair.law is None else pair.law
 
 

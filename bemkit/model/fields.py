@@ -15,8 +15,8 @@ from bemkit.operators.half_plane.surface import SurfaceElasticity
 from bemkit.operators.rigid_modes import without_motion
 from bemkit.operators.steklov_poincare import SteklovPoincare
 from bemkit.operators.steklov_poincare.forces_inside import HeavyElasticity
+from bemkit.scene.body_scene import BodyScene
 from bemkit.scene.conditions import Free, Load
-from bemkit.scene.scene import Scene
 
 _MORE_POINTS = 4
 """Gauss points of an element at which given loads are evaluated, beyond the degree of the tractions."""
@@ -47,7 +47,7 @@ def energy_beyond(elastic: SteklovPoincare, displacement: FloatArray, force: Flo
 
 
 def insert_loads(
-    traction: FloatArray, scene: Scene, mesh: BoundaryMesh, space: BoundarySpace, touching: Collection[str] = ()
+    traction: FloatArray, scene: BodyScene, mesh: BoundaryMesh, space: BoundarySpace, touching: Collection[str] = ()
 ) -> None:
     """Replace the tractions of loaded elements by the projection of the loads, of free elements by zero.
 
@@ -55,7 +55,7 @@ def insert_loads(
     ----------
     traction : (n_elements, n_local, 2) array [Pa]
         At the local nodes of their space; changed in place, but for elements in contact and those that supports hold.
-    scene : Scene
+    scene : BodyScene
     mesh : BoundaryMesh
         In physical units.
     space : BoundarySpace

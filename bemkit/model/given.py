@@ -31,12 +31,12 @@ from bemkit.operators.steklov_poincare.nodal_conditions import (
     integrate_traction,
     supported,
 )
+from bemkit.scene.body_scene import BodyScene
 from bemkit.scene.conditions import Clamped, Load, Part, PrescribedDisplacement, Roller
 from bemkit.scene.discretisation import Discretisation
-from bemkit.scene.scene import Scene
 
 
-def held_nodes(scene: Scene, mesh: BoundaryMesh, units: Units, space: BoundarySpace) -> NodalConditions:
+def held_nodes(scene: BodyScene, mesh: BoundaryMesh, units: Units, space: BoundarySpace) -> NodalConditions:
     """Return the nodal conditions of the parts that hold the body, their displacements in the units given.
 
     Raises
@@ -51,7 +51,7 @@ def held_nodes(scene: Scene, mesh: BoundaryMesh, units: Units, space: BoundarySp
         raise ConflictingSupportsError(error.part, (x, y)) from None
 
 
-def _supports_on(scene: Scene, mesh: BoundaryMesh, units: Units, space: BoundarySpace) -> list[Support]:
+def _supports_on(scene: BodyScene, mesh: BoundaryMesh, units: Units, space: BoundarySpace) -> list[Support]:
     """Return the supports of the parts that hold the body, their displacements in the units given."""
     result = []
     for part, elements in scene.parts_on(mesh):
@@ -78,7 +78,7 @@ def _dimensionless_motion(condition: PrescribedDisplacement, units: Units) -> Ca
     return field
 
 
-def nodal_forces(scene: Scene, mesh: BoundaryMesh, space: BoundarySpace, units: Units) -> FloatArray:
+def nodal_forces(scene: BodyScene, mesh: BoundaryMesh, space: BoundarySpace, units: Units) -> FloatArray:
     """Return the (n_nodes, 2) dimensionless forces of all loads on the nodes of a space on the unit mesh."""
     force = np.zeros((space.n_dofs // 2, 2))
     for part, elements in scene.parts_on(mesh):
@@ -96,7 +96,7 @@ def dimensionless_load(load: Load, units: Units) -> TractionField:
     return field
 
 
-def far_drive(scene: Scene, units: Units) -> FarDrive:
+def far_drive(scene: BodyScene, units: Units) -> FarDrive:
     """Return how a half-plane moves far away, in the units given; at rest by default."""
     far = scene.far
     if far is None:
@@ -118,7 +118,7 @@ def given_data(conditions: NodalConditions, force: FloatArray, inside: ForcesIns
 
 
 def check_same_body(
-    scene: Scene, other: Scene, parts: Sequence[Part], changed_parts: Sequence[Part], name: str
+    scene: BodyScene, other: BodyScene, parts: Sequence[Part], changed_parts: Sequence[Part], name: str
 ) -> None:
     """Check that a body has the same matrices on the same mesh in another scene; `name` is that of the body.
 
@@ -148,7 +148,7 @@ def check_same_body(
             )
 
 
-def _driven(scene: Scene) -> list[bool]:
+def _driven(scene: BodyScene) -> list[bool]:
     return [] if scene.far is None else scene.far.is_driven.tolist()
 
 

@@ -7,10 +7,10 @@ from collections.abc import Sequence
 from bemkit.arrays import FloatArray
 from bemkit.model.contacts import OverlapError
 from bemkit.model.placed import PlacedBody
-from bemkit.scene.steps import Stated
+from bemkit.scene.scene import Scene
 
 
-def check_apart(scene: Stated, bodies: Sequence[PlacedBody]) -> None:
+def check_apart(scene: Scene, bodies: Sequence[PlacedBody]) -> None:
     """Refuse bodies that overlap anywhere by more than the interference of the contacts between them.
 
     Elastic bodies are compared with each other but for half-planes, and with rigid bodies of finite size.
@@ -45,7 +45,7 @@ def check_apart(scene: Stated, bodies: Sequence[PlacedBody]) -> None:
                     raise _overlap(names, -float(gap[k]), points[k])
 
 
-def _interference(scene: Stated, names: tuple[str, str]) -> float:
+def _interference(scene: Scene, names: tuple[str, str]) -> float:
     """Return the largest interference of the contacts between two bodies."""
     bodies = {pair.name: {side.partition(".")[0] for side in pair.sides} for pair in scene.contacts}
     return max((pair.interference for pair in scene.contacts if bodies[pair.name] == set(names)), default=0.0)

@@ -25,7 +25,7 @@ from bemkit.operators.particular_solutions import (
 )
 from bemkit.operators.steklov_poincare.forces_inside import projected_tractions
 from bemkit.scene.body_forces import BodyForce, Gravity, Heating, Rotation
-from bemkit.scene.scene import Scene
+from bemkit.scene.body_scene import BodyScene
 
 HIGHEST_DEGREE = 16
 """Degrees of the trial polynomials."""
@@ -172,12 +172,12 @@ def stress_of(force: BodyForce, mesh: BoundaryMesh, material: Material) -> float
     return mesh.diameter * float(np.abs(force.force_at(points)).max())
 
 
-def particular_solution(scene: Scene, mesh: BoundaryMesh, modulus: float, stress: float) -> ParticularSolution:
+def particular_solution(scene: BodyScene, mesh: BoundaryMesh, modulus: float, stress: float) -> ParticularSolution:
     """Return the dimensionless particular solution of the body forces of a scene.
 
     Parameters
     ----------
-    scene : Scene
+    scene : BodyScene
         With a single load and body forces.
     mesh : BoundaryMesh
         In physical units; lengths are measured by its diameter from its centre.
@@ -248,7 +248,7 @@ class ParticularFields:
     modulus: float
 
     @classmethod
-    def of(cls, scene: Scene, mesh: BoundaryMesh) -> ParticularFields | None:
+    def of(cls, scene: BodyScene, mesh: BoundaryMesh) -> ParticularFields | None:
         """Return that of a scene with a single load; None without body forces."""
         modulus = scene.material.plane_modulus
         solution = particular_solution(scene, mesh, modulus, modulus) if scene.body_forces else None

@@ -17,8 +17,8 @@ from bemkit.geometry.spaces import BoundarySpace
 from bemkit.model.units import Units, check_position
 from bemkit.operators.material import Material
 from bemkit.scene.body import Body
+from bemkit.scene.body_scene import BodyScene
 from bemkit.scene.scene import Scene
-from bemkit.scene.steps import Stated
 
 Meshes: TypeAlias = BoundaryMesh | Mapping[str, BoundaryMesh] | None
 """Meshes of bodies by name, or the mesh of the only body; None for those that the scene describes."""
@@ -34,7 +34,7 @@ class PlacedBody:
     Parameters
     ----------
     body : Body
-    scene : Scene
+    scene : BodyScene
         The scene of this body without the others; see `Scene.scene_of`.
     mesh : BoundaryMesh
         In its place, in physical units.
@@ -46,7 +46,7 @@ class PlacedBody:
     """
 
     body: Body
-    scene: Scene
+    scene: BodyScene
     mesh: BoundaryMesh
     own_mesh: BoundaryMesh
     space: BoundarySpace
@@ -54,7 +54,7 @@ class PlacedBody:
     space_in_place: BoundarySpace
 
     @classmethod
-    def on(cls, body: Body, scene: Scene, mesh: BoundaryMesh, own_mesh: BoundaryMesh) -> PlacedBody:
+    def on(cls, body: Body, scene: BodyScene, mesh: BoundaryMesh, own_mesh: BoundaryMesh) -> PlacedBody:
         """Return a body on its meshes, with the spaces of its discretisation."""
         space_on = scene.discretisation.displacement_space
         own_space = space_on(own_mesh.unit)
@@ -110,12 +110,12 @@ class PlacedBody:
         return Units(mesh.centre, mesh.diameter, modulus, force / mesh.diameter)
 
 
-def place(scene: Stated, meshes: Meshes = None) -> tuple[PlacedBody, ...]:
+def place(scene: Scene, meshes: Meshes = None) -> tuple[PlacedBody, ...]:
     """Divide the bodies of a scene and put them in their places.
 
     Parameters
     ----------
-    scene : Scene or Assembly
+    scene : Scene
     meshes : BoundaryMesh or mapping of str to BoundaryMesh, optional
         Meshes of bodies by name, in the coordinates of their shapes, or that of the only body; by default what the
         scene describes.
@@ -156,7 +156,7 @@ def _by_name(bodies: Sequence[Body], meshes: Meshes) -> Mapping[str, BoundaryMes
     return {bodies[0].name: meshes}
 
 
-def check_body_symmetry(scene: Scene, mesh: BoundaryMesh) -> None:
+def check_body_symmetry(scene: BodyScene, mesh: BoundaryMesh) -> None:
     """Raise GeometryError unless a scene of one body is symmetric about the lines that it names, like its mesh."""
     if scene.symmetry is not None or mesh.symmetry is not None:
         from bemkit.scene.symmetry import check_symmetry
@@ -164,7 +164,7 @@ def check_body_symmetry(scene: Scene, mesh: BoundaryMesh) -> None:
         check_symmetry(scene, mesh)
 
 
-def _divided(own_scene: Scene, scene: Stated, body: Body) -> BoundaryMesh:
+def _divided(own_scene: BodyScene, scene: Scene, body: Body) -> BoundaryMesh:
     even = [*(part.name for part in own_scene.contact_parts), *scene.touching_parts(body)]
     try:
         return own_scene.divided(even)

@@ -44,7 +44,7 @@ from bemkit.operators.steklov_poincare.nodal_conditions import (
     free_modes,
     turning,
 )
-from bemkit.scene.steps import Stated
+from bemkit.scene.scene import Scene
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,7 +88,7 @@ class Prepared:
 
     Parameters
     ----------
-    scene : Scene or Assembly
+    scene : Scene
         With a single load and all contacts listed.
     bodies : tuple of PreparedBody
     units : Units
@@ -96,7 +96,7 @@ class Prepared:
     rows : tuple of ContactRows
     """
 
-    scene: Stated
+    scene: Scene
     bodies: tuple[PreparedBody, ...]
     units: Units
     rows: tuple[ContactRows, ...]
@@ -239,14 +239,14 @@ class Prepared:
         """(n_contact,) bool array: nodes of contacts between bodies that lie on a symmetry line."""
         return np.concatenate([np.zeros(0, bool), *(rows.is_on_line for rows in self.rows)])
 
-    def under(self, scene: Stated, units: Units | None = None) -> Prepared:
+    def under(self, scene: Scene, units: Units | None = None) -> Prepared:
         """Return the same bodies under the loads, gaps and laws of another scene.
 
         Loads on a body are integrated again only if its parts or body forces are other objects than before.
 
         Parameters
         ----------
-        scene : Scene or Assembly
+        scene : Scene
             Differs only in numbers of conditions and contacts, its law and its solver.
         units : Units, optional
             By default the same.
@@ -289,7 +289,7 @@ class Prepared:
         pairs = zip(self.rows, other.rows, strict=False)
         return len(self.rows) == len(other.rows) and all(one.is_coupled_like(two) for one, two in pairs)
 
-    def rows_under(self, scene: Stated) -> tuple[ContactRows, ...] | None:
+    def rows_under(self, scene: Scene) -> tuple[ContactRows, ...] | None:
         """Return the contacts of elastic bodies with the gaps and laws of another scene, None if they are others."""
         before, after = self.scene.elastic_contacts, scene.elastic_contacts
         if len(before) != len(after) or any(
@@ -303,20 +303,20 @@ class Prepared:
         )
 
 
-def prepare(scene: Stated, meshes: Meshes = None) -> Prepared:
+def prepare(scene: Scene, meshes: Meshes = None) -> Prepared:
     """Prepare a scene with a single load; see `prepare_steps`."""
     (prepared,) = prepare_steps((scene,), meshes)
     return prepared
 
 
-def prepare_steps(scenes: Sequence[Stated], meshes: Meshes = None) -> tuple[Prepared, ...]:
+def prepare_steps(scenes: Sequence[Scene], meshes: Meshes = None) -> tuple[Prepared, ...]:
     """Prepare scenes that follow each other in time, in the units of the largest load.
 
     All have the contacts that are found in the first one.
 
     Parameters
     ----------
-    scenes : sequence of Scene or of Assembly
+    scenes : sequence of Scene
         Each with a single load; see `bemkit.scene.load_history.load_steps`.
     meshes : BoundaryMesh or mapping of str to BoundaryMesh, optional
         Meshes of bodies by name, in the coordinates of their shapes, or that of the only body.
@@ -349,7 +349,7 @@ def prepare_steps(scenes: Sequence[Stated], meshes: Meshes = None) -> tuple[Prep
     return (first, *later)
 
 
-def _prepared(scene: Stated, bodies: Sequence[PlacedBody], units: Units, before: Prepared | None = None) -> Prepared:
+def _prepared(scene: Scene, bodies: Sequence[PlacedBody], units: Units, before: Prepared | None = None) -> Prepared:
     """Prepare placed bodies; bodies whose loads have not changed keep their conditions and forces."""
     supports: list[NodalConditions] = []
     forces: list[FloatArray] = []

@@ -1,4 +1,4 @@
-"""The bodies of an assembly as rigid blocks: their motions, loads, and the forces that their joints transmit."""
+"""The bodies of a scene as rigid blocks: their motions, loads, and the forces that their joints transmit."""
 
 from __future__ import annotations
 
@@ -26,8 +26,9 @@ from bemkit.model.same_bodies import listed_contacts, with_found_contacts
 from bemkit.operators.rigid_modes import rigid_motions
 from bemkit.operators.steklov_poincare.forces_inside import ForcesInside
 from bemkit.operators.steklov_poincare.nodal_conditions import free_modes
-from bemkit.scene.assembly import Assembly, ContactPair
 from bemkit.scene.conditions import Contact
+from bemkit.scene.contacts import ContactPair
+from bemkit.scene.scene import Scene
 
 _ENDS = np.array([-1.0, 1.0])
 _SAMPLES = np.linspace(-1.0, 1.0, 9)
@@ -139,10 +140,10 @@ class JointForces:
         return pressing @ self.points[chosen] / pressing.sum(), self.forces[chosen].sum(axis=0)
 
 
-def rigid_blocks(assembly: Assembly, bodies: Sequence[PlacedBody]) -> tuple[Block, ...]:
-    """Return the blocks of an assembly with a single load: those of placed bodies, then those of rigid bodies."""
+def rigid_blocks(scene: Scene, bodies: Sequence[PlacedBody]) -> tuple[Block, ...]:
+    """Return the blocks of a scene with a single load: those of placed bodies, then those of rigid bodies."""
     blocks = [_elastic_block(body) for body in bodies]
-    for body in assembly.rigid:
+    for body in scene.rigid:
         chosen = np.eye(3)[:, body.is_driven]
         blocks.append(Block(np.array(body.centre), 1.0, chosen, body.load @ chosen))
     return tuple(blocks)
@@ -202,17 +203,17 @@ def _elastic_block(body: PlacedBody) -> Block:
     return Block(mesh.centre, mesh.diameter, motions, np.asarray(np.einsum("mnc,nc->m", modes, force)))
 
 
-def joints_of(assembly: Assembly, bodies: Sequence[PlacedBody]) -> Iterator[Joint]:
+def joints_of(scene: Scene, bodies: Sequence[PlacedBody]) -> Iterator[Joint]:
     """Yield the joints between elastic bodies, then those with rigid bodies and with fixed obstacles."""
-    names = [*(body.name for body in bodies), *(body.name for body in assembly.rigid)]
-    listed = with_found_contacts(assembly, listed_contacts(assembly, bodies))
+    names = [*(body.name for body in bodies), *(body.name for body in scene.rigid)]
+    listed = with_found_contacts(scene, listed_contacts(scene, bodies))
     for pair in listed.contacts:
         parts = [(names.index(body), part) for body, part in pair.elastic_parts]
         if pair.rigid_body is None:
-            yield _joint_of_sides(assembly, pair, bodies, parts)
+            yield _joint_of_sides(scene, pair, bodies, parts)
         else:
-            obstacle, partner = assembly.rigid_body_of(pair).obstacle, names.index(pair.rigid_body)
-            yield from _on_obstacle(pair.name, bodies[parts[0][0]], parts[0], partner, obstacle, assembly.law_of(pair))
+            obstacle, partner = scene.rigid_body_of(pair).obstacle, names.index(pair.rigid_body)
+            yield from _on_obstacle(pair.name, bodies[parts[0][0]], parts[0], partner, obstacle, scene.law_of(pair))
     for number, body in enumerate(bodies):
         for part in body.scene.parts:
             if isinstance(part.condition, Contact):
@@ -222,7 +223,7 @@ def joints_of(assembly: Assembly, bodies: Sequence[PlacedBody]) -> Iterator[Join
 
 
 def _joint_of_sides(
-    assembly: Assembly, pair: ContactPair, bodies: Sequence[PlacedBody], parts: Sequence[tuple[int, str]]
+    scene: Scene, pair: ContactPair, bodies: Sequence[PlacedBody], parts: Sequence[tuple[int, str]]
 ) -> Joint:
     """Return the joint between two sides, each given by the number of its body and its name."""
     side, other = (ContactSide(bodies[number].space, bodies[number].mesh.part(part)) for number, part in parts)
@@ -235,7 +236,7 @@ def _joint_of_sides(
     depth = -np.sum(gap * normals, axis=1)
     deepest = int(np.argmax(depth))
     check_overlap(pair, float(depth[deepest]), points[deepest], min(side.mesh.diameter, other.mesh.diameter))
-    law = assembly.law_of(pair).at(points)
+    law = scene.law_of(pair).at(points)
     (body, _), (partner, _) = parts
     return Joint(pair.name, body, partner, points, points + gap, normals, ends.weights.ravel(), law)
 

@@ -13,14 +13,14 @@ from bemkit.errors import InputError
 from bemkit.model.given import check_same_body
 from bemkit.model.placed import PlacedBody, check_body_symmetry
 from bemkit.model.units import Units, largest_sizes
-from bemkit.scene.steps import Stated
+from bemkit.scene.scene import Scene
 
 if TYPE_CHECKING:
-    from bemkit.scene.assembly import ContactPair
+    from bemkit.scene.contacts import ContactPair
     from bemkit.scene.plane_motion import RigidBody
 
 
-def listed_contacts(scene: Stated, bodies: Sequence[PlacedBody]) -> tuple[ContactPair, ...]:
+def listed_contacts(scene: Scene, bodies: Sequence[PlacedBody]) -> tuple[ContactPair, ...]:
     """Return the contacts of bodies that are found touching, none if they are not asked for."""
     if scene.touching is None:
         return ()
@@ -29,7 +29,7 @@ def listed_contacts(scene: Stated, bodies: Sequence[PlacedBody]) -> tuple[Contac
     return touching_pairs(scene, bodies)
 
 
-def with_found_contacts(scene: Stated, found: Sequence[ContactPair]) -> Stated:
+def with_found_contacts(scene: Scene, found: Sequence[ContactPair]) -> Scene:
     """Return a scene that lists the contacts that were found between touching bodies, under its own law for them."""
     if scene.touching is None:
         return scene
@@ -37,7 +37,7 @@ def with_found_contacts(scene: Stated, found: Sequence[ContactPair]) -> Stated:
     return scene.with_contacts((*scene.contacts, *pairs))
 
 
-def find_units(scenes: Sequence[Stated], bodies: Sequence[PlacedBody]) -> Units:
+def find_units(scenes: Sequence[Scene], bodies: Sequence[PlacedBody]) -> Units:
     """Choose units by the largest load of some scenes, the size of the largest body and the most compliant contact.
 
     Raises
@@ -48,7 +48,7 @@ def find_units(scenes: Sequence[Stated], bodies: Sequence[PlacedBody]) -> Units:
     return max((_units_of(scene, bodies_under(scene, bodies)) for scene in scenes), key=lambda units: units.stress)
 
 
-def _units_of(scene: Stated, bodies: Sequence[PlacedBody]) -> Units:
+def _units_of(scene: Scene, bodies: Sequence[PlacedBody]) -> Units:
     numbers = {body.name: body for body in bodies}
     length = max(body.mesh.diameter for body in bodies)
     moduli = [
@@ -69,7 +69,7 @@ def _units_of(scene: Stated, bodies: Sequence[PlacedBody]) -> Units:
     return units
 
 
-def bodies_under(scene: Stated, bodies: Sequence[PlacedBody]) -> tuple[PlacedBody, ...]:
+def bodies_under(scene: Scene, bodies: Sequence[PlacedBody]) -> tuple[PlacedBody, ...]:
     """Return placed bodies under the conditions of another scene; InputError if it has other bodies."""
     names, others = ([body.name for body in some] for some in (bodies, scene.placed_bodies))
     if names != others:
@@ -89,7 +89,7 @@ def bodies_under(scene: Stated, bodies: Sequence[PlacedBody]) -> tuple[PlacedBod
     return tuple(under)
 
 
-def check_rigid(first: Stated, other: Stated) -> None:
+def check_rigid(first: Scene, other: Scene) -> None:
     """Check that a load step has the rigid bodies of the first one."""
     for body, changed in zip_longest(first.rigid, other.rigid):
         if body is None or changed is None or _layout(body) != _layout(changed):

@@ -11,8 +11,8 @@ from bemkit.contact.obstacle import measure_contact
 from bemkit.errors import InputError
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.vectors import LARGEST, SMALLEST
+from bemkit.scene.body_scene import BodyScene
 from bemkit.scene.conditions import Contact, Load, PrescribedDisplacement
-from bemkit.scene.scene import Scene
 
 _FARTHEST = 1e7
 """Distance from the origin in diameters up to which coordinates hold nine digits of the shape."""
@@ -74,7 +74,7 @@ def _check_scale(name: str, scale: float) -> None:
         )
 
 
-def largest_sizes(scene: Scene, mesh: BoundaryMesh, length: float) -> tuple[float, float, float]:
+def largest_sizes(scene: BodyScene, mesh: BoundaryMesh, length: float) -> tuple[float, float, float]:
     """Return the largest traction [Pa], the largest given displacement or interference, and the largest gap [m].
 
     The length [m] decides which overlaps and gaps are the round-off of coordinates.

@@ -1,4 +1,4 @@
-"""Assembly of bilinear forms: one sweep over the element pairs serves all matrices that are wanted.
+"""Scene of bilinear forms: one sweep over the element pairs serves all matrices that are wanted.
 
 A matrix is T_test I T_trial^T: the integrals I of the Legendre polynomials of all pairs of elements between the series
 T of the functions (`bemkit.geometry.series`). The sweep delivers I in chunks of rows, which become rows of the matrix.

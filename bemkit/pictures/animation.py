@@ -35,7 +35,7 @@ def save_animation(
     ----------
     path : str or Path
         Ends in ``.gif``, or in ``.mp4`` where the encoder ffmpeg is installed, or the package imageio-ffmpeg with one.
-    steps : sequence of Solution or AssemblySolution
+    steps : sequence of Solution
         As `bemkit.run` returns them for a sequence of scenes.
     units : UnitNames, optional
         Those of the scene by default.

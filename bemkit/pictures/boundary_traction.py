@@ -31,7 +31,7 @@ def draw_boundary_traction(solution: Solution, axes: Axes | None = None, *, unit
     """
     units = units or solution.units
     order = np.concatenate(solution.mesh.loops)
-    curve = boundary_curve(solution, order)
+    curve = boundary_curve(solution.body, order)
     axes = axes_or_new(axes)
     strip = axes_with_strip(axes, f"Tractions on the boundary\n{solution.title}")
     strip.set_xlabel(with_unit("arc length $s$", "length", units))

@@ -22,7 +22,6 @@ from bemkit.pictures.drawing import Axes, Figure
 from bemkit.pictures.load_history import draw_friction_loop, draw_status_over_time, draw_work, has_friction
 from bemkit.pictures.shown import Result
 from bemkit.pictures.stress import draw_stress
-from bemkit.results.assembly_solution import AssemblySolution
 from bemkit.results.stress_measures import STRESSES
 from bemkit.stopwatch import announce
 
@@ -71,7 +70,7 @@ def figures(result: Result, what: Sequence[str] | None = None) -> dict[str, Figu
 
     Parameters
     ----------
-    result : Solution or AssemblySolution
+    result : Solution
     what : sequence of str, optional
         Names of pictures, from `PICTURES`; by default those that suit the result.
 
@@ -131,12 +130,12 @@ def _without_history(result: Result) -> str:
 
 
 def _without_inside(result: Result) -> str:
-    has_surface = any(body.mesh.surface is not None for body in result.solved_bodies)
+    has_surface = any(body.mesh.surface is not None for body in result.bodies.values())
     return "of a half-plane only the surface is known" if has_surface else ""
 
 
 def _of_several_bodies(result: Result) -> str:
-    return "it shows one body, and there are several" if isinstance(result, AssemblySolution) else ""
+    return "it shows one body, and there are several" if len(result.bodies) > 1 else ""
 
 
 def _has_few_contacts(result: Result) -> bool:
@@ -168,7 +167,7 @@ _ALL = (
         "status and pressure in the plane",
         draw_contact_map,
         _without_contact,
-        lambda result: isinstance(result, AssemblySolution),
+        lambda result: "" not in result.bodies,
     ),
     Picture(
         "boundary-traction",

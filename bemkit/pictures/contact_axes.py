@@ -37,7 +37,7 @@ def contact_axes(
     ----------
     axes : Axes or None
         Those of a new figure by default.
-    solution : Solution or AssemblySolution
+    solution : Solution
     part : str
         Name of the contact part, or of the contact of several bodies.
     units : UnitNames or None

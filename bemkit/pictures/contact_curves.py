@@ -33,7 +33,7 @@ def draw_contact_displacement(
 
     Parameters
     ----------
-    solution : Solution or AssemblySolution
+    solution : Solution
     part : str
         Name of a contact part, or of a contact of several bodies.
     axes : Axes, optional

@@ -8,7 +8,7 @@ import numpy as np
 
 from bemkit.arrays import FloatArray
 from bemkit.pictures.contact_axes import STATUS_COLOURS
-from bemkit.pictures.contact_nodes import Nodes, contact_directions, contact_nodes, is_closed, node_points
+from bemkit.pictures.contact_nodes import Nodes, contact_nodes, is_closed, node_points
 from bemkit.pictures.crowds import marked
 from bemkit.pictures.drawing import VERMILION, Axes, legend_below
 from bemkit.pictures.magnification import magnification
@@ -33,7 +33,7 @@ def draw_contact_map(solution: Result, axes: Axes | None = None, *, units: UnitN
 
     Parameters
     ----------
-    solution : Solution or AssemblySolution
+    solution : Solution
     axes, units : optional
         As for `bemkit.pictures.deformation.draw_deformation`.
     """
@@ -50,7 +50,7 @@ def draw_contact_map(solution: Result, axes: Axes | None = None, *, units: UnitN
     draw_rigid_bodies(axes, scene, 0.0)
     draw_obstacles(axes, scene)
     length = _longest_tooth(scene) * pressure / (largest or 1.0)
-    tips = points - length[:, None] * contact_directions(solution)
+    tips = points - length[:, None] * solution.contact_directions
     words = np.array(table.status_words())
     for word, colour in STATUS_COLOURS.items():
         own = words == word
@@ -80,7 +80,7 @@ def draw_zoom(solution: Result, axes: Axes | None = None, *, units: UnitNames | 
 
     Parameters
     ----------
-    solution : Solution or AssemblySolution
+    solution : Solution
         With contact; where nothing touches, the whole contact boundary is shown.
     axes, units : optional
         As for `bemkit.pictures.deformation.draw_deformation`.

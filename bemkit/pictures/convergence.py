@@ -13,7 +13,7 @@ def draw_convergence(solution: Result, axes: Axes | None = None) -> Axes:
 
     Parameters
     ----------
-    solution : Solution or AssemblySolution
+    solution : Solution
     axes : Axes, optional
         Of matplotlib; those of a new figure by default.
     """

@@ -21,7 +21,7 @@ def draw_deformation(
 
     Parameters
     ----------
-    solution : Solution or AssemblySolution
+    solution : Solution
     axes : Axes, optional
         Of matplotlib; those of a new figure by default.
     factor : float, optional

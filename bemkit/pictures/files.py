@@ -23,7 +23,7 @@ def save_pictures(
 
     Parameters
     ----------
-    result : Solution or AssemblySolution, or a sequence of them
+    result : Solution, or a sequence of them
         The steps of a load history, for those that move; others show the last one.
     place : str or Path
         A folder, which is made if need be, for ``NAME.png`` of each picture; or a file that ends in ``.png``,

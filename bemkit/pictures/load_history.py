@@ -31,7 +31,7 @@ def draw_friction_loop(solution: Result, axes: Axes | None = None, *, units: Uni
 
     Parameters
     ----------
-    solution : Solution or AssemblySolution
+    solution : Solution
         Of a load history.
     axes, units : optional
         As for `bemkit.pictures.contact_curves.draw_contact_displacement`.

@@ -15,11 +15,10 @@ from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.reflection import reflected_to_whole
 from bemkit.geometry.spaces import BoundarySpace
 from bemkit.model.placed import place
-from bemkit.results.assembly_solution import AssemblySolution
 from bemkit.results.contact_table import ContactTable
 from bemkit.results.part_forces import RigidResult
 from bemkit.results.solution import Solution
-from bemkit.scene.assembly import Assembly
+from bemkit.scene.body_scene import BodyScene
 from bemkit.scene.conditions import Part
 from bemkit.scene.discretisation import on_whole_body
 from bemkit.scene.load_history import load_steps
@@ -27,8 +26,8 @@ from bemkit.scene.plane_motion import RigidBody
 from bemkit.scene.scene import Scene
 from bemkit.scene.unit_names import UnitNames
 
-Result: TypeAlias = Solution | AssemblySolution
-Drawable: TypeAlias = Result | Scene | Assembly
+Result: TypeAlias = Solution
+Drawable: TypeAlias = Result | Scene
 
 _POINTS_OF_CURVE = 9
 """Points of an element whose displacement or shape is curved."""
@@ -40,7 +39,7 @@ class ShownBody:
 
     Parameters
     ----------
-    scene : Scene
+    scene : BodyScene
         What is said of it, under its last load.
     mesh : BoundaryMesh
         In its place.
@@ -50,7 +49,7 @@ class ShownBody:
         Zero of a scene that is not solved.
     """
 
-    scene: Scene
+    scene: BodyScene
     mesh: BoundaryMesh
     space: BoundarySpace
     displacement: FloatArray
@@ -130,27 +129,21 @@ def shown(subject: Drawable) -> Shown:
     """Collect what pictures show of a scene or a result."""
     match subject:
         case Solution():
-            body = _body(subject.scene, subject.mesh, subject.boundary.displacement)
-            return Shown(subject.title, subject.units, (body,), (), subject.contact)
-        case AssemblySolution():
             bodies = tuple(_body(body.scene, body.mesh, body.boundary.displacement) for body in subject.bodies.values())
-            rigid = tuple((body, subject.rigid[body.name]) for body in subject.assembly.rigid)
+            rigid = tuple((body, subject.rigid[body.name]) for body in subject.scene.rigid)
             return Shown(subject.title, subject.units, bodies, rigid, subject.contact)
         case Scene():
-            body = _body(subject, subject.build_mesh())
-            return Shown(subject.title, subject.units, (body,), (), ContactTable.empty())
-        case Assembly():
-            bodies = tuple(_body(placed.scene, placed.mesh) for placed in place(subject))
+            bodies = tuple(_body(placed.scene, placed.mesh) for placed in place(load_steps(subject)[-1]))
             rigid = tuple((body, RigidResult(body.name, *(0.0,) * 6)) for body in subject.rigid)
             return Shown(subject.title, subject.units, bodies, rigid, ContactTable.empty())
 
 
-def _body(scene: Scene, mesh: BoundaryMesh, displacement: FloatArray | None = None) -> ShownBody:
+def _body(scene: BodyScene, mesh: BoundaryMesh, displacement: FloatArray | None = None) -> ShownBody:
     whole = on_whole_body(scene.discretisation, mesh)
     space, half = whole.displacement_space(mesh.whole), scene.discretisation.displacement_space(mesh)
     if displacement is None:
         displacement = np.zeros((half.n_dofs // 2, 2))
-    return ShownBody(load_steps(scene)[-1], mesh.whole, space, reflected_to_whole(half, space, displacement))
+    return ShownBody(scene, mesh.whole, space, reflected_to_whole(half, space, displacement))
 
 
 def at_mesh_nodes(space: BoundarySpace, displacement: FloatArray) -> FloatArray:

@@ -31,7 +31,7 @@ def draw_stress(
 
     Parameters
     ----------
-    solution : Solution or AssemblySolution
+    solution : Solution
     axes : Axes, optional
         Of matplotlib; those of a new figure by default.
     measure : str
@@ -50,7 +50,7 @@ def draw_stress(
         If the measure is unknown.
     """
     chosen, scene, units = find_measure(measure), shown(solution), units or solution.units
-    bodies = solution.solved_bodies
+    bodies = tuple(solution.bodies.values())
     size = float(np.ptp(scene.frame, axis=1).max())
     spacing = size / _ACROSS
     # obstacles are where they are in the end: a body that is seen to move must be there, too

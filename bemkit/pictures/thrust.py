@@ -7,7 +7,7 @@ import numpy as np
 from bemkit.geometry.vectors import norms
 from bemkit.model.rigid_blocks import JointForces
 from bemkit.pictures.drawing import BLUE, VERMILION, Axes, axes_or_new
-from bemkit.scene.assembly import Assembly
+from bemkit.scene.scene import Scene
 from bemkit.scene.unit_names import with_unit
 
 _SEEN = np.linspace(0.0, 1.0, 33)
@@ -15,14 +15,14 @@ _LONGEST = 0.12
 """Longest arrow, as a share of the size of the picture."""
 
 
-def draw_thrust(assembly: Assembly, state: JointForces, axes: Axes | None = None) -> Axes:
+def draw_thrust(scene: Scene, state: JointForces, axes: Axes | None = None) -> Axes:
     """Draw the blocks, the force in each joint at its centre of pressure, and the line of thrust.
 
     The line joins the centres of pressure of each block that two joints load.
 
     Parameters
     ----------
-    assembly : Assembly
+    scene : Scene
     state : JointForces
         Of `bemkit.thrust`.
     axes : matplotlib axes, optional
@@ -30,7 +30,7 @@ def draw_thrust(assembly: Assembly, state: JointForces, axes: Axes | None = None
     axes = axes_or_new(axes, 7.0, 5.2)
     outlines = [
         body.placement.forward(side.curve.point(_SEEN))
-        for body in assembly.placed_bodies
+        for body in scene.placed_bodies
         for side in body.shape.outline().sides
     ]
     for points in outlines:
@@ -50,7 +50,7 @@ def draw_thrust(assembly: Assembly, state: JointForces, axes: Axes | None = None
             *(centres - arrows).T, *arrows.T, angles="xy", scale_units="xy", scale=1.0, color=VERMILION, width=0.003
         )
     axes.set_aspect("equal")
-    axes.set_title(f"{assembly.title}: thrust {state.value:.4g}", parse_math=False, fontsize=11)
-    axes.set_xlabel(with_unit("x", "length", assembly.units), parse_math=False)
-    axes.set_ylabel(with_unit("y", "length", assembly.units), parse_math=False)
+    axes.set_title(f"{scene.title}: thrust {state.value:.4g}", parse_math=False, fontsize=11)
+    axes.set_xlabel(with_unit("x", "length", scene.units), parse_math=False)
+    axes.set_ylabel(with_unit("y", "length", scene.units), parse_math=False)
     return axes

@@ -12,8 +12,6 @@ from bemkit.contact.obstacle import measure_contact
 from bemkit.geometry.neighbours import along_boundary
 from bemkit.geometry.spaces import BoundarySpace, ConstantSpace
 from bemkit.pictures.shown import Result
-from bemkit.results.assembly_solution import AssemblySolution
-from bemkit.results.solution import Solution
 from bemkit.results.solved_body import SolvedBody
 from bemkit.scene.conditions import Contact
 
@@ -41,11 +39,12 @@ def traction_curve(solution: Result, part: str) -> TractionCurve:
 
     Parameters
     ----------
-    solution : Solution or AssemblySolution
+    solution : Solution
     part : str
         Name of a contact part, or of a contact of several bodies.
     """
-    body, name = _side_with_nodes(solution, part) if isinstance(solution, AssemblySolution) else (solution, part)
+    side = solution.contact_sides[part][0]
+    body, name = solution.bodies[side.body], side.part
     elements = along_boundary(body.mesh, body.mesh.part(name))
     xi = local_points(body)
     s = arc_length(body, elements, xi)
@@ -53,11 +52,11 @@ def traction_curve(solution: Result, part: str) -> TractionCurve:
     return _resolved(body, elements, xi, s, directions)
 
 
-def boundary_curve(solution: Solution, elements: IntArray) -> TractionCurve:
+def boundary_curve(body: SolvedBody, elements: IntArray) -> TractionCurve:
     """Return the tractions along some elements, in their order, along the normals and tangents of the body."""
-    xi = local_points(solution)
-    normals = solution.mesh.normals_at(elements, xi).reshape(-1, 2)
-    return _resolved(solution, elements, xi, arc_length(solution, elements, xi), normals)
+    xi = local_points(body)
+    normals = body.mesh.normals_at(elements, xi).reshape(-1, 2)
+    return _resolved(body, elements, xi, arc_length(body, elements, xi), normals)
 
 
 def local_points(body: SolvedBody) -> FloatArray:
@@ -88,25 +87,16 @@ def _resolved(
     return TractionCurve(s, normal, tangential)
 
 
-def _side_with_nodes(solution: AssemblySolution, contact: str) -> tuple[SolvedBody, str]:
-    """Return the body and the part with the nodes of a contact."""
-    side = solution.contact_sides[contact][0]
-    return solution.bodies[side.body], side.part
-
-
 def _directions(
     solution: Result, part: str, body: SolvedBody, elements: IntArray, xi: FloatArray, s: FloatArray
 ) -> FloatArray:
     """Return the directions of contact (n, 2) at points of elements, between bodies those of the nodes near by."""
-    if isinstance(solution, AssemblySolution):
-        rows = solution.contact.rows(part)
-        order = np.argsort(solution.contact.s[rows])
-        at_nodes = solution.contact_directions[rows][order]
-        found = np.stack([np.interp(s, solution.contact.s[rows][order], column) for column in at_nodes.T], axis=1)
-        return np.asarray(found / np.hypot(*found.T)[:, None])
-    (condition,) = (each.condition for each in solution.scene.contact_parts if each.name == part)
-    if not isinstance(condition, Contact):
-        raise TypeError(f"part {part!r} is not in contact")
-    points, normals = body.mesh.points(elements, xi), body.mesh.normals_at(elements, xi)
-    _, directions = measure_contact(condition.obstacle, points.reshape(-1, 2), normals.reshape(-1, 2))
-    return directions
+    for own in body.scene.contact_parts:
+        if body.contact_name(own.name) == part and isinstance(own.condition, Contact):
+            points, normals = body.mesh.points(elements, xi), body.mesh.normals_at(elements, xi)
+            return measure_contact(own.condition.obstacle, points.reshape(-1, 2), normals.reshape(-1, 2))[1]
+    rows = solution.contact.rows(part)
+    order = np.argsort(solution.contact.s[rows])
+    at_nodes = solution.contact_directions[rows][order]
+    found = np.stack([np.interp(s, solution.contact.s[rows][order], column) for column in at_nodes.T], axis=1)
+    return np.asarray(found / np.hypot(*found.T)[:, None])

@@ -13,9 +13,9 @@ from bemkit.model.placed import PlacedBody, groups
 from bemkit.model.prepared import Prepared
 from bemkit.operators.rigid_modes import admissible_modes
 from bemkit.operators.steklov_poincare.needs import PlanItem
+from bemkit.scene.body_scene import BodyScene
 from bemkit.scene.registry import BODY_FORCES
 from bemkit.scene.scene import Scene
-from bemkit.scene.steps import Stated
 
 _MOST_NAMED = 12
 """Different bodies up to which each has a line of its own."""
@@ -84,7 +84,7 @@ def find_sizes(prepared: Prepared) -> Sizes:
 
 
 def items_of_one(
-    scene: Scene, sizes: Sizes, of_body: tuple[PlanItem, ...], n_steps: int, proposal: Symmetry | None = None
+    scene: BodyScene, sizes: Sizes, of_body: tuple[PlanItem, ...], n_steps: int, proposal: Symmetry | None = None
 ) -> tuple[PlanItem, ...]:
     """Say what a scene of one body needs and what it skips, in the order in which it is used.
 
@@ -125,7 +125,7 @@ def _last_items(n_steps: int, *inside: str) -> Iterator[PlanItem]:
     yield PlanItem("figures (matplotlib)", False, "no part of the solve; loaded and drawn after it where asked for")
 
 
-def _mesh_items(scene: Scene, sizes: Sizes, proposal: Symmetry | None) -> Iterator[PlanItem]:
+def _mesh_items(scene: BodyScene, sizes: Sizes, proposal: Symmetry | None) -> Iterator[PlanItem]:
     """Yield what elements, symmetry and spaces need."""
     n, n_curved = sizes.n_elements, sizes.n_curved
     outline = scene.shape.outline()
@@ -157,13 +157,13 @@ def _mesh_items(scene: Scene, sizes: Sizes, proposal: Symmetry | None) -> Iterat
     yield PlanItem(f"{displacements} displacements, {tractions} tractions", True, reason)
 
 
-def _body_force_item(scene: Scene) -> PlanItem:
+def _body_force_item(scene: BodyScene) -> PlanItem:
     kinds = ", ".join(dict.fromkeys(BODY_FORCES.kind_of(force) for force in scene.body_forces))
     reason = f"{kinds}, in closed form: no elements inside the body" if kinds else "nothing acts inside the body"
     return PlanItem("particular solution", bool(kinds), reason)
 
 
-def _contact_items(scene: Scene, sizes: Sizes, n_steps: int) -> Iterator[PlanItem]:
+def _contact_items(scene: BodyScene, sizes: Sizes, n_steps: int) -> Iterator[PlanItem]:
     """Yield what contact needs."""
     c, n, n_free = sizes.n_contact_unknowns, sizes.n_contact, sizes.n_free_motions
     if not scene.contact_parts:
@@ -215,7 +215,7 @@ def items_of_several(prepared: Prepared, sizes: Sizes, n_steps: int, *, is_dense
     yield from _last_items(n_steps, "fields inside the bodies")
 
 
-def n_driven_motions(scene: Stated) -> int:
+def n_driven_motions(scene: Scene) -> int:
     """Return how many motions of rigid bodies are unknown."""
     return sum(int(np.count_nonzero(body.is_driven)) for body in scene.rigid)
 

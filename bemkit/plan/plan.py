@@ -29,7 +29,6 @@ from bemkit.plan.items import find_sizes, items_of_one, items_of_several
 from bemkit.result_warning import ResultWarning
 from bemkit.scene.load_history import load_steps
 from bemkit.scene.scene import Scene
-from bemkit.scene.steps import Stated
 from bemkit.stopwatch import announce
 
 _BYTES = 8
@@ -94,12 +93,12 @@ class Plan(ShownInNotebooks):
         }
 
 
-def make_plan(scene: Stated, meshes: Meshes = None, *, proposal: Symmetry | None = None) -> Plan:
+def make_plan(scene: Scene, meshes: Meshes = None, *, proposal: Symmetry | None = None) -> Plan:
     """Return what a scene needs and what it skips, before anything expensive happens.
 
     Parameters
     ----------
-    scene : Scene or Assembly
+    scene : Scene
     meshes : BoundaryMesh or mapping of str to BoundaryMesh, optional
         Meshes of bodies by name, or that of the only body; by default what the scene describes.
     proposal : Symmetry, optional
@@ -126,8 +125,8 @@ def plan_steps(steps: Sequence[Prepared], proposal: Symmetry | None = None) -> P
     contact = _ContactSystem.of(first, sizes, is_matrix_free=any(each.is_matrix_free for each in needs))
     kept = sum(each.kept for each in needs)
     flops = sum(each.flops for each in needs) + CONTACT_STEPS * len(steps) * contact.flops
-    if first.has_obstacles_only and isinstance(first.scene, Scene):
-        items = items_of_one(first.scene, sizes, needs[0].items, len(steps), proposal)
+    if first.has_obstacles_only:
+        items = items_of_one(first.only.scene, sizes, needs[0].items, len(steps), proposal)
     else:
         items = tuple(items_of_several(first, sizes, len(steps), is_dense=contact.is_dense))
     return Plan(
@@ -198,7 +197,7 @@ def check_memory(plan: Plan) -> None:
     _check(plan.sizes.n_elements, plan.memory, plan.is_compressed)
 
 
-def check_elements(scene: Stated) -> None:
+def check_elements(scene: Scene) -> None:
     """Refuse a number of elements whose matrices cannot fit into this computer, before the mesh is made.
 
     Memory grows with the square of that number, or linearly where the equations are compressed: the plans for small
@@ -209,9 +208,9 @@ def check_elements(scene: Stated) -> None:
     TooLargeError
         As `check_memory`.
     """
-    if not isinstance(scene, Scene):
+    if len(scene.placed_bodies) > 1:
         return
-    n_elements, outline = scene.mesh.elements, scene.shape.outline()
+    n_elements, outline = scene.only.mesh.elements, scene.only.shape.outline()
     few = max(_FEW, few_on(outline))
     if n_elements is None or n_elements <= max(_MANY, few) or outline.surface is not None:
         return

@@ -189,7 +189,7 @@ def answer_of(solution: Solution, places: Sequence[Places]) -> Answer:
         Of a frictionless scene every node in contact counts as slipping.
     """
     u_n, u_t, sigma_n, sigma_t = np.concatenate([_along(solution, each) for each in places], axis=1)
-    is_frictionless = all(law.is_frictionless for law in solution.scene.laws.values())
+    is_frictionless = all(law.is_frictionless for law in solution.laws.values())
     zones: list[Zone] = []
     for item in solution.transitions:
         words = (item.from_status, item.to_status)

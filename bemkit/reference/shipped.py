@@ -74,7 +74,7 @@ def _uniform_slip(scene: Scene) -> Reference:
 def _gravity_column(scene: Scene) -> Reference:
     """Return the state of uniaxial strain of a column between smooth walls, p = weight * (height - y)."""
     width, height, gap, weight = 2.0, 10.0, 1e-4, 2400.0 * 9.81
-    energy = width * weight**2 * height**3 / (6.0 * uniaxial_strain_modulus(scene.material))
+    energy = width * weight**2 * height**3 / (6.0 * uniaxial_strain_modulus(scene.only.material))
     s, length = places_along(width, ())
     one = np.ones_like(s)
     pressure = weight * height
@@ -86,8 +86,8 @@ _REFERENCES: Mapping[str, Callable[[Scene], Reference]] = MappingProxyType(
     {
         "paper-1": lambda _: paper_reference(1),
         "paper-2": lambda _: paper_reference(2),
-        "wavy-obstacle": lambda scene: WavyObstacle(0.0172614981, 0.01, 1.0, 1.5, scene.material).reference(),
-        "disc-between-plates": lambda scene: DiscBetweenPlates(1.0, 0.0160343377, scene.material).reference(
+        "wavy-obstacle": lambda scene: WavyObstacle(0.0172614981, 0.01, 1.0, 1.5, scene.only.material).reference(),
+        "disc-between-plates": lambda scene: DiscBetweenPlates(1.0, 0.0160343377, scene.only.material).reference(
             "plate", length=np.pi / 6.0
         ),
         "uniform-slip": _uniform_slip,

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
-from typing import Any
 
 from bemkit.errors import BemkitError
 from bemkit.pictures.catalogue import find_picture
@@ -16,11 +15,9 @@ from bemkit.plan import Plan
 from bemkit.report.html import Element, element, facts, image, render, table
 from bemkit.report.pictures import has_pictures
 from bemkit.report.sections import badge, plan_section
-from bemkit.results.assembly_solution import AssemblySolution
 from bemkit.results.solution import Solution
-from bemkit.results.solved_problem import SolvedSteps
+from bemkit.results.solved_steps import SolvedSteps
 from bemkit.results.summary_rows import summary_rows
-from bemkit.scene.assembly import Assembly
 from bemkit.scene.scene import Scene
 
 _DOTS_PER_INCH = 72
@@ -33,9 +30,9 @@ def notebook_html(value: object) -> str:
     match value:
         case SolvedSteps():
             return _with_pictures(_steps(value), _pictures_of(value[-1]), value[-1].title)
-        case Solution() | AssemblySolution():
+        case Solution():
             return _with_pictures(_result(value), _pictures_of(value), value.title)
-        case Scene() | Assembly():
+        case Scene():
             return _with_pictures(facts(_scene_rows(value), "Scene"), [lambda: draw_scene(value)], value.title)
         case Plan():
             return render(element("div", *plan_section(value)))
@@ -55,7 +52,7 @@ def _pictures_of(result: Result) -> list[Callable[[], Axes]]:
     return draws if loop.why_not(result) else [*draws, lambda: draw_friction_loop(result)]
 
 
-def _steps(steps: SolvedSteps[Any]) -> Element:
+def _steps(steps: SolvedSteps) -> Element:
     """Return a table of the first and last steps."""
     numbers = [number for number in range(len(steps)) if min(number, len(steps) - 1 - number) < _MOST_STEPS // 2]
     rows = []
@@ -75,13 +72,14 @@ def _steps(steps: SolvedSteps[Any]) -> Element:
     return element("div", element("p", badge(steps[-1])), table(rows, caption))
 
 
-def _scene_rows(scene: Scene | Assembly) -> Iterable[tuple[str, str]]:
-    if isinstance(scene, Assembly):
+def _scene_rows(scene: Scene) -> Iterable[tuple[str, str]]:
+    if scene.bodies:
         yield "bodies", str(len(scene.placed_bodies))
         yield "contacts", str(len(scene.contacts)) + (", others are found" if scene.touching is not None else "")
     else:
-        yield "shape", type(scene.shape).__name__
-        material = scene.material
+        body = scene.only
+        yield "shape", type(body.shape).__name__
+        material = body.material
         yield "material", f"E = {material.youngs_modulus:g}, \u03bd = {material.poisson_ratio:g}"
         kinds = Counter(type(part.condition).__name__ for part in scene.parts)
         yield "parts", ", ".join(f"{count} {kind}" for kind, count in kinds.items()) or "none"

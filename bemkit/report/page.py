@@ -30,7 +30,7 @@ def report(result: Result) -> str:
 
     Parameters
     ----------
-    result : Solution or AssemblySolution
+    result : Solution
 
     Returns
     -------

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -17,9 +18,8 @@ from bemkit.geometry.neighbours import along_boundary
 from bemkit.geometry.spaces import BoundarySpace
 from bemkit.geometry.vectors import norms
 from bemkit.results.contact_table import ContactTable, free_contacts
-from bemkit.results.least_clearance import PointsBetween, Sample, deepest, with_least_clearances
+from bemkit.results.least_clearance import PointsBetween, Sample, deepest
 from bemkit.results.solved_body import SolvedBody
-from bemkit.scene.conditions import Contact
 
 _POINTS_PER_NODE = 4
 """Points on an element for each of its nodes: a polynomial is larger between them by a few per cent at most."""
@@ -95,50 +95,13 @@ class BetweenNodes:
         return cls(*np.max(rows, axis=0).tolist()) if rows else None
 
 
-def violations_between_nodes(
-    body: SolvedBody,
-    contact: ContactTable,
-    motion: SlipHistory | None = None,
-    names: Collection[str] | None = None,
-) -> dict[str, BetweenNodes]:
-    """Measure the displacements and tractions of one body along its contact parts, without running anything again.
+class MeasuredContact(NamedTuple):
+    """A contact, the elastic bodies that it joins, its law, and what measures points of it."""
 
-    Parameters
-    ----------
-    body : SolvedBody
-    contact : ContactTable
-    motion : SlipHistory, optional
-        Of the contact nodes, for laws that depend on slip or time; interpolated between them.
-    names : collection of str, optional
-        The contact parts to measure; by default all.
-
-    Returns
-    -------
-    dict of str to BetweenNodes
-        By contact part.
-
-    Notes
-    -----
-    The gap is measured at each point, so that the shape of both bodies between nodes counts too. Fields of constant
-    elements are steps. Without any contact force lengths are relative to the largest displacement.
-    """
-    if not contact.n_contact:
-        return {}
-    scene, mesh = body.scene, body.mesh
-    stress = float(np.maximum(np.abs(contact.sigma_n), np.abs(contact.sigma_t)).max()) or 1.0
-    force = float(np.sum(contact.weight * np.hypot(contact.sigma_n, contact.sigma_t)))
-    length = force / scene.material.plane_modulus or float(np.abs(body.boundary.displacement).max()) or 1.0
-    violations = {}
-    for part in scene.parts:
-        if names is not None and part.name not in names:
-            continue
-        if isinstance(part.condition, Contact) and (elements := mesh.part(part.name)).size:  # none beyond a symmetry
-            with np.errstate(all="ignore"):  # results that are not finite are measured by nan
-                sample = sample_at_obstacle(body, part.condition.obstacle, elements)
-                points = with_least_clearances(sample, elements.size, points_between(_degree(body)))
-                law = law_between(scene.laws[part.name], points, contact, part.name, motion)
-                violations[part.name] = violations_at(points, law, stress, length)
-    return violations
+    name: str
+    bodies: tuple[str, ...]
+    law: FrictionLaw
+    measure: Callable[[], PointsBetween]
 
 
 def points_at_obstacle(body: SolvedBody, obstacle: Obstacle, elements: IntArray) -> PointsBetween:

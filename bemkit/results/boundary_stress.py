@@ -24,7 +24,7 @@ from bemkit.scene.discretisation import on_whole_body
 
 if TYPE_CHECKING:
     from bemkit.model.particular import ParticularFields
-    from bemkit.scene.scene import Scene
+    from bemkit.scene.body_scene import BodyScene
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,7 +69,7 @@ class BoundaryStress:
     def from_half(
         cls,
         mesh: BoundaryMesh,
-        scene: Scene,
+        scene: BodyScene,
         displacement: FloatArray,
         traction_dofs: FloatArray,
         particular: ParticularFields | None,

@@ -10,10 +10,7 @@ from types import MappingProxyType
 
 from bemkit.geometry.curves import Segment
 from bemkit.geometry.shapes import ElasticHalfPlane, PeriodicHalfPlane
-from bemkit.results.assembly_solution import AssemblySolution
 from bemkit.results.solution import Solution
-from bemkit.scene.assembly import Assembly
-from bemkit.scene.body import Body
 from bemkit.scene.discretisation import ConstantCollocation, Discretisation, Galerkin
 from bemkit.scene.registry import LAWS, SOLVERS
 from bemkit.scene.scene import Scene
@@ -92,12 +89,12 @@ class Citations:
         return "\n\n".join(["\n".join(lines), *(entries()[key] for key in self.keys)])
 
 
-def cite(subject: Scene | Assembly | Solution | AssemblySolution) -> Citations:
+def cite(subject: Scene | Solution) -> Citations:
     """Return the references of the methods of a scene or of a result.
 
     Parameters
     ----------
-    subject : Scene, Assembly, Solution or AssemblySolution
+    subject : Scene or Solution
         A solution contains more than its scene: the linear solver that was chosen, and which solvers took part.
 
     Returns
@@ -105,16 +102,16 @@ def cite(subject: Scene | Assembly | Solution | AssemblySolution) -> Citations:
     Citations
         ``print`` shows a BibTeX file: the methods as comments, then the entries of their works.
     """
-    stated = subject if isinstance(subject, Scene | Assembly) else subject.stated
-    messages = [] if isinstance(subject, Scene | Assembly) else [record.message for record in subject.history]
+    stated = subject if isinstance(subject, Scene) else subject.stated
+    messages = [] if isinstance(subject, Scene) else [record.message for record in subject.history]
     methods = [Method("bemkit", (PACKAGE,)), *_of_bodies(stated), *_of_contact(stated, messages)]
-    if not isinstance(subject, Scene | Assembly):
+    if not isinstance(subject, Scene):
         methods += _of_run(subject)
     return Citations(tuple(dict.fromkeys(methods)), stated.reference)
 
 
-def _of_bodies(stated: Scene | Assembly) -> Iterator[Method]:
-    bodies: tuple[Scene | Body, ...] = stated.bodies if isinstance(stated, Assembly) else (stated,)
+def _of_bodies(stated: Scene) -> Iterator[Method]:
+    bodies = stated.placed_bodies
     is_adaptive = stated.mesh.accuracy is not None
     with_boundary = [body for body in bodies if not isinstance(body.shape, ElasticHalfPlane | PeriodicHalfPlane)]
     if len(with_boundary) < len(bodies):
@@ -143,19 +140,17 @@ def _of_discretisation(discretisation: Discretisation, *, has_layers: bool) -> I
         yield Method("corners where contact tractions have no bound", ("Williams1952",))
 
 
-def _of_contact(stated: Scene | Assembly, messages: list[str]) -> Iterator[Method]:
-    if isinstance(stated, Assembly) and (stated.contacts or stated.touching is not None):
+def _of_contact(stated: Scene, messages: list[str]) -> Iterator[Method]:
+    if stated.contacts or stated.touching is not None:
         yield Method(
             "mortar coupling with dual multipliers",
             ("Wohlmuth2000", "PusoLaursen2004", "PoppEtAl2010", "CichoszBischoff2011"),
         )
-    if isinstance(stated, Scene) and not stated.contact_parts:
+    if not stated.has_contact:
         return
     yield Method("contact and friction as projection equations", ("Paper", "AlartCurnier1991", "QiSun1993"))
-    if isinstance(stated, Scene):
-        own = list(stated.laws.values())
-    else:
-        own = [each.law for each in (*stated.contacts, stated.touching) if each is not None and each.law is not None]
+    own = [law for body in stated.placed_bodies for law in stated.scene_of(body).laws.values()]
+    own += [each.law for each in (*stated.contacts, stated.touching) if each is not None and each.law is not None]
     for law in (stated.law, *own):
         if keys := LAW_WORKS.get(LAWS.word_of(law)):
             yield Method(f"law {LAWS.word_of(law)}", keys)
@@ -163,7 +158,7 @@ def _of_contact(stated: Scene | Assembly, messages: list[str]) -> Iterator[Metho
         yield Method(f"driver {word}", DRIVERS.get(word, ()))
 
 
-def _of_run(solution: Solution | AssemblySolution) -> Iterator[Method]:
+def _of_run(solution: Solution) -> Iterator[Method]:
     if any("fast multipole" in item.reason for item in solution.plan.items):
         yield Method("products by the fast multipole method", ("GreengardRokhlin1987", "Muskhelishvili1953"))
         yield Method("GMRES with sums over a hierarchy", ("SaadSchultz1986", "BramblePasciakXu1990"))

@@ -14,7 +14,6 @@ import numpy as np
 from bemkit.arrays import FloatArray, IntArray
 from bemkit.atomic_files import OutputFileError, check_target, replacing, write_text
 from bemkit.errors import InputError
-from bemkit.results.assembly_solution import AssemblySolution
 from bemkit.results.solution import Solution
 from bemkit.results.tables import to_csv, to_json
 from bemkit.results.vtk import bodies_of, write_vtk
@@ -38,8 +37,8 @@ class Format:
     """
 
     check: Callable[[Path], Path]
-    write: Callable[[Path, Solution | AssemblySolution], None]
-    write_inside: Callable[[Path, Solution | AssemblySolution, int], None] | None = None
+    write: Callable[[Path, Solution], None]
+    write_inside: Callable[[Path, Solution, int], None] | None = None
 
 
 def format_of(path: str | Path, inside: int = 0) -> Format:
@@ -70,7 +69,7 @@ def format_of(path: str | Path, inside: int = 0) -> Format:
     return chosen
 
 
-def export_result(path: str | Path, solution: Solution | AssemblySolution, *, inside: int = 0) -> None:
+def export_result(path: str | Path, solution: Solution, *, inside: int = 0) -> None:
     """Write a solution in the format of the file ending, completely or not at all.
 
     Parameters
@@ -79,7 +78,7 @@ def export_result(path: str | Path, solution: Solution | AssemblySolution, *, in
         ``.h5`` or ``.hdf5``: everything, see `bemkit.results.result_file`; ``.json``: the summary; ``.csv``: the
         contact table; ``.npz``: contact table and fields on boundaries as numpy arrays; ``.vtu`` and ``.vtp``:
         boundaries as lines with displacement and traction, contact nodes as vertices, for ParaView and the like.
-    solution : Solution or AssemblySolution
+    solution : Solution
     inside : int
         Points across each body, along its longer extent, on which they hold displacement and stress inside; 0 for
         none.
@@ -97,7 +96,7 @@ def export_result(path: str | Path, solution: Solution | AssemblySolution, *, in
         chosen.write(target, solution)
 
 
-def to_pyvista(solution: Solution | AssemblySolution, inside: int) -> Any:
+def to_pyvista(solution: Solution, inside: int) -> Any:
     """Return what a ``.vtu`` file holds as a grid of pyvista.
 
     Raises
@@ -115,7 +114,7 @@ def to_pyvista(solution: Solution | AssemblySolution, inside: int) -> Any:
         return pyvista.read(path)
 
 
-def boundary_arrays(solution: Solution | AssemblySolution) -> dict[str, FloatArray | IntArray]:
+def boundary_arrays(solution: Solution) -> dict[str, FloatArray | IntArray]:
     """Return the contact table and the fields on boundaries by name; of several bodies as ``"body/field"``."""
     table = solution.contact
     arrays: dict[str, Any] = {f"contact/{name}": column for name, column in table.columns().items()}
@@ -128,7 +127,7 @@ def boundary_arrays(solution: Solution | AssemblySolution) -> dict[str, FloatArr
     return arrays
 
 
-def _write_npz(path: Path, solution: Solution | AssemblySolution) -> None:
+def _write_npz(path: Path, solution: Solution) -> None:
     with replacing(path.resolve()) as temporary, temporary.open("wb") as stream:
         np.savez_compressed(stream, **boundary_arrays(solution))  # type: ignore[arg-type]  # names of arrays
 
@@ -139,13 +138,13 @@ def _check_hdf5(path: Path) -> Path:
     return check_result_target(path)
 
 
-def _write_hdf5(path: Path, solution: Solution | AssemblySolution) -> None:
+def _write_hdf5(path: Path, solution: Solution) -> None:
     from bemkit.results.result_file import write_result
 
     write_result(path, solution)
 
 
-def _text(text: Callable[[Solution | AssemblySolution], str]) -> Format:
+def _text(text: Callable[[Solution], str]) -> Format:
     return Format(check_target, lambda path, solution: write_text(path, text(solution)))
 
 

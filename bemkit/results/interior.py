@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from bemkit.operators.somigliana.potentials import PotentialFields
+from bemkit.results.solution import Solution
 from bemkit.results.solved_body import SolvedBody
 
 
-def interior_fields(solution: SolvedBody) -> PotentialFields:
+def interior_fields(solution: Solution | SolvedBody) -> PotentialFields:
     """Return the displacement, strain and stress inside the body of a solution.
 
     Parameters
     ----------
-    solution : Solution or BodyResult
+    solution : Solution or SolvedBody
         As `run` returns it or `read_result` reads it. Look at its status first: fields of a run that did not converge
         are fields of the last state it reached.
 
@@ -30,4 +31,5 @@ def interior_fields(solution: SolvedBody) -> PotentialFields:
     versions). Inside, their error decays quickly with the distance from the boundary. Within about one element length
     of it, stresses are those of the piecewise data, with peaks at the ends of elements: see `InteriorFields`.
     """
-    return solution.boundary_stress.interior
+    body = solution.body if isinstance(solution, Solution) else solution
+    return body.boundary_stress.interior

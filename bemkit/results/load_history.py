@@ -12,11 +12,11 @@ from bemkit.contact.body import ContactState, SlipHistory
 from bemkit.results.contact_table import ContactTable
 
 if TYPE_CHECKING:
-    from bemkit.scene.steps import Stated
+    from bemkit.scene.scene import Scene
 
 
 class StepEnd(Protocol):
-    """Members of a solution that a step needs: `Solution` and `AssemblySolution` have them."""
+    """Members of a solution that a step needs: `Solution` has them."""
 
     @property
     def energy(self) -> float:
@@ -78,8 +78,8 @@ class LoadStep:
     n_increments : int
         One, or the increments in which the step was gone because one jump failed.
     linear_solves : int
-    end : Solution or AssemblySolution
-        All fields at its end; see `SolvedProblem.at_step`.
+    end : Solution
+        All fields at its end; see `Solution.at_step`.
     state : ContactState
         Dimensionless, at its end.
     motion : SlipHistory
@@ -154,14 +154,14 @@ class LoadHistory:
 
     Parameters
     ----------
-    asked : Scene or Assembly
+    asked : Scene
         With all steps; the scene of a solution is that of its own step.
     n_steps : int
         Number of steps that were asked for.
     steps : tuple of LoadStep
     """
 
-    asked: Stated
+    asked: Scene
     n_steps: int
     steps: tuple[LoadStep, ...]
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -11,7 +11,7 @@ from bemkit.scene.unit_names import amount
 from bemkit.solvers.base import Status
 
 if TYPE_CHECKING:
-    from bemkit.results.solved_problem import SolvedProblem
+    from bemkit.results.solution import Solution
 
 LARGEST_APART = 1.0
 """Least distance of sides with a contact force, relative to the displacement that contact forces cause, up to which
@@ -19,10 +19,8 @@ they touch: mortar conditions hold in the mean, which curved sides of long eleme
 _FEW = 3
 """Pressed nodes up to which sides may have a force although they touch nowhere."""
 
-AnySolution = TypeVar("AnySolution", bound="SolvedProblem")
 
-
-def with_missed_contact_named(solution: AnySolution) -> AnySolution:
+def with_missed_contact_named(solution: Solution) -> Solution:
     """Return the same solution, with the status MISSED_CONTACT if the mesh does not find the contact.
 
     A contact without any force overlaps between its nodes, or sides that touch nowhere have a force.
@@ -42,7 +40,7 @@ def with_missed_contact_named(solution: AnySolution) -> AnySolution:
     return replace(solution, status=Status.MISSED_CONTACT, message=message, warnings=solution.unasked_warnings)
 
 
-def _pressed_apart(solution: SolvedProblem) -> list[str]:
+def _pressed_apart(solution: Solution) -> list[str]:
     """Return the contacts between elastic bodies with a force whose sides touch nowhere."""
     table = solution.contact
     n_pressed = {name: np.count_nonzero(table.sigma_n[table.rows(name)]) for name in table.parts}

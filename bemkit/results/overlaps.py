@@ -15,14 +15,14 @@ from bemkit.results.solved_body import SolvedBody
 from bemkit.scene.unit_names import amount
 
 if TYPE_CHECKING:
-    from bemkit.results.assembly_solution import AssemblySolution
+    from bemkit.results.solution import Solution
 
 LEAST_OVERLAP = 0.1
 """Depth, relative to the largest displacement of both bodies, up to which it may be the error of small displacements
 beside a contact zone."""
 
 
-def overlap_warnings(solution: AssemblySolution) -> Iterator[ResultWarning]:
+def overlap_warnings(solution: Solution) -> Iterator[ResultWarning]:
     """Warn of two bodies that overlap beside the contacts stated between them.
 
     Points of sides in contact are measured by `BetweenNodes`, others here: at the displaced points of both boundaries.
@@ -57,7 +57,7 @@ def _displaced(body: SolvedBody) -> Polyline:
     return Polyline.of(mesh, Interpolation.at(body, elements, at).displacement(body))
 
 
-def _is_beside(solution: AssemblySolution, name: str, other: str) -> BoolArray:
+def _is_beside(solution: Solution, name: str, other: str) -> BoolArray:
     """Return (n_elements,) bool: the elements of a body that are in no contact with another one."""
     mesh = solution.bodies[name].mesh
     is_beside = np.ones(mesh.n_elements, bool)

@@ -41,7 +41,7 @@ class PartForce:
 
 @dataclass(frozen=True)
 class RigidResult(PartForce):
-    """A rigid body of a solved assembly.
+    """A rigid body of a solution.
 
     Parameters
     ----------

@@ -1,12 +1,12 @@
 """Result files: HDF5 with a versioned layout, written step by step, safe to read.
 
 A result file holds plain arrays, texts and numbers only, so any HDF5 program can read it, and reading one from a
-stranger runs no code. The layout, version 4 (files of other versions are refused):
+stranger runs no code. The layout, version 5 (files of other versions are refused):
 
     /                attributes format = "bemkit-result" and schema_version
     /provenance      attributes
-    /scene           text, the scene or assembly as TOML, with all its load steps
-    /assembly        text, the assembly as TOML with all its contacts listed, if a load history found them by `touching`
+    /scene           text, the scene as TOML, with all its load steps
+    /listed          text, the scene as TOML with all its contacts listed, if it found them by `touching`
     /plan            text: linear solver, sizes and counts as JSON
     /bodies          table: name of each body, and its numbers of rows in the arrays that follow
     /meshes/N        mesh of body N: nodes, elements, part_elements, table parts; attribute is_exterior,
@@ -15,12 +15,12 @@ stranger runs no code. The layout, version 4 (files of other versions are refuse
     /points, /centres    of displacements and elements, one body after the other
     /contact_nodes   table: part, place and weight of each contact node
     /steps/0001      a group for each step of a load history, one for a single load:
-        contact          table: displacement, traction, clearance and status of each contact node; of an assembly also
-                         its direction and friction bound; of a load history also what has slipped, and the
-                         dimensionless state from which a run goes on
+        contact          table: displacement, traction, clearance, status, direction and friction bound of each contact
+                         node; of a load history also what has slipped, and the dimensionless state from which a
+                         run goes on
         displacement, traction, traction_dofs, reaction    one body after the other
         outcome          of a load history: text, all else of the step as JSON
-        scene            text, of steps that are scenes of their own: the scene or assembly of the step
+        scene            text, of steps that are scenes of their own: the scene of the step
     /last            the group of the last step
     /outcome         text: status, certificate, transitions, history, timings, warnings ... of the whole run as JSON;
                      there is none until the last step is finished
@@ -33,7 +33,7 @@ and, where the scene names its units, `unit`, tables `meanings` and `units`; see
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
@@ -48,11 +48,11 @@ from bemkit.geometry.surface import Surface
 from bemkit.geometry.symmetry import Symmetry
 from bemkit.hdf5 import FileFormat, Reader, ResultFileError, write_array, write_table
 from bemkit.plan import Plan
-from bemkit.results.assembly_solution import AssemblySolution
 from bemkit.results.file_meanings import annotate
 from bemkit.results.load_history import LoadHistory, LoadStep
+from bemkit.results.resultants import part_facts
 from bemkit.results.solution import Solution
-from bemkit.results.solved_problem import following
+from bemkit.results.solved_steps import following
 from bemkit.results.step_group import (
     NODES,
     BodyLayout,
@@ -63,7 +63,6 @@ from bemkit.results.step_group import (
     write_outcome,
     write_step,
 )
-from bemkit.scene.assembly import Assembly
 from bemkit.scene.load_history import load_steps
 from bemkit.scene.scene import Scene
 from bemkit.scene.serialisation import structure
@@ -79,7 +78,7 @@ if TYPE_CHECKING:
 
 __all__ = ["OutputFileError", "ResultFileError", "ResultWriter", "check_result_target", "read_result", "write_result"]
 
-FORMAT = FileFormat("bemkit-result", 4, "bemkit result", "bemkit run -o")
+FORMAT = FileFormat("bemkit-result", 5, "bemkit result", "bemkit run -o")
 _MAX_PLAN = 1_000_000
 
 
@@ -96,14 +95,14 @@ def check_result_target(path: str | Path) -> Path:
     return FORMAT.check_target(path)
 
 
-def write_result(path: str | Path, solution: Solution | AssemblySolution) -> None:
+def write_result(path: str | Path, solution: Solution) -> None:
     """Write a solution to an HDF5 file, completely or not at all.
 
     Parameters
     ----------
     path : str or Path
         Of the file, usually ``.h5``.
-    solution : Solution or AssemblySolution
+    solution : Solution
 
     Raises
     ------
@@ -142,7 +141,7 @@ class ResultWriter:
         if self._growing is not None:
             self._growing.close()
 
-    def append(self, solution: Solution | AssemblySolution) -> None:
+    def append(self, solution: Solution) -> None:
         """Bring the file on the disk up to the last step of the load history of a solution.
 
         Another history than before, on a finer mesh for example, begins the file anew.
@@ -156,7 +155,7 @@ class ResultWriter:
         """
         self._grown(solution).commit()
 
-    def finish(self, solution: Solution | AssemblySolution) -> None:
+    def finish(self, solution: Solution) -> None:
         """Replace the file on the disk by the whole result; errors as for `append`."""
         growing = self._grown(solution)
         write_outcome(growing.file, solution)
@@ -165,7 +164,7 @@ class ResultWriter:
         annotate(growing.file, solution.units)
         growing.finish()
 
-    def _grown(self, solution: Solution | AssemblySolution) -> GrowingFile:
+    def _grown(self, solution: Solution) -> GrowingFile:
         """Return the open file with all steps of a solution."""
         steps = () if solution.loading is None else solution.loading.steps
         n_written = len(self._written)
@@ -182,11 +181,11 @@ class ResultWriter:
         self._written = steps
         return self._growing
 
-    def _begun(self, solution: Solution | AssemblySolution) -> GrowingFile:
+    def _begun(self, solution: Solution) -> GrowingFile:
         """Return a new file with all that steps have in common."""
         texts = {"scene": scene_to_toml(solution.stated), "plan": json.dumps(unstructure(solution.plan))}
-        if isinstance(solution, AssemblySolution) and solution.stated.touching:
-            texts["assembly"] = scene_to_toml(solution.assembly)
+        if solution.stated.touching:
+            texts["listed"] = scene_to_toml(solution.scene)
         if self._growing is not None:
             self._growing.close()
         growing = GrowingFile(self._target)
@@ -199,7 +198,7 @@ class ResultWriter:
         return growing
 
 
-def read_result(path: str | Path) -> Solution | AssemblySolution:
+def read_result(path: str | Path) -> Solution:
     """Read a solution from a result file.
 
     Parameters
@@ -209,8 +208,8 @@ def read_result(path: str | Path) -> Solution | AssemblySolution:
 
     Returns
     -------
-    Solution or AssemblySolution
-        Of an assembly if the file holds one. Its status is UNFINISHED if the file ends before its load history.
+    Solution
+        Its status is UNFINISHED if the file ends before its load history.
 
     Raises
     ------
@@ -220,7 +219,7 @@ def read_result(path: str | Path) -> Solution | AssemblySolution:
     with FORMAT.opened(path) as reader:
         try:
             problem = _read_problem(reader, "scene")
-            listed = _read_problem(reader, "assembly") if reader.has("assembly") else problem
+            listed = _read_problem(reader, "listed") if reader.has("listed") else problem
         except SceneError as error:
             raise reader.error(str(error)) from error
         try:
@@ -232,13 +231,13 @@ def read_result(path: str | Path) -> Solution | AssemblySolution:
             raise reader.error(f"inconsistent content ({error})") from error
 
 
-def _derived(solution: Solution | AssemblySolution) -> dict[str, Any]:
+def _derived(solution: Solution) -> dict[str, Any]:
     """Return results that follow from the fields."""
     between, contacts = solution.between_nodes, [contact.as_dict() for contact in solution.contacts]
     return {
         "between_nodes": None if between is None else between.as_dict(),
         "contacts": contacts,
-        "bodies": [[force.as_dict() for force in body.part_forces] for body in solution.solved_bodies],
+        "parts": part_facts(solution),
     }
 
 
@@ -247,45 +246,41 @@ def _group(number: int) -> str:
     return f"steps/{number:04d}"
 
 
-def _read_problem(reader: Reader, name: str) -> Scene | Assembly:
+def _read_problem(reader: Reader, name: str) -> Scene:
     return scene_from_toml(reader.text(name, MAX_BYTES), name="scene inside")
 
 
-def _read_history(
-    reader: Reader, asked: Scene | Assembly, listed: Scene | Assembly, layout: StepLayout
-) -> Solution | AssemblySolution:
-    """Return the result of the steps in the file; `listed` has all contacts of an assembly."""
+def _read_history(reader: Reader, asked: Scene, listed: Scene, layout: StepLayout) -> Solution:
+    """Return the result of the steps in the file; `listed` has all contacts."""
     n_steps = int(reader.attributes("steps")["n_steps"])
     groups = [f"steps/{name}" for name in reader.names("steps")]
     problems = (
-        [_read_problem(reader, f"{group}/scene") for group in groups]
-        if asked.n_steps != n_steps
-        else cast("Sequence[Scene | Assembly]", load_steps(cast(Any, asked)))
+        [_read_problem(reader, f"{group}/scene") for group in groups] if asked.n_steps != n_steps else load_steps(asked)
     )
     if not 0 < len(groups) <= min(n_steps, len(problems)):
         raise InputError(f"{len(groups)} of {n_steps} steps, where {len(problems)} were requested")
     steps: list[LoadStep] = []
-    whole: Any = None
+    whole: Solution | None = None
     for number, (group, problem) in enumerate(zip(groups, problems, strict=False), start=1):
-        if isinstance(problem, Assembly) and isinstance(listed, Assembly) and problem.touching:
+        if problem.touching:
             problem = problem.with_contacts(listed.contacts)
-        end: Any = read_step(reader, group, f"{group}/outcome", problem, layout)
+        end = read_step(reader, group, f"{group}/outcome", problem, layout)
         steps.append(read_load_step(reader, group, end))
         whole = following(whole, end, asked, number, n_steps)
     loading = LoadHistory(asked, n_steps, tuple(steps))
+    assert whole is not None  # there is a step
     if not reader.has("outcome"):
-        return cast("Solution | AssemblySolution", replace(whole, status=Status.UNFINISHED, loading=loading))
-    return cast("Solution | AssemblySolution", replace(end, **read_outcome(reader, "outcome"), loading=loading))
+        return replace(whole, status=Status.UNFINISHED, loading=loading)
+    return replace(end, **read_outcome(reader, "outcome"), loading=loading)
 
 
-def _write_layout(file: h5py.File, solution: Solution | AssemblySolution) -> None:
+def _write_layout(file: h5py.File, solution: Solution) -> None:
     """Write what all steps have in common: meshes, points, contact nodes."""
-    bodies = solution.solved_bodies
+    bodies = solution.bodies.values()
     fields = [body.boundary for body in bodies]
-    names = list(solution.bodies) if isinstance(solution, AssemblySolution) else [""]
     counts = {name: [len(getattr(each, name)) for each in fields] for name in _COUNTED}
     columns = {f"n_{name}": np.array(count, dtype=np.int64) for name, count in counts.items()}
-    write_table(file, "bodies", {"name": names, **columns})
+    write_table(file, "bodies", {"name": list(solution.bodies), **columns})
     for number, body in enumerate(bodies):
         _write_mesh(file.create_group(f"meshes/{number}"), body.mesh)
     for name in ("points", "centres"):
@@ -294,7 +289,7 @@ def _write_layout(file: h5py.File, solution: Solution | AssemblySolution) -> Non
     write_table(file, "contact_nodes", {"part": list(table.part), **{name: getattr(table, name) for name in NODES}})
 
 
-def _read_layout(reader: Reader, problem: Scene | Assembly) -> StepLayout:
+def _read_layout(reader: Reader, problem: Scene) -> StepLayout:
     """Read what `_write_layout` wrote."""
     counted = [f"n_{name}" for name in _COUNTED]
     table = reader.table("bodies", texts=("name",), integers=counted)
@@ -319,10 +314,8 @@ def _read_layout(reader: Reader, problem: Scene | Assembly) -> StepLayout:
 _COUNTED = ("points", "centres", "traction_dofs", "reaction")
 
 
-def _curves(problem: Scene | Assembly) -> list[Callable[[], tuple[Curve, ...]]]:
+def _curves(problem: Scene) -> list[Callable[[], tuple[Curve, ...]]]:
     """Return for each body the function that gives its curves, which the file names by their numbers."""
-    if isinstance(problem, Scene):
-        return [lambda: problem.build_mesh().curves]
     return [
         lambda body=body: body.placement.mesh(problem.scene_of(body).build_mesh()).curves  # type: ignore[misc]
         for body in problem.placed_bodies

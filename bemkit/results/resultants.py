@@ -2,43 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from bemkit.results.contact_table import ContactTable
 
 if TYPE_CHECKING:
-    from bemkit.results.part_forces import ContactForce, PartForce
+    from bemkit.results.solved_scene import SolvedScene
 
 
-class _Body(Protocol):
-    @property
-    def part_forces(self) -> tuple[PartForce, ...]:
-        """Resultants on the parts."""
-
-
-class _Result(Protocol):
-    """Needs of a solution."""
-
-    @property
-    def contact(self) -> ContactTable:
-        """The contact table."""
-
-    @property
-    def contacts(self) -> tuple[ContactForce, ...]:
-        """Forces of each contact."""
-
-    @property
-    def solved_bodies(self) -> Sequence[_Body]:
-        """The elastic bodies."""
-
-    def part_length(self, part: str, /) -> float:
-        """Return the length of a contact."""
-
-
-def contact_facts(solution: _Result) -> list[dict[str, Any]]:
+def contact_facts(solution: SolvedScene) -> list[dict[str, Any]]:
     """Return the numbers of each contact by name.
 
     Those of `ContactForce`, and ``contact_fraction`` [-], the share of the contact that touches, ``peak_x`` and
@@ -58,11 +32,17 @@ def _peak(table: ContactTable, part: str) -> dict[str, float]:
     return {"peak_x": float(table.x[node]), "peak_y": float(table.y[node])}
 
 
-def part_facts(solution: _Result) -> list[dict[str, Any]]:
-    """Return the resultants on each part, of several bodies with the name of the ``body``."""
-    names = list(getattr(solution, "bodies", {}))
-    return [
-        ({"body": names[number]} if names else {}) | force.as_dict()
-        for number, body in enumerate(solution.solved_bodies)
-        for force in body.part_forces
-    ]
+def part_facts(solution: SolvedScene) -> list[dict[str, Any]]:
+    """Return the resultants on each part, with the name of the ``body`` if it has one.
+
+    Those on parts at fixed obstacles are those of the contacts: of the nodal forces, with which the body is in
+    equilibrium to round-off.
+    """
+    contacts = {contact.name: contact for contact in solution.contacts}
+    facts = []
+    for name, body in solution.bodies.items():
+        for force in body.part_forces:
+            found = contacts.get(body.contact_name(force.name), force)
+            sums = {"force_x": found.force_x, "force_y": found.force_y, "moment": found.moment}
+            facts.append(({"body": name} if name else {}) | {"name": force.name} | sums)
+    return facts

@@ -1,4 +1,4 @@
-"""The result of a scene: physical fields on the boundary, the summary, the plan and the timings.
+"""The result of a scene: physical fields of its bodies, the contacts, how the solve ended, the plan and the timings.
 
 Everything is in the user's units and holds physical tractions only. Signs: outward normal n, tangent t along the
 anticlockwise boundary, traction = stress @ n; a pressed contact has sigma_n <= 0, and u_n <= gap.
@@ -6,182 +6,283 @@ anticlockwise boundary, traction = stress @ n; a pressed contact has sigma_n <= 
 
 from __future__ import annotations
 
-from collections.abc import Collection
-from dataclasses import dataclass
+from collections.abc import Callable, Collection, Mapping
+from copy import copy
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
-from bemkit.arrays import FloatArray, IntArray
-from bemkit.contact.body import SlipHistory
-from bemkit.geometry.mesh import BoundaryMesh
-from bemkit.results.between_nodes import BetweenNodes, violations_between_nodes
+from bemkit.contact.certificate import Certificate
+from bemkit.errors import InputError
+from bemkit.notebook import Explorable
+from bemkit.operators.counts import OperationCounts
+from bemkit.plan import Plan
+from bemkit.result_warning import ResultWarning
+from bemkit.results.between_nodes import BetweenNodes, missed_contacts
 from bemkit.results.contact_table import ContactTable as ContactTable
 from bemkit.results.contact_table import Transition as Transition
-from bemkit.results.contact_table import bound_at, resolved_transitions, unresolved_contacts
-from bemkit.results.resultants import contact_facts
+from bemkit.results.contact_table import free_contacts
+from bemkit.results.contact_violations import violations_between_nodes
+from bemkit.results.load_history import step_rows
+from bemkit.results.resultants import contact_facts, part_facts
 from bemkit.results.solved_body import BoundaryFields as BoundaryFields
-from bemkit.results.solved_body import SolvedBody
-from bemkit.results.solved_problem import SolvedProblem
-from bemkit.scene.scene import Scene
+from bemkit.results.solved_scene import SolvedScene
+from bemkit.results.when_asked import WhenAsked
+from bemkit.solvers.base import Status, StepRecord
 
 if TYPE_CHECKING:
-    from bemkit.results.part_forces import ContactForce
+    from typing import Self
+
+    from bemkit.results.contact_places import ContactPlaces
     from bemkit.results.singular_corners import SingularCorner
-    from bemkit.results.zone_ends import ZoneEnd
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Solution(SolvedProblem, SolvedBody):
+class Solution(SolvedScene, Explorable):
     """The solution of a scene, as `bemkit.run` returns it and result files hold it.
 
-    Status, certificate, contact table and history are entries of `SolvedProblem`.
+    Bodies and contacts are entries of `SolvedScene`.
 
     Parameters
     ----------
-    scene : Scene
-        Of a load history that of its last step.
-    mesh : BoundaryMesh
-    boundary : BoundaryFields
-    force_normal : float [N/m]
-        The total pressing force, positive: minus the integral of sigma_n.
-    force_tangential : float [N/m]
-        The total friction force on the body along the boundary tangent: the integral of sigma_t.
-    energy : float [J/m]
-        Elastic energy: half the work of the stresses in the plane on the strains that they cause. In plane strain heat
-        also compresses the body along its length, which costs E (alpha T)^2 / 2 per volume, not counted here.
+    status : Status
+    certificate : Certificate
+    history : tuple of StepRecord
+    linear_solves, outer_steps : int
+    timings : mapping of str to float [s]
+        Of each stage of the run, and of all.
+    plan : Plan
+    work : OperationCounts
+        Counts of integrals, factorisations and solves; equal to ``plan.work`` if all load steps converged.
+    message : str
+        How the solver ended.
+    memory : mapping of str to int [bytes]
+        Largest memory of all arrays in each stage of the run; empty unless `tracemalloc` was tracing.
+    warnings : tuple of ResultWarning
+        See `bemkit.results.warnings`.
+    provenance : mapping of str to str
+        Versions, platform and time of a result from a file; empty otherwise.
     """
 
-    scene: Scene
-    mesh: BoundaryMesh
-    boundary: BoundaryFields
-    force_normal: float
-    force_tangential: float
-    energy: float
+    status: Status
+    certificate: Certificate
+    history: tuple[StepRecord, ...]
+    linear_solves: int
+    outer_steps: int
+    timings: Mapping[str, float]
+    plan: Plan
+    work: OperationCounts
+    message: str = ""
+    memory: Mapping[str, int] = field(default_factory=dict)
+    warnings: WhenAsked[tuple[ResultWarning, ...]] = WhenAsked(())  # noqa: RUF009 - a descriptor, shared by all on purpose
+    provenance: Mapping[str, str] = field(default_factory=dict)
 
     def __repr__(self) -> str:
         """Return one line; the fields hold thousands of numbers."""
+        named = f"{len(self.bodies)} bodies, " if "" not in self.bodies else ""
         nodes = f", {self.contact.n_contact} contact nodes" if self.contact.n_contact else ""
-        return f"Solution({self.scene.title!r}: {self.status_words}, {self.n_elements} elements{nodes})"
+        return f"Solution({self.title!r}: {self.status_words}, {named}{self.n_elements} elements{nodes})"
+
+    @property
+    def is_converged(self) -> bool:
+        """Whether the result is certified and, if an accuracy was asked for, as accurate."""
+        return self.status is Status.CONVERGED
+
+    @property
+    def is_certified(self) -> bool:
+        """Whether contact, friction and equilibrium hold on the mesh, even if it is too coarse for the accuracy."""
+        return self.status in (Status.CONVERGED, Status.ACCURACY_NOT_REACHED)
+
+    def at_step(self, number: int) -> Self:
+        """Return the solution at the end of an earlier step of its load history.
+
+        Parameters
+        ----------
+        number : int
+            Of the step, counted from 1.
+
+        Returns
+        -------
+        Solution
+            Its `loading` ends there, too.
+
+        Raises
+        ------
+        InputError
+            If there is no such step.
+        """
+        loading = self.loading
+        if loading is None:
+            raise InputError("the result has no load history: give [[steps]] or load_factors")
+        if not 1 <= number <= len(loading.steps):
+            most = len(loading.steps)
+            raise InputError(f"step {number} does not exist: give a number from 1 to {most}")
+        end: Any = loading.steps[number - 1].end
+        return cast("Self", replace(end, loading=replace(loading, steps=loading.steps[:number])))
+
+    @cached_property
+    def estimated_error(self) -> float | None:
+        """Estimated error of all bodies in the energy norm, sqrt(a(u - u_h, u - u_h) / a(u_h, u_h)).
+
+        None without an estimate, and where the energy is not positive, so that an error is measured against nothing;
+        zero of bodies at rest, or that only move as a whole. None, too, while contact is missed that no node meets.
+        """
+        if self.wrongly_free:
+            return None
+        errors = [
+            float(np.sum(body.element_errors)) for body in self.bodies.values() if body.element_errors is not None
+        ]
+        unit = sum(body.error_unit for body in self.bodies.values())
+        if len(errors) < len(self.bodies.values()):
+            return None
+        if max(sum(errors), unit) <= sum(body.energy_of_round_off for body in self.bodies.values()):
+            return 0.0
+        return float(np.sqrt(sum(errors) / unit)) if unit > 0.0 else None
+
+    @cached_property
+    def places(self) -> ContactPlaces:
+        """Places of contacts on the bodies, and what happens there."""
+        from bemkit.results.contact_places import ContactPlaces
+
+        return ContactPlaces(self, lambda: self.missed_contacts)
+
+    @property
+    def singular_corners(self) -> tuple[SingularCorner, ...]:
+        """Corners of all bodies at which contact tractions grow without bound; see `ContactPlaces.corners`."""
+        return tuple(corner for own in self.places.corners.values() for corner in own)
 
     @cached_property
     def estimated_traction_error(self) -> float | None:
-        """Estimated error of the contact tractions in L2, relative to them.
+        """Estimated error of the contact tractions of all bodies in L2, relative to their norm.
 
-        From degree 3 on without those at `singular_corners`, which no element holds. Of a half-plane that of all
-        tractions but loads, in the mean. None without an estimate and without such tractions.
+        From degree 3 on without those at edges that press into another side, and at `singular_corners`. Of a half-plane
+        that of all tractions but loads, in the mean. None without an estimate, without such tractions, and where fewer
+        than three nodes carry them.
         """
-        if self.surface_errors is not None:
-            return self.surface_errors.in_the_mean
-        if not self.scene.discretisation.estimates_error or self.contact_traction_size == 0.0:
+        bodies = tuple(self.bodies.values())
+        if len(bodies) == 1 and bodies[0].surface_errors is not None:
+            return bodies[0].surface_errors.in_the_mean
+        size = self.contact_traction_size
+        if size == 0.0 or not all(body.scene.discretisation.estimates_error for body in bodies):
             return None
-        if self.coefficient_errors is None:
-            return self._error_of_nodal_tractions()
-        from bemkit.results.error_indicators import place_error
-        from bemkit.results.zone_ends import zone_end
+        if any(body.coefficient_errors is None for body in bodies):
+            from bemkit.results.error_indicators import nodal_error
 
-        squared = float(self.coefficient_errors.traction[self.contact_elements].sum())
-        squared += sum(
-            place_error(self.contact, each, self.transitions, zone_end(self.mesh, self.contact, each))
-            for each in self.transitions
-        )
-        return float(np.sqrt(squared)) / self.contact_traction_size
+            degree = min(body.scene.discretisation.displacement_space(body.mesh).degree for body in bodies)
+            squared = nodal_error(self.contact, degree, self.n_sides)
+        else:
+            squared = self.places.squared_traction_error()
+        return None if squared is None else float(np.sqrt(squared)) / size
 
     @cached_property
     def estimated_local_traction_error(self) -> float | None:
-        """Estimated largest error of the tractions of a half-plane on an element; None for another body.
+        """Estimated largest error of the tractions of a half-plane on an element; None for other bodies.
 
         Relative to the traction on the element or to the mean of all, whichever is larger. The worst elements are
         excluded, on a share of the loaded length no larger than the error itself: no element is right where tractions
         are infinite.
         """
-        return None if self.surface_errors is None else self.surface_errors.largest
+        errors = [body.surface_errors for body in self.bodies.values()]
+        return errors[0].largest if len(errors) == 1 and errors[0] is not None else None
 
     @property
-    def stated(self) -> Scene:
-        """The scene that was solved, with all its load steps."""
-        return self.scene if self.loading is None else cast(Scene, self.loading.asked)
-
-    @property
-    def _problem(self) -> Scene:
-        return self.scene
-
-    @property
-    def solved_bodies(self) -> tuple[Solution]:
-        """The one body: the solution itself."""
-        return (self,)
-
-    def part_length(self, part: str) -> float:
-        """Return the length of boundary of a part [m]."""
-        return float(self.mesh.lengths[self.mesh.part(part)].sum())
+    def status_words(self) -> str:
+        """How the solve ended, in lower case."""
+        return self.status.name.lower().replace("_", " ")
 
     @cached_property
-    def friction_bound(self) -> FloatArray | None:
-        """(n_contact,) array [Pa]: the largest friction at each contact node; None if there is none anywhere."""
-        table = self.contact
-        law = self.scene.law_at(table.part, np.stack([table.x, table.y], axis=1))
-        return bound_at(table, law if self.loading is None else law.at_slip(self.loading.motion))
+    def between_nodes(self) -> BetweenNodes | None:
+        """Largest violations of the contact conditions between the nodes, which the certificate does not measure.
 
-    @cached_property
-    def contacts(self) -> tuple[ContactForce, ...]:
-        """The forces on each contact part, with contact length, peak pressure and largest slip."""
-        from bemkit.results.part_forces import contact_forces
-
-        parts = {force.name: force for force in self.part_forces}
-        return contact_forces(self.contact, [parts[name] for name in self.contact.parts], self.transitions)
-
-    @cached_property
-    def singular_corners(self) -> tuple[SingularCorner, ...]:
-        """Corners with singular contact tractions; see `bemkit.results.singular_corners`."""
-        from bemkit.results.singular_corners import singular_corners
-
-        return singular_corners(self, self.contact, motion=None if self.loading is None else self.loading.motion)
-
-    def corners_of(self, body: SolvedBody) -> tuple[SingularCorner, ...]:
-        """Return the singular corners of the one body."""
-        return self.singular_corners
-
-    @property
-    def contact_elements(self) -> IntArray:
-        """The elements of all contact parts, from degree 3 on without those at `singular_corners`."""
-        elements = np.concatenate(
-            [np.zeros(0, np.intp), *(self.mesh.part(part.name) for part in self.scene.contact_parts)]
-        )
-        if self.coefficient_errors is None:
-            return elements
-        return np.setdiff1d(elements, [k for corner in self.singular_corners for k in corner.elements])
-
-    @cached_property
-    def zone_ends(self) -> tuple[ZoneEnd, ...]:
-        """Resolved ends of zones of one status, missed and unresolved contact.
-
-        See `resolved_transitions`, `missed_contacts` and `unresolved_contacts`.
+        None without contact.
         """
-        from bemkit.results.zone_ends import Side, zone_end
-
-        resolved = resolved_transitions(self.contact, self.transitions)
-        places = (*unresolved_contacts(self.contact, resolved), *self.missed_contacts.items())
-        missed = (Side("", self.mesh, part).near(np.array(place)) for part, place in places)
-        return (*(zone_end(self.mesh, self.contact, each) for each in resolved), *missed)
+        return BetweenNodes.largest(self.contacts_between_nodes.values())
 
     @cached_property
-    def reversal_ends(self) -> tuple[ZoneEnd, ...]:
-        """Reversals of slip without a resolved stick zone; see `slip_reversals`."""
-        from bemkit.results.slip_reversals import slip_reversals
-        from bemkit.results.zone_ends import zone_end
+    def contacts_between_nodes(self) -> dict[str, BetweenNodes]:
+        """Largest violations between the nodes of each contact, by its name in the contact table."""
+        return violations_between_nodes(self)
 
-        return tuple(zone_end(self.mesh, self.contact, each.place) for each in slip_reversals(self.contact))
+    def between_nodes_of(self, names: Collection[str]) -> dict[str, BetweenNodes]:
+        """Return the largest violations between the nodes of some contacts; the others are not measured for it."""
+        if "contacts_between_nodes" in vars(self):
+            return {name: each for name, each in self.contacts_between_nodes.items() if name in names}
+        return violations_between_nodes(self, names) if names else {}
 
-    def _measured_between(
-        self, motion: SlipHistory | None, names: Collection[str] | None = None
-    ) -> dict[str, BetweenNodes]:
-        return violations_between_nodes(self, self.contact, motion, names)
+    @cached_property
+    def missed_contacts(self) -> dict[str, tuple[float, float]]:
+        """Points where contact is missed, because no node meets it, by contact; see `bemkit.results.missed_contact`."""
+        return missed_contacts(self.contact, self.contacts_between_nodes)
 
-    def _parts(self) -> dict[str, Any]:
+    @cached_property
+    def wrongly_free(self) -> dict[str, tuple[float, float]]:
+        """The missed contacts without any force; those with a force are not measured for it."""
+        return missed_contacts(self.contact, self.between_nodes_of(free_contacts(self.contact)))
+
+    @property
+    def unasked_warnings(self) -> Any:
+        """The warnings, or the function that will find them: what a solution that replaces this one takes over."""
+        return WhenAsked.held(self, "warnings")
+
+    def with_warnings(self, warnings: tuple[ResultWarning, ...] | Callable[[Any], tuple[ResultWarning, ...]]) -> Self:
+        """Return the same solution, with what it has computed, and other warnings.
+
+        A function of the solution is called when the warnings are first read.
+        """
+        result = copy(self)
+        object.__setattr__(result, "warnings", warnings)
+        return result
+
+    def summary(self) -> dict[str, Any]:
+        """Return the result without its fields, under the stable names of the JSON output.
+
+        Returns
+        -------
+        dict
+            ``title``, ``units`` (names, None without), ``status`` (a word), ``message`` (how the solver ended),
+            ``converged``, ``certified``, ``warnings``, ``n_bodies``, ``n_elements``, ``n_contact``, ``linear_solves``,
+            ``outer_steps``, ``force_normal`` and ``force_tangential`` [N/m], ``energy`` [J/m], ``estimated_error``,
+            ``estimated_traction_error`` and ``estimated_local_traction_error`` (None without an estimate),
+            ``singular_corners`` (``x``, ``y`` [m], ``exponent``), ``parts`` (resultants of the tractions on each part),
+            ``contacts`` (what each contact transmits), ``bodies`` (``n_elements``, ``energy``), ``rigid``,
+            ``transitions``, ``certificate``, ``between_nodes`` (None without contact), ``timings`` [s], ``plan``,
+            ``work``, ``memory`` [bytes], ``steps`` (of a load history, see `LoadStep.as_dict`). The only body
+            of a scene that names none is called ``body``.
+        """
+        errors = ("estimated_error", "estimated_traction_error", "estimated_local_traction_error")
+        numbers = ("linear_solves", "outer_steps", "force_normal", "force_tangential", "energy", *errors)
         return {
-            **{name: getattr(self, name) for name in ("estimated_traction_error", "estimated_local_traction_error")},
-            "singular_corners": [corner.as_dict() for corner in self.singular_corners],
-            "parts": [force.as_dict() for force in self.part_forces],
+            "title": self.title,
+            "units": None if self.units is None else self.units.as_dict(),
+            "status": self.status.name.lower(),
+            "message": self.message or self.status.value,
+            "converged": self.is_converged,
+            "certified": self.is_certified,
+            "warnings": [warning.as_dict() for warning in self.warnings],
+            "n_bodies": len(self.bodies),
+            "n_elements": self.n_elements,
+            "n_contact": self.contact.n_contact,
+            **{name: getattr(self, name) for name in numbers},
+            "singular_corners": [
+                ({"body": name} if name else {}) | corner.as_dict()
+                for name, own in self.places.corners.items()
+                for corner in own
+            ],
+            "parts": part_facts(self),
             "contacts": contact_facts(self),
+            "bodies": {
+                name or "body": {"n_elements": body.mesh.n_elements, "energy": body.energy}
+                for name, body in self.bodies.items()
+            },
+            "rigid": {name: body.as_dict() for name, body in self.rigid.items()},
+            "transitions": [transition.as_dict() for transition in self.transitions],
+            "certificate": self.certificate.as_dict(),
+            "between_nodes": None if self.between_nodes is None else self.between_nodes.as_dict(),
+            "timings": dict(self.timings),
+            "plan": self.plan.as_dict(),
+            "work": self.work.as_dict(),
+            "memory": dict(self.memory),
+            "steps": step_rows(self.loading),
         }

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -12,8 +12,8 @@ from bemkit.arrays import BoolArray, FloatArray, read_only
 from bemkit.errors import InputError
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.spaces import ConstantSpace
+from bemkit.scene.body_scene import BodyScene
 from bemkit.scene.conditions import Clamped, Load, PrescribedDisplacement, Roller
-from bemkit.scene.scene import Scene
 
 if TYPE_CHECKING:
     from bemkit.model.particular import ParticularFields
@@ -80,6 +80,13 @@ class BoundaryFields:
         return f"BoundaryFields({len(self.points)} points, {len(self.centres)} elements)"
 
 
+class SideName(NamedTuple):
+    """A side of an elastic body in a contact."""
+
+    body: str
+    part: str
+
+
 _FREE_SHARE = 1e-16
 """Share of the energy of a heated body that cannot expand at all, up to which a body counts as free to expand."""
 
@@ -89,22 +96,37 @@ _ROUND_OFF = 1e-13
 that only move as a whole."""
 
 
+@dataclass(frozen=True, eq=False)
 class SolvedBody:
-    """Base of the results of a single body and of one of several bodies.
+    """One elastic body of a solution.
 
-    Attributes
+    Parameters
     ----------
-    scene : Scene
+    name : str
+        Empty if the scene names no bodies.
+    scene : BodyScene
+        The part of the scene that is about it, in the coordinates of its shape.
     mesh : BoundaryMesh
+        In its place.
     boundary : BoundaryFields
     energy : float [J/m]
-        Elastic energy.
+        Elastic energy: half the work of the stresses in the plane on the strains that they cause. In plane strain heat
+        also compresses the body along its length, which costs E (alpha T)^2 / 2 per volume, not counted here.
     """
 
-    scene: Scene
+    name: str
+    scene: BodyScene
     mesh: BoundaryMesh
     boundary: BoundaryFields
     energy: float
+
+    def __repr__(self) -> str:
+        """Return one line; the fields hold thousands of numbers."""
+        return f"SolvedBody({self.name!r}: {self.mesh.n_elements} elements)"
+
+    def contact_name(self, part: str) -> str:
+        """Return the name of the contact of a part with a fixed obstacle: ``"body.part"``."""
+        return f"{self.name}.{part}" if self.name else part
 
     @cached_property
     def particular(self) -> ParticularFields | None:

@@ -20,12 +20,11 @@ from bemkit.hdf5 import Reader, write_array, write_table
 from bemkit.operators.counts import OperationCounts
 from bemkit.plan import Plan
 from bemkit.result_warning import ResultWarning
-from bemkit.results.assembly_solution import AssemblySolution, BodyResult, SideName
 from bemkit.results.contact_table import ContactTable, Transition
 from bemkit.results.load_history import LoadStep, StepWork
 from bemkit.results.part_forces import ContactForce, RigidResult
-from bemkit.results.solution import BoundaryFields, Solution
-from bemkit.scene.assembly import Assembly
+from bemkit.results.solution import Solution
+from bemkit.results.solved_body import BoundaryFields, SideName, SolvedBody
 from bemkit.scene.scene import Scene
 from bemkit.scene.serialisation import structure
 from bemkit.solvers.base import Status, StepRecord
@@ -38,9 +37,8 @@ NODES = ("x", "y", "s", "weight")
 _CONTACT = ("u_n", "u_t", "sigma_n", "sigma_t", "gap", "clearance")
 _STATE = ("state_u_n", "state_u_t", "state_sigma_n", "state_sigma_t")
 _SLIP = ("slip", "last_slip")
-_ASSEMBLY = ("direction_x", "direction_y", "friction_bound")
+_DIRECTIONS = ("direction_x", "direction_y")
 _FIELDS = ("displacement", "traction", "traction_dofs", "reaction")
-_FORCES = ("force_normal", "force_tangential", "energy")
 
 
 @dataclass(frozen=True)
@@ -83,62 +81,54 @@ class StepLayout:
     provenance: Mapping[str, str]
 
 
-def write_step(group: h5py.Group, solution: Solution | AssemblySolution, step: LoadStep | None) -> None:
+def write_step(group: h5py.Group, solution: Solution, step: LoadStep | None) -> None:
     """Write the fields of a solution into a group; with a step of a load history also its outcome and what slipped."""
     table = solution.contact
     columns: dict[str, Any] = {name: getattr(table, name) for name in _CONTACT} | {"status": table.status}
-    if isinstance(solution, AssemblySolution):
-        bound = solution.friction_bound
-        bounds = np.full(table.n_contact, np.nan) if bound is None else bound
-        columns |= dict(zip(_ASSEMBLY, (*solution.contact_directions.T, bounds), strict=True))
+    columns |= dict(zip(_DIRECTIONS, solution.contact_directions.T, strict=True))
+    bound = solution.friction_bound
+    columns["friction_bound"] = np.full(table.n_contact, np.nan) if bound is None else bound
     if step is not None:
         state = np.hstack([step.state.displacement, step.state.traction])
         columns |= dict(zip(_STATE, state.T, strict=True)) | {name: getattr(step.motion, name) for name in _SLIP}
         write_outcome(group, solution, step)
     write_table(group, "contact", columns)
     for name in _FIELDS:
-        write_array(group, name, np.concatenate([getattr(body.boundary, name) for body in solution.solved_bodies]))
+        write_array(group, name, np.concatenate([getattr(body.boundary, name) for body in solution.bodies.values()]))
 
 
-def read_step(
-    reader: Reader, group: str, outcome: str, problem: Scene | Assembly, layout: StepLayout
-) -> Solution | AssemblySolution:
-    """Read the fields that `write_step` wrote, and the outcome at a path, as the solution of a scene or an assembly."""
-    names = (*_CONTACT, *_ASSEMBLY) if isinstance(problem, Assembly) else _CONTACT
+def read_step(reader: Reader, group: str, outcome: str, problem: Scene, layout: StepLayout) -> Solution:
+    """Read the fields that `write_step` wrote, and the outcome at a path, as the solution of a scene."""
+    names = (*_CONTACT, *_DIRECTIONS, "friction_bound")
     columns = reader.table(f"{group}/contact", floats=names, integers=("status",))
     entries = reader.json(outcome)
     table = {name: columns[name] for name in (*_CONTACT, "status")}
-    common = _outcome(entries) | {
-        "contact": ContactTable(**layout.nodes, **table),
-        "plan": layout.plan,
-        "provenance": layout.provenance,
-    }
     boundaries = _read_boundaries(reader, group, layout.bodies)
-    if not isinstance(problem, Assembly):
-        forces: dict[str, Any] = {name: float(entries[name]) for name in _FORCES}
-        return Solution(scene=problem, mesh=layout.bodies[0].mesh, boundary=boundaries[0], **forces, **common)
     placed = [problem.scene_of(body) for body in problem.placed_bodies]
     energies = map(float, entries["energies"])
     bodies = [
-        BodyResult(body.name, scene, body.mesh, boundary, energy)
+        SolvedBody(body.name, scene, body.mesh, boundary, energy)
         for body, scene, boundary, energy in zip(layout.bodies, placed, boundaries, energies, strict=True)
     ]
     bound = columns["friction_bound"]
-    return AssemblySolution(
-        assembly=problem,
+    return Solution(
+        scene=problem,
+        contact=ContactTable(**layout.nodes, **table),
+        plan=layout.plan,
+        provenance=layout.provenance,
         bodies={body.name: body for body in bodies},
         contact_sides={
             name: tuple(SideName(*map(str, side)) for side in sides) for name, sides in entries["sides"].items()
         },
-        contact_directions=np.stack([columns[name] for name in _ASSEMBLY[:2]], axis=1),
+        contact_directions=np.stack([columns[name] for name in _DIRECTIONS], axis=1),
         friction_bound=bound if entries["has_friction"] else None,
         contacts=tuple(_rows(entries["contacts"], ContactForce)),
         rigid={row.name: row for row in _rows(entries["rigid"], RigidResult)},
-        **common,
+        **_outcome(entries),
     )
 
 
-def write_outcome(group: h5py.Group, solution: Solution | AssemblySolution, step: LoadStep | None = None) -> None:
+def write_outcome(group: h5py.Group, solution: Solution, step: LoadStep | None = None) -> None:
     """Write all of a solution but its arrays as a text in JSON, of a step also what it adds to its load history."""
     entries: dict[str, Any] = {
         "status": solution.status.name,
@@ -151,16 +141,13 @@ def write_outcome(group: h5py.Group, solution: Solution | AssemblySolution, step
         "warnings": [warning.as_dict() for warning in solution.warnings],
         "history": [vars(record) | {"certificate": record.certificate.as_dict()} for record in solution.history],
     }
-    if isinstance(solution, AssemblySolution):
-        entries |= {
-            "energies": [body.energy for body in solution.solved_bodies],
-            "sides": solution.contact_sides,
-            "has_friction": solution.friction_bound is not None,
-            "contacts": [asdict(contact) for contact in solution.contacts],
-            "rigid": [asdict(body) for body in solution.rigid.values()],
-        }
-    else:
-        entries |= {name: getattr(solution, name) for name in _FORCES}
+    entries |= {
+        "energies": [body.energy for body in solution.bodies.values()],
+        "sides": solution.contact_sides,
+        "has_friction": solution.friction_bound is not None,
+        "contacts": [asdict(contact) for contact in solution.contacts],
+        "rigid": [asdict(body) for body in solution.rigid.values()],
+    }
     if step is not None:
         counts = {"n_increments": step.n_increments, "linear_solves": step.linear_solves}
         times = {"time": step.time, "time_step": step.motion.time_step}
@@ -168,7 +155,7 @@ def write_outcome(group: h5py.Group, solution: Solution | AssemblySolution, step
     write_array(group, "outcome", json.dumps(entries, default=lambda number: number.item()))
 
 
-def read_load_step(reader: Reader, group: str, end: Solution | AssemblySolution) -> LoadStep:
+def read_load_step(reader: Reader, group: str, end: Solution) -> LoadStep:
     """Read what `write_step` wrote of a step of a load history, whose fields at its end are given."""
     columns = reader.table(f"{group}/contact", floats=(*_STATE, *_SLIP))
     entries = reader.json(f"{group}/outcome")["step"]

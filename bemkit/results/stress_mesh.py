@@ -67,7 +67,7 @@ def stress_mesh(body: SolvedBody, spacing: float, frame: FloatArray) -> StressMe
 
     Parameters
     ----------
-    body : Solution or BodyResult
+    body : Solution or SolvedBody
         Bounded, or the exterior of closed curves.
     spacing : float [m]
         Distance of points far from the boundary; close to it they are as dense as its elements.

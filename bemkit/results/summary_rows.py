@@ -10,7 +10,6 @@ import numpy as np
 
 from bemkit.contact.certificate import Certificate
 from bemkit.geometry.shapes import Shape
-from bemkit.results.assembly_solution import AssemblySolution
 from bemkit.results.between_nodes import BetweenNodes
 from bemkit.results.resultants import contact_facts, part_facts
 from bemkit.results.solution import Solution
@@ -23,7 +22,7 @@ DIGITS = 8
 _MANY_TRANSITIONS, _MANY_CONTACTS = 6, 8
 
 
-def summary_text(solution: Solution | AssemblySolution) -> str:
+def summary_text(solution: Solution) -> str:
     """Return the summary of a result in lines: title, rows, warnings."""
     rows = list(summary_rows(solution))
     width = max(len(name) for name, _ in rows)
@@ -36,15 +35,10 @@ def _lines(name: str, text: str) -> list[tuple[str, str]]:
     return [(name, first), *(("", line) for line in more)]
 
 
-def summary_rows(solution: Solution | AssemblySolution) -> Iterator[tuple[str, str]]:
+def summary_rows(solution: Solution) -> Iterator[tuple[str, str]]:
     """Yield names and texts of all that a summary says of a result, numbers with their units."""
     yield "status", _status(solution)
-    if isinstance(solution, Solution):
-        solver = solution.scene.solver
-        yield from _body_rows(solution)
-    else:
-        solver = solution.assembly.solver
-        yield from _bodies_rows(solution)
+    yield from _bodies_rows(solution)
     if has_contact := solution.contact.n_contact > 0:
         yield "contact nodes", _node_counts(solution)
         yield from _force_rows(solution)
@@ -58,20 +52,27 @@ def summary_rows(solution: Solution | AssemblySolution) -> Iterator[tuple[str, s
         yield "estimated error", words
     if has_contact:
         yield "transitions", "\n".join(_transition_lines(solution))
-        drivers = drivers_at_work(solver, (record.message for record in solution.history))
+        drivers = drivers_at_work(solution.scene.solver, (record.message for record in solution.history))
         words = ", ".join(dict.fromkeys(map(SOLVERS.word_of, drivers)))
         yield "linear solves", f"{solution.linear_solves} in {solution.outer_steps} steps ({words})"
     yield from _violation_rows(solution)
     yield "time", _time(solution)
 
 
-def _body_rows(solution: Solution) -> Iterator[tuple[str, str]]:
-    mesh = solution.mesh
-    discretisation = DISCRETISATIONS.word_of(solution.scene.discretisation)
-    if (degree := solution.scene.discretisation.displacement_space(mesh).degree) > 2:
-        discretisation += f", degree {degree}"
-    yield "elements", f"{mesh.n_elements} ({discretisation})"
-    if notes := _notes(solution.scene.shape):
+def _bodies_rows(solution: Solution) -> Iterator[tuple[str, str]]:
+    if "" not in solution.bodies:
+        yield "bodies", f"{len(solution.bodies)}, with {solution.n_elements} elements"
+        for elastic in solution.stated.bodies:
+            if notes := _notes(elastic.shape):
+                yield f"outline of {elastic.name}", notes
+        return
+    body = solution.body
+    mesh, discretisation = body.mesh, body.scene.discretisation
+    words = DISCRETISATIONS.word_of(discretisation)
+    if (degree := discretisation.displacement_space(mesh).degree) > 2:
+        words += f", degree {degree}"
+    yield "elements", f"{mesh.n_elements} ({words})"
+    if notes := _notes(body.scene.shape):
         yield "outline", notes
     if mesh.symmetry is not None:
         values = f"values of one side, {mesh.n_elements} of {mesh.whole.n_elements} elements"
@@ -84,7 +85,7 @@ def _notes(shape: Shape) -> str:
     return "" if drawing is None else "\n".join(drawing.notes)
 
 
-def _force_rows(solution: Solution | AssemblySolution) -> Iterator[tuple[str, str]]:
+def _force_rows(solution: Solution) -> Iterator[tuple[str, str]]:
     """Yield the forces of all contacts together, then those of each, the largest first."""
     units = solution.units
     total, friction = solution.force_normal, solution.force_tangential
@@ -121,7 +122,7 @@ def _vector(x: float, y: float, quantity: str, units: UnitNames | None) -> str:
     return f"({_amount(x, '', None)}, {_amount(y, '', None)}) {unit_of(quantity, units)}".rstrip()
 
 
-def _part_rows(solution: Solution | AssemblySolution) -> Iterator[tuple[str, str]]:
+def _part_rows(solution: Solution) -> Iterator[tuple[str, str]]:
     """Yield resultants on the parts of the bodies, and how rigid bodies moved and what acts on them."""
     units = solution.units
     forces = part_facts(solution)
@@ -131,7 +132,7 @@ def _part_rows(solution: Solution | AssemblySolution) -> Iterator[tuple[str, str
         yield f"force on {name}", f"{_vector(fact['force_x'], fact['force_y'], 'force', units)}, moment {moment}"
     if len(forces) > _MANY_CONTACTS:
         yield "", f"and {len(forces) - _MANY_CONTACTS} parts more (--json -)"
-    rigid = [] if isinstance(solution, Solution) else list(solution.rigid.values())
+    rigid = list(solution.rigid.values())
     for body in rigid[:_MANY_CONTACTS]:
         yield (
             body.name,
@@ -143,21 +144,14 @@ def _part_rows(solution: Solution | AssemblySolution) -> Iterator[tuple[str, str
         yield "", f"and {len(rigid) - _MANY_CONTACTS} rigid bodies more (--json -)"
 
 
-def _traction_errors(solution: Solution | AssemblySolution) -> str:
+def _traction_errors(solution: Solution) -> str:
     tractions = solution.estimated_traction_error
-    local = solution.estimated_local_traction_error if isinstance(solution, Solution) else None
+    local = solution.estimated_local_traction_error
     words = "" if tractions is None else f", {tractions:.1e} of contact tractions"
     return words if local is None else f"{words}, {local:.1e} of single ones"
 
 
-def _bodies_rows(solution: AssemblySolution) -> Iterator[tuple[str, str]]:
-    yield "bodies", f"{len(solution.bodies)}, with {solution.n_elements} elements"
-    for elastic in solution.assembly.bodies:
-        if notes := _notes(elastic.shape):
-            yield f"outline of {elastic.name}", notes
-
-
-def _violation_rows(solution: Solution | AssemblySolution) -> Iterator[tuple[str, str]]:
+def _violation_rows(solution: Solution) -> Iterator[tuple[str, str]]:
     round_off = f"round-off of the forces up to {solution.certificate.round_off:.1e}"
     yield "certificate", f"{_worst_entry(solution.certificate)}; {round_off}"
     if (between := solution.between_nodes) is not None:
@@ -165,7 +159,7 @@ def _violation_rows(solution: Solution | AssemblySolution) -> Iterator[tuple[str
         yield "between nodes", f"{_worst_entry(between)}; penetration up to {depth}"
 
 
-def _history_rows(solution: Solution | AssemblySolution) -> Iterator[tuple[str, str]]:
+def _history_rows(solution: Solution) -> Iterator[tuple[str, str]]:
     loading = solution.loading
     if loading is not None:
         work, units = loading.total(), solution.units
@@ -177,18 +171,18 @@ def _history_rows(solution: Solution | AssemblySolution) -> Iterator[tuple[str, 
             yield "increment error", f"{left}  decreases with smaller increments"
 
 
-def _status(solution: Solution | AssemblySolution) -> str:
+def _status(solution: Solution) -> str:
     words = solution.status_words
     return words if solution.is_converged else f"{words}: {solution.message or solution.status.value}"
 
 
-def _node_counts(solution: Solution | AssemblySolution) -> str:
+def _node_counts(solution: Solution) -> str:
     counts = Counter(solution.contact.status_words())
     nodes = f"{counts['separated']} separated, {counts['slip']} slip, {counts['stick']} stick"
     return f"{solution.contact.n_contact}: {nodes}"
 
 
-def _time(solution: Solution | AssemblySolution) -> str:
+def _time(solution: Solution) -> str:
     timings = solution.timings
     stages = ", ".join(f"{name} {value:.2f}" for name, value in timings.items() if name != "total" and value > 0.0)
     return f"{timings.get('total', sum(timings.values())):.2f} s ({stages})"
@@ -205,7 +199,7 @@ def _worst_entry(measured: Certificate | BetweenNodes) -> str:
     return f"worst entry {measured.worst:.1e}{name}"
 
 
-def _transition_lines(solution: Solution | AssemblySolution) -> list[str]:
+def _transition_lines(solution: Solution) -> list[str]:
     units = solution.units
     lines = [
         f"{item.part}: {item.from_status} to {item.to_status} at {_vector(item.x, item.y, 'length', units)}, "

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import fields
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -21,9 +21,6 @@ from bemkit.results.solved_body import SolvedBody
 from bemkit.results.stress_measures import STRESSES
 from bemkit.solvers.base import StepRecord
 from bemkit.table import Column, Table, json_text
-
-if TYPE_CHECKING:
-    from bemkit.results.assembly_solution import AssemblySolution
 
 TABLES = ("contact", "boundary", "history", "steps", "forces")
 CERTIFICATE_ENTRIES = tuple(entry.name for entry in fields(Certificate))
@@ -50,12 +47,12 @@ _FORCES = (
 )
 
 
-def to_csv(solution: Solution | AssemblySolution, table: str) -> str:
+def to_csv(solution: Solution, table: str) -> str:
     """Return one table of a solution as comma-separated values with a header line.
 
     Parameters
     ----------
-    solution : Solution or AssemblySolution
+    solution : Solution
     table : str
         ``"contact"``: one row per contact node; ``"boundary"``: one row per element, values at its centre;
         ``"history"``: one row per step of the solver; ``"steps"``: one row per step of the load history; ``"forces"``:
@@ -69,7 +66,7 @@ def to_csv(solution: Solution | AssemblySolution, table: str) -> str:
     return table_of(solution, table).to_csv()
 
 
-def table_of(solution: Solution | AssemblySolution, table: str) -> Table:
+def table_of(solution: Solution, table: str) -> Table:
     """Return one table of a solution; see `to_csv`."""
     if table not in TABLES:
         raise InputError(f"table is {table!r}: give one of {', '.join(TABLES)}")
@@ -98,7 +95,7 @@ def history_columns(history: Sequence[StepRecord]) -> dict[str, Any]:
     return columns_of(rows, texts=("message",), floats=floats, integers=RECORD_COUNTS)
 
 
-def to_json(solution: Solution | AssemblySolution) -> str:
+def to_json(solution: Solution) -> str:
     """Return the summary as one JSON object; numbers that are not finite become null."""
     return json_text(solution.summary())
 
@@ -110,7 +107,7 @@ def element_displacement(body: SolvedBody) -> FloatArray:
     return np.asarray(np.einsum("p,epc->ec", at_centre, values_on_elements(space, body.boundary.displacement)))
 
 
-def _columns(solution: Solution | AssemblySolution, table: str) -> dict[str, Any]:
+def _columns(solution: Solution, table: str) -> dict[str, Any]:
     match table:
         case "contact":
             contact = solution.contact
@@ -133,13 +130,13 @@ def _columns(solution: Solution | AssemblySolution, table: str) -> dict[str, Any
             return columns
 
 
-def _boundary_columns(solution: Solution | AssemblySolution) -> dict[str, Any]:
+def _boundary_columns(solution: Solution) -> dict[str, Any]:
     """Return the columns of one body after the other, those of several with the name of the body in front."""
-    tables = [_columns_of_body(body) for body in solution.solved_bodies]
+    tables = [_columns_of_body(body) for body in solution.bodies.values()]
     columns = {name: np.concatenate([table[name] for table in tables]) for name in tables[0]}
-    if isinstance(solution, Solution):
+    if "" in solution.bodies:
         return columns
-    counts = [body.mesh.n_elements for body in solution.solved_bodies]
+    counts = [body.mesh.n_elements for body in solution.bodies.values()]
     return {"body": np.repeat(list(solution.bodies), counts)} | columns
 
 

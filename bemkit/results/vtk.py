@@ -22,7 +22,6 @@ from bemkit.geometry.vectors import norms
 from bemkit.operators.material import Material, Plane
 from bemkit.operators.somigliana.locate import Locator
 from bemkit.operators.somigliana.stress import von_mises
-from bemkit.results.assembly_solution import AssemblySolution, BodyResult
 from bemkit.results.solution import Solution
 from bemkit.results.solved_body import SolvedBody
 from bemkit.results.stress_mesh import stress_mesh
@@ -121,20 +120,18 @@ def _add(piece: ElementTree.Element[str], place: str, arrays: Mapping[str, npt.N
         entry.text = b64encode(len(data).to_bytes(8, "little") + data).decode("ascii")
 
 
-def bodies_of(solution: Solution | AssemblySolution) -> Mapping[str, Solution | BodyResult]:
+def bodies_of(solution: Solution) -> Mapping[str, SolvedBody]:
     """Return the bodies of a solution by the prefix of their arrays."""
-    if isinstance(solution, Solution):
-        return {"": solution}
-    return {f"{name}/": body for name, body in solution.bodies.items()}
+    return {f"{name}/" if name else "": body for name, body in solution.bodies.items()}
 
 
-def write_vtk(path: Path, solution: Solution | AssemblySolution, inside: int = 0) -> None:
+def write_vtk(path: Path, solution: Solution, inside: int = 0) -> None:
     """Write a .vtu or .vtp file.
 
     Parameters
     ----------
     path : Path
-    solution : Solution or AssemblySolution
+    solution : Solution
     inside : int
         Points across each body at which there are fields inside; 0 for none.
 
@@ -155,7 +152,7 @@ def write_vtk(path: Path, solution: Solution | AssemblySolution, inside: int = 0
     write_vtk_xml(path, blocks)
 
 
-def _boundary(body: Solution | BodyResult, number: int) -> Block:
+def _boundary(body: SolvedBody, number: int) -> Block:
     """Return the boundary of a body as lines, each element sampled by itself."""
     mesh, space = body.mesh, body.scene.discretisation.displacement_space(body.mesh)
     n_points = 2 if space.degree <= 1 and bool(mesh.is_straight.all()) else _POINTS_OF_CURVE
@@ -187,7 +184,7 @@ def _fields(material: Material, displacement: FloatArray, stress: FloatArray) ->
     }
 
 
-def _contact_nodes(solution: Solution | AssemblySolution, bodies: Sequence[SolvedBody]) -> Block:
+def _contact_nodes(solution: Solution, bodies: Sequence[SolvedBody]) -> Block:
     table = solution.contact
     points = np.stack([table.x, table.y], axis=1)
     values = {name: np.asarray(getattr(table, name), float) for name in _CONTACT}
@@ -208,7 +205,7 @@ def _contact_nodes(solution: Solution | AssemblySolution, bodies: Sequence[Solve
     return Block("vertex", points, np.arange(table.n_contact)[:, None], values | on_bodies, {})
 
 
-def _inside(body: Solution | BodyResult, number: int, across: int) -> Block:
+def _inside(body: SolvedBody, number: int, across: int) -> Block:
     """Return triangles that fill a body; none of a half-plane."""
     mesh = body.mesh.whole
     if mesh.surface is not None:

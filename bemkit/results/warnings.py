@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import chain
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -23,9 +22,6 @@ from bemkit.results.solution import Solution
 from bemkit.results.solved_body import SolvedBody
 from bemkit.scene.conditions import Clamped, PrescribedDisplacement, Roller
 from bemkit.scene.unit_names import UnitNames, amount
-
-if TYPE_CHECKING:
-    from bemkit.results.assembly_solution import AssemblySolution
 
 LARGEST_ERROR = 0.05
 """Estimated relative error above which a solution carries a warning."""
@@ -52,24 +48,19 @@ _CLOSED = 1e-9
 """Clearance, relative to the largest one, up to which a node counts as closed: round-off of zero."""
 
 
-def find_warnings(solution: Solution | AssemblySolution) -> tuple[ResultWarning, ...]:
+def find_warnings(solution: Solution) -> tuple[ResultWarning, ...]:
     """Return the warnings about a solution, first those of its plan, at most three of each kind and their number."""
     if not solution.is_certified:
         return solution.plan.warnings
-    remedy = _remedy(solution.solved_bodies)
-    of_all: list[Iterator[ResultWarning]]
-    titled: dict[str, SolvedBody]
-    if isinstance(solution, Solution):
-        laws, of_all = solution.scene.laws, [_error(solution)]
-        titled = {"": solution}
-    else:
-        from bemkit.results.overlaps import overlap_warnings  # only of several bodies
+    remedy = _remedy(solution.bodies.values())
+    laws = solution.laws
+    of_all = [_error(solution, remedy)]
+    if len(solution.bodies) > 1:
+        from bemkit.results.overlaps import overlap_warnings
 
-        laws = {pair.name: solution.assembly.law_of(pair) for pair in solution.assembly.contacts}
-        of_all = [_large(solution.estimated_error, remedy), overlap_warnings(solution)]
-        titled = dict(solution.bodies)
+        of_all.append(overlap_warnings(solution))
     smooth = {name for name, law in laws.items() if law.is_frictionless}
-    of_bodies = [_in_body(name, found) for name, body in titled.items() for found in _of_body(solution, body)]
+    of_bodies = [_in_body(name, found) for name, body in solution.bodies.items() for found in _of_body(solution, body)]
     found = [
         *of_all,
         _large_of_tractions(solution.estimated_traction_error, remedy),
@@ -82,7 +73,7 @@ def find_warnings(solution: Solution | AssemblySolution) -> tuple[ResultWarning,
     return (*solution.plan.warnings, *first_of_each_kind(chain.from_iterable(found)))
 
 
-def _of_body(solution: Solution | AssemblySolution, body: SolvedBody) -> tuple[Iterator[ResultWarning], ...]:
+def _of_body(solution: Solution, body: SolvedBody) -> tuple[Iterator[ResultWarning], ...]:
     """Return the kinds of warnings about one body."""
     return (
         _without_estimate(body),
@@ -110,11 +101,11 @@ def _remedy(bodies: Iterable[SolvedBody]) -> str:
     return "use more elements, or give an accuracy"
 
 
-def _unbounded_tractions(solution: Solution | AssemblySolution, body: SolvedBody) -> Iterator[ResultWarning]:
+def _unbounded_tractions(solution: Solution, body: SolvedBody) -> Iterator[ResultWarning]:
     """Warn of singular contact tractions, whose estimated error excludes the corner."""
     if body.coefficient_errors is None:
         return
-    for corner in solution.corners_of(body):
+    for corner in solution.places.corners[body.name]:
         length = amount(float(body.mesh.lengths[list(corner.elements)].sum()), "length", solution.units, 2)
         point = f"({corner.x:.4g}, {corner.y:.4g})"
         yield ResultWarning(
@@ -126,9 +117,9 @@ def _unbounded_tractions(solution: Solution | AssemblySolution, body: SolvedBody
         )
 
 
-def _no_load(solution: Solution | AssemblySolution) -> Iterator[ResultWarning]:
+def _no_load(solution: Solution) -> Iterator[ResultWarning]:
     """Warn of a single load that moves nothing."""
-    bodies = solution.solved_bodies
+    bodies = solution.bodies.values()
     if solution.loading is None and not any(body.boundary.displacement.any() for body in bodies):
         yield ResultWarning("no load", "", "Nothing loads or moves the bodies: give a load or a displacement.")
 
@@ -145,18 +136,16 @@ def _large_of_tractions(error: float | None, remedy: str) -> Iterator[ResultWarn
         yield ResultWarning("large estimated error of tractions", "", text, error)
 
 
-def _error(solution: Solution) -> Iterator[ResultWarning]:
+def _error(solution: Solution, remedy: str) -> Iterator[ResultWarning]:
     """Warn of a large estimated error, and of an error that could not be estimated."""
-    discretisation = solution.scene.discretisation
-    if not discretisation.estimates_error:
+    if not all(body.scene.discretisation.estimates_error for body in solution.bodies.values()):
         return
     error = solution.estimated_error
     if error is None:
         energy = f"the elastic energy, {amount(solution.energy, 'energy', solution.units, 2)}, is not positive"
-        remedy = "use more elements, or bring body and obstacle together"
-        text = f"No error could be estimated, because {energy}: {remedy}."
+        text = f"No error could be estimated, because {energy}: use more elements, or bring body and obstacle together."
         yield ResultWarning("no estimated error", "", text, solution.energy)
-    yield from _large(error, _remedy((solution,)))
+    yield from _large(error, remedy)
 
 
 def _without_estimate(body: SolvedBody) -> Iterator[ResultWarning]:

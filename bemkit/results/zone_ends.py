@@ -13,8 +13,6 @@ from bemkit.arrays import FloatArray, IntArray
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.neighbours import along_boundary
 from bemkit.geometry.vectors import norms
-from bemkit.results.contact_table import ContactTable, Transition
-from bemkit.solvers.active_sets import NodeStatus
 
 LYING_ON = 1e-2
 """Distance, relative to the shorter of two sides, up to which one lies on the other."""
@@ -44,22 +42,6 @@ class ZoneEnd(NamedTuple):
         return float(min(self.fraction, 1.0 - self.fraction) * self.mesh.lengths[self.element])
 
 
-def zone_end(mesh: BoundaryMesh, contact: ContactTable, transition: Transition) -> ZoneEnd:
-    """Return the place of a transition on a single body.
-
-    The zone length is that of the part; on a half-plane, where a part may be any strip, half of the contact length.
-    """
-    elements = along_boundary(mesh, mesh.part(transition.part))
-    ends = np.cumsum(mesh.lengths[elements])
-    k = min(int(np.searchsorted(ends, transition.s)), elements.size - 1)
-    fraction = 1.0 - float((ends[k] - transition.s) / mesh.lengths[elements[k]])
-    zone_length = float(ends[-1])
-    if mesh.surface is not None:
-        touches = contact.rows(transition.part) & (contact.status != NodeStatus.SEPARATED)
-        zone_length = 0.5 * float(contact.weight[touches].sum())
-    return ZoneEnd(mesh, zone_length, int(elements[k]), fraction)
-
-
 @dataclass(frozen=True, eq=False)
 class Side:
     """A side of a body that meets another: a part of its mesh.
@@ -69,11 +51,14 @@ class Side:
     body : str
     mesh : BoundaryMesh
     part : str
+    zone_length : float, optional [m]
+        To which elements at ends of zones are compared; by default the length of the side.
     """
 
     body: str
     mesh: BoundaryMesh
     part: str
+    zone_length: float | None = None
 
     @cached_property
     def length(self) -> float:
@@ -82,7 +67,8 @@ class Side:
 
     def near(self, point: FloatArray) -> ZoneEnd:
         """Return the nearest place on the side, as the end of a zone."""
-        return ZoneEnd(self.mesh, self.length, *_nearest(self.mesh, self.mesh.part(self.part), point), self.body)
+        zone_length = self.length if self.zone_length is None else self.zone_length
+        return ZoneEnd(self.mesh, zone_length, *_nearest(self.mesh, self.mesh.part(self.part), point), self.body)
 
     def ends(self) -> list[FloatArray]:
         """Return the points (2,) where the side ends; none of a closed one."""

@@ -16,7 +16,7 @@ from bemkit.runs.mesh_sequence import Level, MeshSequence
 from bemkit.runs.refinement import refined, required_accuracy
 from bemkit.runs.step_errors import in_which_step
 from bemkit.runs.steps import joined, solved_history
-from bemkit.scene.steps import Stated
+from bemkit.scene.scene import Scene
 from bemkit.solvers.base import StepRecord
 
 if TYPE_CHECKING:
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 
 def run_adaptive(
-    scene: Stated,
+    scene: Scene,
     *,
     start: Any = None,
     callback: Callable[[StepRecord], None] | None = None,
@@ -44,9 +44,9 @@ def run_adaptive(
 
     Parameters
     ----------
-    scene : Scene or Assembly
+    scene : Scene
         With `MeshOptions.accuracy`.
-    start : Solution or AssemblySolution, optional
+    start : Solution, optional
         Of the first mesh; as for `bemkit.run`.
     callback : callable, optional
         Receives a record of every step on every mesh.
@@ -57,7 +57,7 @@ def run_adaptive(
 
     Returns
     -------
-    tuple of Solution or of AssemblySolution
+    tuple of Solution
         One for each mesh; the best one comes last. Its timings, linear solves, steps and history are those of all
         meshes together. If the accuracy is out of reach within the elements or the time allowed, or because the solve
         on a finer mesh fails, its status is ACCURACY_NOT_REACHED, its message gives the reason, and
@@ -69,12 +69,12 @@ def run_adaptive(
     ValueError
         If the scene has no accuracy, degrees shall rise in a load history, or for the reasons of `bemkit.run`.
     """
-    level: Level[Any] = Level.first(cast(Any, scene))
+    level: Level = Level.first(cast(Any, scene))
     refinement = _Refinement(_rule(level), start, callback, EarlierSteps(done, finished), executor)
     return refined(level, refinement, scene.mesh)
 
 
-def _rule(level: Level[Any]) -> MeshSequence[Any]:
+def _rule(level: Level) -> MeshSequence:
     """Return how better meshes are made: in layers for elements of high degree, if there is a single load."""
     mesh, n_steps = level.asked.mesh, level.asked.n_steps
     accuracy = required_accuracy(mesh)
@@ -90,13 +90,13 @@ def _rule(level: Level[Any]) -> MeshSequence[Any]:
 class _Refinement:
     """How the meshes of a level are solved, judged and refined."""
 
-    meshes: MeshSequence[Any]
+    meshes: MeshSequence
     start: Any
     callback: Callable[[StepRecord], None] | None
-    earlier: EarlierSteps[Any]
+    earlier: EarlierSteps
     executor: Executor | None
 
-    def solved(self, level: Level[Any], start: Any) -> Any:
+    def solved(self, level: Level, start: Any) -> Any:
         """Solve a single load from the solution before, and if that leads nowhere from the beginning."""
         scene = level.scene
         if start is not None and start.contact.n_contact and scene.n_steps == 1:
@@ -124,14 +124,14 @@ class _Refinement:
         """Return whether the last of the solutions is as accurate as it shall be."""
         return self.meshes.is_enough(solutions)
 
-    def following(self, level: Level[Any], solutions: Sequence[Any]) -> Level[Any] | None:
+    def following(self, level: Level, solutions: Sequence[Any]) -> Level | None:
         """Return the next level, its meshes made; None if that would not help."""
         following = self.meshes.following(level, solutions)
         if following is not None:
             _ = following.meshes  # errors in them are raised now
         return following
 
-    def excess(self, level: Level[Any], most_elements: int) -> str:
+    def excess(self, level: Level, most_elements: int) -> str:
         """Say which number of elements a level exceeds; empty if it does not.
 
         That of a body, on average; of high degree, of quadratic ones with as many nodes. Copies count as one.
@@ -141,6 +141,6 @@ class _Refinement:
         of_each = " a body" if len(level.keys) > 1 else ""
         return f"{most_elements} elements{of_each}" if n_elements * max(degree, 2) // 2 > most_elements else ""
 
-    def expected_seconds(self, level: Level[Any], solution: Any, spent: float) -> float:
+    def expected_seconds(self, level: Level, solution: Any, spent: float) -> float:
         """Return how long the next meshes will take: what the last ones took, in the proportion of their plans."""
         return spent * make_plan(level.scene, level.meshes).seconds / float(solution.plan.seconds)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from bemkit.results.result_file import ResultWriter, check_result_target, read_result
 from bemkit.runs.adaptive import run_adaptive
 from bemkit.runs.steps import joined, solved_history
-from bemkit.scene.steps import Stated
+from bemkit.scene.scene import Scene
 from bemkit.scene.toml import scene_to_toml
 from bemkit.solvers.base import Status, StepRecord
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 def run_to_file(
-    scene: Stated,
+    scene: Scene,
     path: str | Path,
     callback: Callable[[StepRecord], None] | None = None,
     executor: Executor | None = None,
@@ -31,7 +31,7 @@ def run_to_file(
 
     Parameters
     ----------
-    scene : Scene or Assembly
+    scene : Scene
         It is compared with that in the file by what a scene file says.
     path : str or Path
         The result file, ``.h5``. Until the last step is there its status is UNFINISHED.
@@ -42,7 +42,7 @@ def run_to_file(
 
     Returns
     -------
-    Solution or AssemblySolution
+    Solution
         Of the last step, as `bemkit.run` returns it.
 
     Raises

@@ -1,4 +1,4 @@
-"""The load under which an assembly of bodies collapses, and the thrust between them before."""
+"""The load under which a scene of bodies collapses, and the thrust between them before."""
 
 from __future__ import annotations
 
@@ -25,20 +25,20 @@ from bemkit.model.rigid_blocks import (
     rigid_blocks,
 )
 from bemkit.runs.steps import UnsolvableSceneError
-from bemkit.scene.assembly import Assembly
 from bemkit.scene.load_history import load_steps, with_scaled_loads
+from bemkit.scene.scene import Scene
 
 _UNSOLVABLE = "no contact tractions can balance the constant load, at any load factor"
 _MOVES = 1e-9
 """Share of the largest motion below which it is round-off."""
 
 
-def largest_load_factor(assembly: Assembly, *, meshes: Meshes = None) -> float:
-    """Return the largest load factor under which contact tractions can balance the loads of an assembly.
+def largest_load_factor(scene: Scene, *, meshes: Meshes = None) -> float:
+    """Return the largest load factor under which contact tractions can balance the loads of a scene.
 
     Parameters
     ----------
-    assembly : Assembly
+    scene : Scene
         Its loads and body forces are those of the factor one; body forces that are constant have none. Its own load
         factors play no part.
     meshes : mapping of str to BoundaryMesh, optional
@@ -61,19 +61,19 @@ def largest_load_factor(assembly: Assembly, *, meshes: Meshes = None) -> float:
     joints have forces at the ends of elements. Of Coulomb friction this is a bound from above, see
     `bemkit.contact.limit_load.largest_factor`; a mesh holds less by the share of a joint that its last nodes take.
     """
-    case = _limit_analysis(assembly, meshes)
+    case = _limit_analysis(scene, meshes)
     factor = largest_factor(case.motions, case.constant, case.growing, case.friction)
     if factor is None:
         raise UnsolvableSceneError(_UNSOLVABLE)
     return factor
 
 
-def coulomb_load_factor(assembly: Assembly, *, meshes: Meshes = None) -> CoulombLimit:
-    """Return load factors at which an assembly with Coulomb friction, which does not dilate, collapses.
+def coulomb_load_factor(scene: Scene, *, meshes: Meshes = None) -> CoulombLimit:
+    """Return load factors at which a scene with Coulomb friction, which does not dilate, collapses.
 
     Parameters
     ----------
-    assembly : Assembly
+    scene : Scene
     meshes : mapping of str to BoundaryMesh, optional
         Both as for `largest_load_factor`.
 
@@ -89,7 +89,7 @@ def coulomb_load_factor(assembly: Assembly, *, meshes: Meshes = None) -> Coulomb
     InputError
         If friction has a cap, or no state of collapse was found.
     """
-    case = _limit_analysis(assembly, meshes)
+    case = _limit_analysis(scene, meshes)
     found = coulomb_limit(case.motions, case.constant, case.growing, *case.only_friction)
     if found is None:
         raise UnsolvableSceneError(_UNSOLVABLE)
@@ -97,16 +97,16 @@ def coulomb_load_factor(assembly: Assembly, *, meshes: Meshes = None) -> Coulomb
 
 
 def thrust(
-    assembly: Assembly, contact: str, direction: tuple[float, float] = (1.0, 0.0), *, meshes: Meshes = None
+    scene: Scene, contact: str, direction: tuple[float, float] = (1.0, 0.0), *, meshes: Meshes = None
 ) -> tuple[JointForces, JointForces]:
-    """Return the smallest and the largest thrust at a contact, of all forces that balance the loads of an assembly.
+    """Return the smallest and the largest thrust at a contact, of all forces that balance the loads of a scene.
 
     If the support of the contact yields against the direction, the thrust along it falls to the smallest; if it yields
     along it, the thrust rises to the largest. Each state has the motion of the blocks that follow.
 
     Parameters
     ----------
-    assembly : Assembly
+    scene : Scene
         With its loads at the load factor one.
     contact : str
         Its name in results, such as ``"first.springing"`` or ``"left.top / right.bottom"``.
@@ -122,7 +122,7 @@ def thrust(
     UnsolvableSceneError
         If no contact tractions balance the loads.
     """
-    case = _limit_analysis(assembly, meshes)
+    case = _limit_analysis(scene, meshes)
     names = tuple(dict.fromkeys(joint.name for joint in case.joints))
     if contact not in names:
         raise InputError(f"no contact {contact!r}: the contacts are {choices(contact, names)}")
@@ -194,11 +194,11 @@ class _LimitCase:
         )
 
 
-def _limit_analysis(assembly: Assembly, meshes: Meshes) -> _LimitCase:
-    """Return the limit analysis of an assembly, whose load factors play no part."""
-    assembly = load_steps(replace(assembly, load_factors=(1.0,)))[-1]
-    bodies, unloaded = place(assembly, meshes), with_scaled_loads(assembly, 0.0)
-    joints = tuple(joints_of(assembly, bodies))
+def _limit_analysis(scene: Scene, meshes: Meshes) -> _LimitCase:
+    """Return the limit analysis of a scene, whose load factors play no part."""
+    scene = load_steps(replace(scene, load_factors=(1.0,)))[-1]
+    bodies, unloaded = place(scene, meshes), with_scaled_loads(scene, 0.0)
+    joints = tuple(joints_of(scene, bodies))
     if not joints:
         raise InputError("no two bodies are in contact: list contacts")
     at_rest = rigid_blocks(
@@ -209,8 +209,8 @@ def _limit_analysis(assembly: Assembly, meshes: Meshes) -> _LimitCase:
         ],
     )
     constant = loads_of(at_rest)
-    growing = loads_of(rigid_blocks(assembly, bodies)) - constant
+    growing = loads_of(rigid_blocks(scene, bodies)) - constant
     typical = float(np.abs(constant).sum()) or float(np.abs(growing).sum()) or 1.0
-    names = (*(body.name for body in bodies), *(body.name for body in assembly.rigid))
+    names = (*(body.name for body in bodies), *(body.name for body in scene.rigid))
     motions, friction = relative_motions(at_rest, joints), friction_of(joints, typical)
     return _LimitCase(names, at_rest, joints, motions, constant, growing, friction)

@@ -18,8 +18,7 @@ from bemkit.model.prepared import prepare
 from bemkit.runs.run import LoadHistoryError, on_its_meshes
 from bemkit.runs.steps import UnsolvableSceneError
 from bemkit.scene.load_history import load_steps
-from bemkit.scene.scene import NoContactError, Scene
-from bemkit.scene.steps import Stated, check_stated
+from bemkit.scene.scene import NoContactError, Scene, check_scene
 from bemkit.solvers.active_sets import NodeStatus
 from bemkit.solvers.base import solve
 
@@ -59,12 +58,12 @@ class CriticalFriction:
         return {name: None if math.isinf(value) else value for name, value in numbers.items()}
 
 
-def critical_friction(scene: Stated) -> CriticalFriction:
+def critical_friction(scene: Scene) -> CriticalFriction:
     """Return the friction coefficients above which sliding states of a scene may not be unique.
 
     Parameters
     ----------
-    scene : Scene or Assembly
+    scene : Scene
         With a law under which friction grows with the pressure, and a single load. Which nodes are in contact, and
         which of them slip, is taken from its solution under its own law; one coefficient is then asked for that all
         sliding nodes have in common.
@@ -134,12 +133,12 @@ def _coefficients(
     )
 
 
-def _solved(scene: Stated) -> tuple[ContactProblem, np.ndarray[tuple[int], np.dtype[np.intp]]]:
+def _solved(scene: Scene) -> tuple[ContactProblem, np.ndarray[tuple[int], np.dtype[np.intp]]]:
     """Return the contact problem of a scene, on the mesh that its accuracy needs, and the statuses of its nodes."""
-    check_stated(scene)
+    check_scene(scene)
     if scene.n_steps > 1:
         raise LoadHistoryError(f"a load history of {scene.n_steps} steps has no single state: give one load")
-    if isinstance(scene, Scene) and not scene.contact_parts:
+    if not scene.has_contact:
         raise NoContactError("no part is in contact: nothing slides")
     (step,) = load_steps(scene)
     prepared = prepare(*on_its_meshes(step))

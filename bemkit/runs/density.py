@@ -10,10 +10,11 @@ import numpy as np
 from bemkit.arrays import BoolArray, FloatArray
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.meshing.partition import LEAST_DENSITY, SPREAD, better_partition
+from bemkit.results.solution import Solution
 from bemkit.results.solved_body import SolvedBody
 from bemkit.results.surface_errors import SurfaceErrors
 from bemkit.results.zone_ends import ZoneEnd
-from bemkit.runs.mesh_sequence import AnyScene, AnySolution, Level, zone_cuts
+from bemkit.runs.mesh_sequence import Level, zone_cuts
 from bemkit.runs.step_errors import StepErrors
 
 LARGEST_GROWTH = 2.5
@@ -55,7 +56,7 @@ class DensityMeshes:
 
     accuracy: float
 
-    def error(self, solution: AnySolution) -> float:
+    def error(self, solution: Solution) -> float:
         """Return the estimated error in the energy norm, of a half-plane those of its tractions if they are larger."""
         errors = StepErrors.of(solution)
         if errors.surface is None:
@@ -67,12 +68,12 @@ class DensityMeshes:
     def _local_accuracy(self) -> float:
         return max(self.accuracy, LEAST_LOCAL)
 
-    def is_enough(self, solutions: Sequence[AnySolution]) -> bool:
+    def is_enough(self, solutions: Sequence[Solution]) -> bool:
         """Return whether the estimated error is small enough, and the elements in which the status changes short."""
-        ends = StepErrors.of(solutions[-1]).worst.zone_ends
+        ends = StepErrors.of(solutions[-1]).worst.places.zone_ends
         return is_enough([self.error(each) for each in solutions], ends, self.accuracy)
 
-    def following(self, level: Level[AnyScene], solutions: Sequence[AnySolution]) -> Level[AnyScene]:
+    def following(self, level: Level, solutions: Sequence[Solution]) -> Level:
         """Return meshes whose density follows the estimated errors; copies share one, as fine as the worst needs."""
         errors = StepErrors.of(solutions[-1])
         densities = self._densities(level, errors)
@@ -94,9 +95,9 @@ class DensityMeshes:
         ]
         return replace(level, partitions=tuple(partitions))
 
-    def _densities(self, level: Level[AnyScene], errors: StepErrors[AnySolution]) -> list[FloatArray]:
+    def _densities(self, level: Level, errors: StepErrors) -> list[FloatArray]:
         """Return for each partition how many elements (n_elements,) should replace each one."""
-        bodies = errors.worst.solved_bodies
+        bodies = tuple(errors.worst.bodies.values())
         rate = error_rate(min(body.scene.discretisation.displacement_space(body.mesh).degree for body in bodies))
         worst = level.at_worst(errors.required())
         of_bodies = np.concatenate([worst[key] for key in level.keys.values()])

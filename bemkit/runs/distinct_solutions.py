@@ -11,20 +11,19 @@ from bemkit.runs.run import LoadHistoryError, UnsolvableSceneError, on_its_meshe
 from bemkit.runs.solution_of import solution_of
 from bemkit.runs.steps import built, checked, explained, planned
 from bemkit.scene.load_history import load_steps
-from bemkit.scene.scene import NoContactError, Scene
-from bemkit.scene.steps import Stated, check_stated
+from bemkit.scene.scene import NoContactError, Scene, check_scene
 from bemkit.solvers.multistart import probe
 from bemkit.stopwatch import Stage
 
 
-def distinct_solutions(scene: Stated, *, n_starts: int = 8, mesh: Meshes = None) -> tuple[Any, ...]:
+def distinct_solutions(scene: Scene, *, n_starts: int = 8, mesh: Meshes = None) -> tuple[Any, ...]:
     """Solve a scene from several starts and return the distinct solutions.
 
     With Coulomb friction a scene may have more than one solution; which of them `run` returns depends on its start.
 
     Parameters
     ----------
-    scene : Scene or Assembly
+    scene : Scene
         With a single load. With an accuracy, on the meshes that it needs.
     n_starts : int
         Starts: all nodes sticking, open, slipping forward, slipping backward, then random choices (always the same).
@@ -33,7 +32,7 @@ def distinct_solutions(scene: Stated, *, n_starts: int = 8, mesh: Meshes = None)
 
     Returns
     -------
-    tuple of Solution or of AssemblySolution
+    tuple of Solution
         In the order found, each certified; empty if no start leads to a solution. A single one does not prove that
         there is no other.
 
@@ -42,8 +41,8 @@ def distinct_solutions(scene: Stated, *, n_starts: int = 8, mesh: Meshes = None)
     UnsolvableSceneError, ValueError
         As for `run`; also if the scene has a load history or `n_starts` is negative.
     """
-    check_stated(scene)
-    if isinstance(scene, Scene) and not scene.contact_parts:
+    check_scene(scene)
+    if not scene.has_contact:
         raise NoContactError("no part is in contact: the solution is the only one, which run returns")
     if scene.n_steps > 1:
         raise LoadHistoryError(f"a load history of {scene.n_steps} steps cannot be probed: give one load")

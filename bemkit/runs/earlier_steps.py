@@ -4,37 +4,33 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Generic, TypeVar
 
 import numpy as np
 
 from bemkit.geometry.mesh import BoundaryMesh
-from bemkit.results.assembly_solution import AssemblySolution
 from bemkit.results.solution import Solution
 from bemkit.runs.refinement import SizedLevel
-
-AnySolution = TypeVar("AnySolution", Solution, AssemblySolution)
 
 _SAME = 1e-9
 """Relative difference of the lengths of equal elements, in the coordinates of the shape and in those of its place."""
 
 
 @dataclass(frozen=True)
-class EarlierSteps(Generic[AnySolution]):
+class EarlierSteps:
     """Solutions of earlier steps, and the callback for new ones.
 
     Parameters
     ----------
-    done : Solution or AssemblySolution, optional
+    done : Solution, optional
         Some steps on one of the meshes; meshes before that one are solved again, unheard.
     finished : callable, optional
         Receives the solution of each step on a mesh but the last; see `bemkit.runs.steps.History`.
     """
 
-    done: AnySolution | None = None
-    finished: Callable[[AnySolution], None] | None = None
+    done: Solution | None = None
+    finished: Callable[[Solution], None] | None = None
 
-    def on(self, level: SizedLevel) -> tuple[AnySolution | None, Callable[[AnySolution], None] | None]:
+    def on(self, level: SizedLevel) -> tuple[Solution | None, Callable[[Solution], None] | None]:
         """Return the finished steps on the meshes of a level, and the callback for further ones."""
         if self.done is None:
             return None, self.finished
@@ -43,8 +39,7 @@ class EarlierSteps(Generic[AnySolution]):
         return None, None if level.n_elements < self.done.n_elements else self.finished
 
 
-def _has_meshes(solution: Solution | AssemblySolution, meshes: Mapping[str, BoundaryMesh]) -> bool:
+def _has_meshes(solution: Solution, meshes: Mapping[str, BoundaryMesh]) -> bool:
     """Return whether a solution is one on these meshes, wherever its bodies lie."""
-    own = {"": solution.mesh} if isinstance(solution, Solution) else {k: v.mesh for k, v in solution.bodies.items()}
-    pairs = [(own[name].lengths, mesh.lengths) for name, mesh in meshes.items()]
+    pairs = [(solution.bodies[name].mesh.lengths, mesh.lengths) for name, mesh in meshes.items()]
     return all(one.shape == two.shape and np.allclose(one, two, rtol=_SAME, atol=0.0) for one, two in pairs)

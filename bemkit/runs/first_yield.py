@@ -6,11 +6,11 @@ import math
 from dataclasses import dataclass
 
 from bemkit.errors import InputError
-from bemkit.results.assembly_solution import AssemblySolution
 from bemkit.results.equivalent_stress import largest_equivalent_stress
 from bemkit.results.solution import Solution
 from bemkit.runs.run import run
-from bemkit.scene.load_history import AnyScene, with_scaled_loads
+from bemkit.scene.load_history import with_scaled_loads
+from bemkit.scene.scene import Scene
 
 _MOST_SOLVES = 20
 
@@ -25,22 +25,22 @@ class FirstYield:
         Multiple of all loads of the scene.
     x, y : float [m]
         Where the equivalent stress of von Mises is largest.
-    solution : Solution or AssemblySolution
+    solution : Solution
         Under this load.
     """
 
     load_factor: float
     x: float
     y: float
-    solution: Solution | AssemblySolution
+    solution: Solution
 
 
-def first_yield(scene: AnyScene, yield_stress: float, *, rtol: float = 1e-6) -> FirstYield:
+def first_yield(scene: Scene, yield_stress: float, *, rtol: float = 1e-6) -> FirstYield:
     """Return the load factor at which von Mises' stress reaches a given stress, on the boundary or inside.
 
     Parameters
     ----------
-    scene : Scene or Assembly
+    scene : Scene
         With a single load, which the factor multiplies; prescribed displacements and gaps stay as they are.
     yield_stress : float [Pa]
         Positive.
@@ -68,7 +68,7 @@ def first_yield(scene: AnyScene, yield_stress: float, *, rtol: float = 1e-6) -> 
     for _ in range(_MOST_SOLVES):
         factor = math.exp(logarithm)
         solution = run(scene if factor == 1.0 else with_scaled_loads(scene, factor))
-        largest = max(map(largest_equivalent_stress, solution.solved_bodies), key=lambda each: each.value)
+        largest = max(map(largest_equivalent_stress, solution.bodies.values()), key=lambda each: each.value)
         if largest.value <= 0.0:
             raise InputError("the scene has no stress under its load: give it a load")
         error = math.log(largest.value / yield_stress)

@@ -10,7 +10,6 @@ from bemkit.model.model import Model
 from bemkit.model.placed import Meshes
 from bemkit.runs.steps import joined, solved_history
 from bemkit.scene.scene import NoContactError, Scene
-from bemkit.scene.steps import Stated
 from bemkit.solvers.base import StepRecord
 
 if TYPE_CHECKING:
@@ -18,7 +17,7 @@ if TYPE_CHECKING:
 
 
 def run_on_mesh(
-    scene: Stated,
+    scene: Scene,
     mesh: Meshes = None,
     start: Any = None,
     callback: Callable[[StepRecord], None] | None = None,
@@ -28,11 +27,11 @@ def run_on_mesh(
     return joined(*solved_history([scene], mesh, callback, guess=guess_from(scene, start), executor=executor))
 
 
-def guess_from(scene: Stated, start: Any) -> Callable[[Model], ContactState] | None:
+def guess_from(scene: Scene, start: Any) -> Callable[[Model], ContactState] | None:
     """Return what takes a solution to the contact nodes of a model, where one is given."""
     if start is None:
         return None
-    if isinstance(scene, Scene) and not scene.contact_parts:
+    if not scene.has_contact:
         raise NoContactError("start is given, but no part is in contact: remove it; nothing is iterated")
     from bemkit.runs.warm_start import state_on
 

@@ -27,14 +27,13 @@ from bemkit.geometry.meshing.layers import (
     shortest_length,
 )
 from bemkit.geometry.meshing.partition import Partition
-from bemkit.results.assembly_solution import AssemblySolution
 from bemkit.results.coefficient_decay import CoefficientErrors
 from bemkit.results.contact_table import FLICKER, resolved_transitions
 from bemkit.results.slip_reversals import slip_reversals
 from bemkit.results.solution import Solution
 from bemkit.runs.density import DensityMeshes
 from bemkit.runs.element_degrees import below_layers, few_kinds, sufficient_degrees
-from bemkit.runs.mesh_sequence import AnyScene, AnySolution, Level, Member, zone_cuts
+from bemkit.runs.mesh_sequence import Level, Member, zone_cuts
 from bemkit.scene.discretisation import Discretisation
 from bemkit.solvers.base import Status
 
@@ -84,19 +83,19 @@ class LayeredMeshes:
 
     accuracy: float
 
-    def error(self, solution: Solution | AssemblySolution) -> float:
+    def error(self, solution: Solution) -> float:
         """Return the larger estimated error, of energy or of contact tractions; infinite if one is missing."""
         energy, tractions = solution.estimated_error, solution.estimated_traction_error
         if tractions is None and solution.contact_traction_size == 0.0:
             tractions = 0.0
         return np.inf if energy is None or tractions is None else max(energy, tractions)
 
-    def is_enough(self, solutions: Sequence[AnySolution]) -> bool:
+    def is_enough(self, solutions: Sequence[Solution]) -> bool:
         """Return whether the error is small enough; not after the first look, whose zones end inside of elements."""
         is_first = len(solutions) == 1 and bool(solutions[0].transitions)
         return not is_first and self.error(solutions[-1]) <= self.accuracy
 
-    def _is_stuck(self, solutions: Sequence[AnySolution]) -> bool:
+    def _is_stuck(self, solutions: Sequence[Solution]) -> bool:
         """Return whether the last two meshes have not halved the error of the best before them, all in layers.
 
         After a mesh that misses contact the next one, in layers, is the first to look at its zones.
@@ -104,7 +103,7 @@ class LayeredMeshes:
         errors = [
             self.error(solution)
             for solution in solutions
-            if all(body.coefficient_errors is not None for body in solution.solved_bodies)
+            if all(body.coefficient_errors is not None for body in solution.bodies.values())
         ]
         n_missed = sum(solution.status is Status.MISSED_CONTACT for solution in solutions)
         return len(errors) > FEWEST_LEVELS + n_missed and min(errors[-2:]) > 0.5 * min(errors[:-2])
@@ -121,7 +120,7 @@ class LayeredMeshes:
                 f"{mesh.lengths[worst]:.1e} is about as short as coordinates hold"
             )
 
-    def following(self, level: Level[AnyScene], solutions: Sequence[AnySolution]) -> Level[AnyScene] | None:
+    def following(self, level: Level, solutions: Sequence[Solution]) -> Level | None:
         """Return a finer first look, the first meshes in layers, or after these meshes of the next degree."""
         solution, members = solutions[-1], level.members(solutions[-1])
         if level.degree == LOOK_DEGREE:
@@ -134,13 +133,11 @@ class LayeredMeshes:
                 self._check_lengths(members, errors)
             return None
         if errors is None:
-            method = solution.solved_bodies[0].scene.discretisation.method
+            method = solution.body.scene.discretisation.method
             raise InputError(f"{method} has no error estimate: take another discretisation")
         return self._next_degree(level, members, solution, errors)
 
-    def _finer_look(
-        self, level: Level[AnyScene], members: Sequence[Member], solutions: Sequence[AnySolution]
-    ) -> Level[AnyScene] | None:
+    def _finer_look(self, level: Level, members: Sequence[Member], solutions: Sequence[Solution]) -> Level | None:
         """Return denser meshes if zones have single nodes; None if none does, or another look does not help."""
         table, transitions = solutions[-1].contact, solutions[-1].transitions
         n_unresolved = len(transitions) - len(resolved_transitions(table, transitions))
@@ -151,16 +148,12 @@ class LayeredMeshes:
             return None
         return DensityMeshes(self.accuracy).following(level, solutions)
 
-    def _first_layers(
-        self, level: Level[AnyScene], members: Sequence[Member], solution: AnySolution
-    ) -> Level[AnyScene]:
+    def _first_layers(self, level: Level, members: Sequence[Member], solution: Solution) -> Level:
         """Return the first meshes in layers; one degree and one layer more if they may be the last ones."""
         more = int(self._may_stop_at_once(solution))
         return replace(level, partitions=_in_layers(members, n_at_jumps=1 + more), degree=FIRST_DEGREE + more)
 
-    def _next_degree(
-        self, level: Level[AnyScene], members: Sequence[Member], solution: AnySolution, errors: _Errors
-    ) -> Level[AnyScene]:
+    def _next_degree(self, level: Level, members: Sequence[Member], solution: Solution, errors: _Errors) -> Level:
         """Return meshes of a higher degree, with elements divided where that is not enough."""
         fresh = _in_layers(members)
         # the same pieces: the places where the status changes have only moved
@@ -178,11 +171,11 @@ class LayeredMeshes:
             for member, excess, own in zip(members, excesses, fresh, strict=True)
         )
         degrees: tuple[int, ...] = ()
-        if is_settled and level.asked.mesh.rising_degrees and isinstance(solution, Solution):
+        if is_settled and level.asked.mesh.rising_degrees and len(level.keys) == 1:
             degrees = self._degrees(errors, level.partition, refined[0], int(higher[0].max()))
         return replace(level, partitions=refined, degree=level.degree + rise.degrees, degrees=degrees)
 
-    def _rise(self, level: Level[AnyScene], solution: AnySolution, errors: _Errors, *, is_settled: bool) -> _Rise:
+    def _rise(self, level: Level, solution: Solution, errors: _Errors, *, is_settled: bool) -> _Rise:
         """Return by how many degrees the next mesh rises, and the error to which its elements are divided."""
         is_inner = np.concatenate([~is_at_end(partition) for partition in level.partitions])
         needed = self._needed_rise(errors, is_inner) if is_settled else 0
@@ -196,12 +189,12 @@ class LayeredMeshes:
             goal = max(goal, self.error(solution) / GAIN**LARGEST_RISE)
         return _Rise(rise, goal, is_last)
 
-    def _may_stop_at_once(self, solution: AnySolution) -> bool:
+    def _may_stop_at_once(self, solution: Solution) -> bool:
         """Whether a first mesh in layers that is better than others may be the last."""
         has_error = solution.estimated_traction_error is not None
         return has_error and self.accuracy < COARSE and not self._moves_on(solution)
 
-    def _moves_on(self, solution: AnySolution) -> bool:
+    def _moves_on(self, solution: Solution) -> bool:
         """Whether the part of its error that the next mesh keeps, as places of change still move, is too large."""
         error = solution.estimated_traction_error
         return error is not None and NEXT_ERROR * error > self.accuracy
@@ -268,7 +261,7 @@ class _Errors:
     size: float
 
     @classmethod
-    def of(cls, level: Level[AnyScene], solution: AnySolution) -> _Errors | None:
+    def of(cls, level: Level, solution: Solution) -> _Errors | None:
         """Return the errors of a solution; None if degrees are too low for an estimate."""
         members = level.members(solution)
         known = [[body.coefficient_errors for body in member.bodies] for member in members]
@@ -308,7 +301,7 @@ class _Errors:
 
 
 def _moved_to_corners(
-    solution: AnySolution, member: Member, errors: CoefficientErrors, is_contact: BoolArray
+    solution: Solution, member: Member, errors: CoefficientErrors, is_contact: BoolArray
 ) -> CoefficientErrors:
     """Return errors in which an element at a singular corner has that of the contact tractions on the next one.
 
@@ -318,7 +311,7 @@ def _moved_to_corners(
     moves = [
         (tip, following)
         for body in member.bodies
-        for corner in solution.corners_of(body)
+        for corner in solution.places.corners[body.name]
         for tip, following in corner.beside(body.mesh)
         if not corner.partner and is_contact[following] and errors.traction_decay[following] > SPREADING
     ]

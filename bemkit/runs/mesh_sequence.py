@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Generic, NamedTuple, Protocol, TypeVar
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
@@ -13,16 +13,12 @@ from bemkit.arrays import FloatArray, IntArray
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.meshing.partition import Partition
 from bemkit.geometry.spaces import LARGEST_DEGREE
-from bemkit.results.assembly_solution import AssemblySolution
 from bemkit.results.solution import Solution
 from bemkit.results.solved_body import SolvedBody
 from bemkit.results.zone_ends import ZoneEnd
-from bemkit.scene.assembly import Assembly
+from bemkit.scene.body_scene import BodyScene
 from bemkit.scene.discretisation import Discretisation, Galerkin
 from bemkit.scene.scene import Scene
-
-AnyScene = TypeVar("AnyScene", Scene, Assembly)
-AnySolution = TypeVar("AnySolution", Solution, AssemblySolution)
 
 
 class Member(NamedTuple):
@@ -41,12 +37,12 @@ class Member(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Level(Generic[AnyScene]):
+class Level:
     """The next level to solve.
 
     Parameters
     ----------
-    asked : Scene or Assembly
+    asked : Scene
     partitions : tuple of Partition
         How bodies are divided; copies have one in common.
     keys : mapping of str to int
@@ -62,7 +58,7 @@ class Level(Generic[AnyScene]):
         Of each element of a single body, where they are lower than `degree`.
     """
 
-    asked: AnyScene
+    asked: Scene
     partitions: tuple[Partition, ...]
     keys: Mapping[str, int]
     touching: tuple[tuple[str, ...], ...]
@@ -71,7 +67,7 @@ class Level(Generic[AnyScene]):
     degrees: tuple[int, ...] = ()
 
     @classmethod
-    def first(cls, asked: AnyScene) -> Level[AnyScene]:
+    def first(cls, asked: Scene) -> Level:
         """Divide outlines of whose solution nothing is known."""
         keys, scenes, touching = _divided_bodies(asked)
         partitions = tuple(scene.first_partition(parts) for scene, parts in zip(scenes, touching, strict=True))
@@ -84,13 +80,11 @@ class Level(Generic[AnyScene]):
         return partition
 
     @cached_property
-    def scene(self) -> AnyScene:
+    def scene(self) -> Scene:
         """The scene with the discretisations of this level."""
         if not self.is_layered:
             return self.asked
         scene = replace(self.asked, discretisation=self._discretisation(self.asked.discretisation))
-        if isinstance(scene, Scene):
-            return scene
         own = ((body, body.discretisation) for body in scene.bodies)
         bodies = (body if d is None else replace(body, discretisation=self._discretisation(d)) for body, d in own)
         return replace(scene, bodies=tuple(bodies))
@@ -114,20 +108,17 @@ class Level(Generic[AnyScene]):
         """The mesh of each body by its name."""
         return {name: self.partitions[key].mesh for name, key in self.keys.items()}
 
-    def members(self, solution: Solution | AssemblySolution) -> list[Member]:
+    def members(self, solution: Solution) -> list[Member]:
         """Return what a solution on this level found on each partition."""
-        if isinstance(solution, Solution):
-            found = self.partition, solution.solved_bodies, solution.contact_elements, solution.zone_ends
-            return [Member(*found, reversals=solution.reversal_ends)]
-        members = []
+        members, places = [], solution.places
         for number, partition in enumerate(self.partitions):
             names = [name for name, key in self.keys.items() if key == number]
             ends = (
                 tuple(end for end in each if end.body in names)
-                for each in (solution.zone_ends, solution.facing_ends, solution.reversal_ends)
+                for each in (places.zone_ends, places.facing_ends, places.reversals)
             )
             bodies = tuple(solution.bodies[name] for name in names)
-            members.append(Member(partition, bodies, solution.contact_elements(names[0]), *ends))
+            members.append(Member(partition, bodies, places.elements(names[0]), *ends))
         return members
 
     def at_worst(self, bodies: Sequence[FloatArray]) -> list[FloatArray]:
@@ -138,13 +129,11 @@ class Level(Generic[AnyScene]):
         return [worst[key] for key in range(len(self.partitions))]
 
 
-def _divided_bodies(asked: Scene | Assembly) -> tuple[dict[str, int], list[Scene], tuple[tuple[str, ...], ...]]:
+def _divided_bodies(asked: Scene) -> tuple[dict[str, int], list[BodyScene], tuple[tuple[str, ...], ...]]:
     """Return by the name of each body which scene says what it is, these scenes, and their parts in contact."""
-    if isinstance(asked, Scene):
-        return {"": 0}, [asked], (tuple(part.name for part in asked.contact_parts),)
     keys: dict[str, int] = {}
     numbers: dict[int, int] = {}
-    scenes: list[Scene] = []
+    scenes: list[BodyScene] = []
     touching: list[tuple[str, ...]] = []
     for body in asked.placed_bodies:
         scene = asked.scene_of(body)
@@ -156,21 +145,18 @@ def _divided_bodies(asked: Scene | Assembly) -> tuple[dict[str, int], list[Scene
     return keys, scenes, tuple(touching)
 
 
-AnyJudged = TypeVar("AnyJudged", Solution, AssemblySolution, contravariant=True)
-
-
-class MeshSequence(Protocol[AnyJudged]):
+class MeshSequence(Protocol):
     """A rule for better meshes; a frozen dataclass without memory."""
 
-    def error(self, solution: AnyJudged) -> float:
+    def error(self, solution: Solution) -> float:
         """Return the estimated error that is to be made small; infinite without an estimate."""
         ...
 
-    def is_enough(self, solutions: Sequence[AnyJudged]) -> bool:
+    def is_enough(self, solutions: Sequence[Solution]) -> bool:
         """Return whether the last of the solutions is as accurate as it shall be."""
         ...
 
-    def following(self, level: Level[AnyScene], solutions: Sequence[AnyJudged]) -> Level[AnyScene] | None:
+    def following(self, level: Level, solutions: Sequence[Solution]) -> Level | None:
         """Return the next meshes, with the discretisation for them; None if that would not help.
 
         The last of the solutions is that of `level`.

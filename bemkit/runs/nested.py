@@ -10,11 +10,10 @@ from bemkit.contact.body import ContactState
 from bemkit.errors import BemkitError, InputError
 from bemkit.model.model import Model
 from bemkit.plan import check_elements
-from bemkit.results.solved_problem import SolvedProblem
+from bemkit.results.solution import Solution
 from bemkit.runs.steps import joined, solved_history
 from bemkit.runs.warm_start import state_on, take_sticking_state
 from bemkit.scene.scene import Scene
-from bemkit.scene.steps import Stated
 from bemkit.scene.toml import with_overrides
 from bemkit.solvers.base import StepRecord
 
@@ -27,7 +26,7 @@ class CascadeError(InputError):
 
 
 def run_nested(
-    scene: Stated,
+    scene: Scene,
     *,
     coarsest: int = 40,
     ratio: int = 2,
@@ -41,7 +40,7 @@ def run_nested(
 
     Parameters
     ----------
-    scene : Scene or Assembly
+    scene : Scene
         With a single load factor, without an accuracy.
     coarsest : int
         The number of elements is halved as long as it stays at least this large.
@@ -69,7 +68,7 @@ def run_nested(
         raise InputError(f"coarsest = {coarsest}: give at least 3 elements")
     if ratio < 2:
         raise InputError(f"ratio = {ratio}: give a whole number from 2 on")
-    if isinstance(scene, Scene) and not scene.contact_parts:
+    if not scene.has_contact:
         raise CascadeError("no part is in contact: one mesh is enough, where there is nothing to iterate")
     if scene.n_steps > 1:
         raise CascadeError(f"a load history of {scene.n_steps} steps cannot cascade: run it on one mesh")
@@ -97,7 +96,7 @@ class _Levels:
     """The model and the solution on the mesh before."""
 
     models: list[Model] = field(default_factory=list)
-    solution: SolvedProblem | None = None
+    solution: Solution | None = None
 
     def start(self, model: Model) -> ContactState | None:
         """Return where a model starts; the load is measured by the sticking state of the model before."""

@@ -9,7 +9,8 @@ from typing import Protocol, TypeVar
 
 from bemkit.errors import BemkitError, InputError
 from bemkit.geometry.mesh import BoundaryMesh
-from bemkit.results.solved_problem import AnySolution, with_totals
+from bemkit.results.solution import Solution
+from bemkit.results.solved_steps import with_totals
 from bemkit.scene.mesh_options import MOST_ELEMENTS, MeshOptions
 from bemkit.solvers.base import Status
 
@@ -34,26 +35,26 @@ class SizedLevel(Protocol):
 AnyLevel = TypeVar("AnyLevel", bound=SizedLevel)
 
 
-class Refinement(Protocol[AnyLevel, AnySolution]):
+class Refinement(Protocol[AnyLevel]):
     """How a level is solved, judged and refined."""
 
-    def solved(self, level: AnyLevel, start: AnySolution | None) -> AnySolution:
+    def solved(self, level: AnyLevel, start: Solution | None) -> Solution:
         """Solve a level, from the solution of the level before where that helps."""
         ...
 
-    def error(self, solution: AnySolution) -> float:
+    def error(self, solution: Solution) -> float:
         """Return the estimated error; infinite without an estimate."""
         ...
 
-    def shown_error(self, solution: AnySolution) -> str:
+    def shown_error(self, solution: Solution) -> str:
         """Return the estimated errors in words."""
         ...
 
-    def is_enough(self, solutions: Sequence[AnySolution]) -> bool:
+    def is_enough(self, solutions: Sequence[Solution]) -> bool:
         """Return whether the last of the solutions is as accurate as it shall be."""
         ...
 
-    def following(self, level: AnyLevel, solutions: Sequence[AnySolution]) -> AnyLevel | None:
+    def following(self, level: AnyLevel, solutions: Sequence[Solution]) -> AnyLevel | None:
         """Return the next level, its meshes made; None if that would not help."""
         ...
 
@@ -61,7 +62,7 @@ class Refinement(Protocol[AnyLevel, AnySolution]):
         """Say, for a message, which number of elements a level exceeds; empty if it does not."""
         ...
 
-    def expected_seconds(self, level: AnyLevel, solution: AnySolution, spent: float) -> float:
+    def expected_seconds(self, level: AnyLevel, solution: Solution, spent: float) -> float:
         """Return how long a level will take, after a solution that took `spent` seconds."""
         ...
 
@@ -73,14 +74,12 @@ def required_accuracy(options: MeshOptions) -> float:
     return options.accuracy
 
 
-def refined(
-    first: AnyLevel, refinement: Refinement[AnyLevel, AnySolution], options: MeshOptions
-) -> tuple[AnySolution, ...]:
+def refined(first: AnyLevel, refinement: Refinement[AnyLevel], options: MeshOptions) -> tuple[Solution, ...]:
     """Solve level after level until the accuracy of the options is reached or cannot be.
 
     Returns
     -------
-    tuple of Solution or AssemblySolution
+    tuple of Solution
         One for each mesh, the best one last; see `bemkit.runs.adaptive.run_adaptive`.
 
     Raises
@@ -91,7 +90,7 @@ def refined(
     begin, accuracy = time.perf_counter(), required_accuracy(options)
     most_elements = MOST_ELEMENTS if options.most_elements is None else options.most_elements
     level, obstacle = first, ""
-    solutions: list[AnySolution] = []
+    solutions: list[Solution] = []
     while not obstacle:
         started = time.perf_counter()
         try:
@@ -131,8 +130,8 @@ def refined(
 
 
 def _best_last(
-    solutions: Sequence[AnySolution], obstacle: str, accuracy: float, refinement: Refinement[AnyLevel, AnySolution]
-) -> tuple[AnySolution, ...]:
+    solutions: Sequence[Solution], obstacle: str, accuracy: float, refinement: Refinement[AnyLevel]
+) -> tuple[Solution, ...]:
     """Put the best solution last, with the totals of all and the reason why its accuracy is not what was asked for.
 
     The last one is the best if it is accurate enough.

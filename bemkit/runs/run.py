@@ -11,13 +11,11 @@ from bemkit.errors import InputError
 from bemkit.interrupts import interruptible
 from bemkit.model.placed import Meshes
 from bemkit.plan.plan import few_on, make_plan
-from bemkit.results.solution import Solution
-from bemkit.results.solved_problem import SolvedSteps, with_times
+from bemkit.results.solved_steps import SolvedSteps, with_times
 from bemkit.runs.history import guess_from, run_on_mesh
 from bemkit.runs.steps import UnsolvableSceneError as UnsolvableSceneError
 from bemkit.runs.steps import solved_history
-from bemkit.scene.scene import Scene
-from bemkit.scene.steps import Stated, check_stated
+from bemkit.scene.scene import Scene, check_scene
 from bemkit.solvers.base import StepRecord
 
 if TYPE_CHECKING:
@@ -37,7 +35,7 @@ class LoadHistoryError(InputError):
 
 @interruptible()
 def run(
-    scene: Stated | Sequence[Stated],
+    scene: Scene | Sequence[Scene],
     *,
     mesh: Meshes = None,
     start: Any = None,
@@ -53,13 +51,13 @@ def run(
 
     Parameters
     ----------
-    scene : Scene, Assembly, or sequence of them
+    scene : Scene, or sequence of them
         A sequence has the same bodies and contacts under changing loads, motions, obstacles, gaps or laws; a scene with
         several steps or load factors is as many.
     mesh : BoundaryMesh or mapping of str to BoundaryMesh, optional
         A mesh of your own with the parts of the scene, or meshes of bodies by name, in the coordinates of their shapes.
         By default the meshes that the scene describes, or meshes until its accuracy is reached.
-    start : Solution or AssemblySolution, optional
+    start : Solution, optional
         A solution to start from, on any mesh. By default every node sticks; large scenes on compressed equations start
         from a solution on a coarser mesh. Where a scene has several solutions the start chooses among them. With an
         accuracy the first mesh starts there. An error without contact, where there is only one solution.
@@ -78,7 +76,7 @@ def run(
 
     Returns
     -------
-    Solution, AssemblySolution or SolvedSteps
+    Solution or SolvedSteps
         Look at its status before you use it: a run that did not converge returns its last state. Of a load history
         this is the last step, with the linear solves and the records of all steps.
 
@@ -104,7 +102,7 @@ def run(
         raise InputError("file is given with a mesh, a start or coarsest, which a run that resumes does not have")
     if coarsest is not None and (mesh is not None or start is not None):
         raise InputError("coarsest is given with a mesh or a start: nested meshes have their own; remove one")
-    if not isinstance(scene, Stated):
+    if not isinstance(scene, Scene):
         return _in_turn(scene, mesh, start, coarsest, file, callback, executor)
     if file is not None:
         from bemkit.runs.checkpoint import run_to_file
@@ -128,21 +126,21 @@ def run(
 
 
 def _in_turn(
-    scenes: Sequence[Stated],
+    scenes: Sequence[Scene],
     mesh: Meshes,
     start: Any,
     coarsest: int | None,
     file: str | Path | None,
     callback: Callable[[StepRecord], None] | None,
     executor: Executor | None,
-) -> SolvedSteps[Any]:
+) -> SolvedSteps:
     """Solve scenes that follow each other in time on one mesh of each body."""
     if isinstance(scenes, str) or not isinstance(scenes, Sequence):
-        check_stated(scenes)  # which says what to give
+        check_scene(scenes)  # which says what to give
     if not scenes:
         raise InputError("scene is an empty sequence: give at least one scene")
     for scene in scenes:
-        check_stated(scene)
+        check_scene(scene)
     if file is not None:
         raise InputError("file is given with a sequence of scenes: a file holds one scene; give it as steps")
     if coarsest is not None:
@@ -151,15 +149,15 @@ def _in_turn(
     return SolvedSteps(solved_history(scenes, mesh, callback, guess=guess, executor=executor)[1])
 
 
-def _cascade(scene: Stated) -> tuple[int, int] | None:
+def _cascade(scene: Scene) -> tuple[int, int] | None:
     """Return elements of the coarsest mesh and the ratio of a cascade, None if a scene is solved on its mesh at once.
 
     A cascade pays where a contact step costs about as much as the assembly: for half-planes, of which only closed nodes
     are solved for or which have no matrices, and for large bodies on compressed equations.
     """
-    if not isinstance(scene, Scene) or scene.n_steps > 1 or not scene.contact_parts:
+    if not scene.has_obstacles_only or scene.n_steps > 1 or not scene.has_contact:
         return None
-    outline, n_elements = scene.shape.outline(), scene.mesh.n_elements
+    outline, n_elements = scene.only.shape.outline(), scene.only.mesh.n_elements
     if outline.surface is None:
         coarsest, ratio = max(_COARSEST, few_on(outline)), _RATIO
     elif outline.surface.is_periodic:
@@ -174,7 +172,7 @@ def _cascade(scene: Stated) -> tuple[int, int] | None:
     return (coarsest, ratio) if make_plan(smaller).is_compressed else None
 
 
-def on_its_meshes(scene: Stated) -> tuple[Stated, Meshes]:
+def on_its_meshes(scene: Scene) -> tuple[Scene, Meshes]:
     """Return a scene with the discretisations, and the meshes of its bodies, by which it reaches its accuracy.
 
     Without an accuracy the scene stays as it is.
@@ -182,7 +180,5 @@ def on_its_meshes(scene: Stated) -> tuple[Stated, Meshes]:
     if scene.mesh.accuracy is None:
         return scene, None
     found = run(scene)
-    if isinstance(found, Solution):
-        return found.scene, found.mesh
     placed = {body.name: body.placement for body in scene.placed_bodies}
-    return found.assembly, {name: placed[name].inverse.mesh(body.mesh) for name, body in found.bodies.items()}
+    return found.scene, {name: placed[name].inverse.mesh(body.mesh) for name, body in found.bodies.items()}

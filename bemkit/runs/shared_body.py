@@ -15,7 +15,6 @@ from bemkit.runs.steps import History, joined, planned, solve_steps
 from bemkit.runs.warm_start import state_on
 from bemkit.scene.load_history import load_steps
 from bemkit.scene.scene import Scene
-from bemkit.scene.steps import Stated
 from bemkit.stopwatch import Stage, StageClock
 
 
@@ -27,14 +26,14 @@ class SharedBody:
 
     Parameters
     ----------
-    scenes : sequence of Scene or Assembly
+    scenes : sequence of Scene
         All of the same bodies, meshes, discretisation and kinds of conditions, without an accuracy.
     starts_cold : bool
         Whether each solve begins with every node sticking, as `bemkit.run` does. By default it begins at the solution
         before, as a guess; where a scene has several solutions the guess chooses among them.
     """
 
-    def __init__(self, scenes: Sequence[Stated], *, starts_cold: bool = False) -> None:
+    def __init__(self, scenes: Sequence[Scene], *, starts_cold: bool = False) -> None:
         self._base = max(scenes, key=_n_with_friction)  # friction that is new would take another condensation
         self._starts_cold = starts_cold
         self._solver: _Solver | None = None
@@ -44,7 +43,7 @@ class SharedBody:
         """Travel to another process without matrices."""
         return _shared_body, (self._base, self._starts_cold)
 
-    def run(self, scene: Stated) -> Any:
+    def run(self, scene: Scene) -> Any:
         """Solve one of the scenes.
 
         Raises
@@ -73,12 +72,12 @@ class SharedBody:
             return _Anew()  # each scene says itself what is wrong
 
 
-def _shared_body(base: Stated, starts_cold: bool) -> SharedBody:
+def _shared_body(base: Scene, starts_cold: bool) -> SharedBody:
     return SharedBody([base], starts_cold=starts_cold)
 
 
-def _n_with_friction(scene: Stated) -> int:
-    laws = list(scene.laws.values()) if isinstance(scene, Scene) else [scene.law]
+def _n_with_friction(scene: Scene) -> int:
+    laws = [scene.law] if scene.bodies else scene.only.laws.values()
     return sum(not law.is_frictionless for law in laws)
 
 
@@ -87,7 +86,7 @@ class _Solver(Protocol):
     def has_start(self) -> bool:
         """Whether a scene has been solved from which others can start."""
 
-    def run(self, scene: Stated, *, is_cold: bool) -> Any:
+    def run(self, scene: Scene, *, is_cold: bool) -> Any:
         """Solve a scene."""
 
 
@@ -96,14 +95,14 @@ class _Anew:
 
     has_start = False
 
-    def run(self, scene: Stated, *, is_cold: bool) -> Any:
+    def run(self, scene: Scene, *, is_cold: bool) -> Any:
         return run(scene)
 
 
 class _Bodies:
     """The bodies of a scene under several loads, obstacles, gaps and laws."""
 
-    def __init__(self, base: Stated) -> None:
+    def __init__(self, base: Scene) -> None:
         steps, self._plan, _ = planned(load_steps(base))
         self._found = tuple(pair for pair in steps[0].scene.contacts if pair not in base.contacts)
         self._last: Any = None
@@ -114,7 +113,7 @@ class _Bodies:
     def has_start(self) -> bool:
         return self._last is not None
 
-    def run(self, scene: Stated, *, is_cold: bool) -> Any:
+    def run(self, scene: Scene, *, is_cold: bool) -> Any:
         clock, base = StageClock.start(), self._model.prepared
         scenes = [with_found_contacts(step, self._found) for step in load_steps(scene)]
         with blas_threads_for(base.largest_matrix):
@@ -123,7 +122,7 @@ class _Bodies:
             steps = tuple(base.under(step, None if is_alike else units) for step in scenes)
             model = self._model.under(steps[0])
             clock = clock.closed(Stage.CONDENSE)
-            history: History[Any] = History.of(scene, scenes)
+            history: History = History.of(scene, scenes)
             guess = None if is_cold or self._last is None else state_on(model, self._last)
             solution = joined(history, solve_steps(model, steps, self._plan, history, clock=clock, guess=guess))
         if solution.is_converged and len(steps) == 1 and solution.contact.n_contact:

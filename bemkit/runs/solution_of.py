@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -17,20 +17,20 @@ from bemkit.model.solved_contact import contact_warnings
 from bemkit.plan import Plan
 from bemkit.result_warning import ResultWarning
 from bemkit.results.contact_table import ContactTable, bound_at, find_transitions
-from bemkit.results.solution import BoundaryFields, Solution
+from bemkit.results.part_forces import RigidResult, contact_forces, nodal_resultants
+from bemkit.results.solution import Solution
+from bemkit.results.solved_body import BoundaryFields, SideName, SolvedBody
 from bemkit.results.warnings import find_warnings
-from bemkit.scene.scene import Scene
 from bemkit.solvers.base import ContactSolution, Status
 from bemkit.stopwatch import Stage, StageClock
 
 if TYPE_CHECKING:
     from bemkit.model.prepared import Prepared
-    from bemkit.results.assembly_solution import SideName
 
 
 def solution_of(
     model: Model, result: ContactSolution, plan: Plan, clock: StageClock, motion: SlipHistory | None = None
-) -> Any:
+) -> Solution:
     """Turn what the solver found into the physical fields of all bodies; the slip is for laws that depend on it."""
     prepared = model.prepared
     state, node_status = result.state, result.node_status
@@ -53,74 +53,41 @@ def solution_of(
     finite = (np.isfinite(each).all() for own in solved for each in own)
     if result.is_converged and not all(finite):
         result = replace(result, status=Status.NOT_FINITE, message=Status.NOT_FINITE.value)
-    common: dict[str, Any] = {
-        "status": result.status,
-        "certificate": result.certificate,
-        "contact": table,
-        "history": result.history,
-        "linear_solves": result.linear_solves,
-        "outer_steps": result.steps,
-        "transitions": find_transitions(table, table.u_t - model.problem.slip_origin * model.units.displacement),
-        "timings": clock.timings,
-        "memory": clock.memory,
-        "plan": plan,
-        "work": model.work,
-        "message": result.message,
-    }
-    energies = [energy for _, _, energy in solved]
-    if isinstance(prepared.scene, Scene):
-        solution: Any = Solution(
-            scene=prepared.scene,
-            mesh=prepared.only.mesh,
-            boundary=fields[0],
-            force_normal=float(np.sum(-table.weight * table.sigma_n)),
-            force_tangential=float(np.sum(table.weight * table.sigma_t)),
-            energy=energies[0],
-            **common,
-        )
-    else:
-        solution = _several(model, state, fields, energies, motion, common)
-    return solution.with_warnings(partial(_warnings, of_contact))
-
-
-def _several(
-    model: Model,
-    state: ContactState,
-    fields: list[BoundaryFields],
-    energies: list[float],
-    motion: SlipHistory | None,
-    common: dict[str, Any],
-) -> Any:
-    from bemkit.results.assembly_solution import AssemblySolution, BodyResult
-    from bemkit.results.part_forces import RigidResult, contact_forces, nodal_resultants
-
-    prepared, table = model.prepared, common["contact"]
     law = prepared.law if motion is None else prepared.law.at_slip(motion)
-    bodies = {
-        body.name: BodyResult(body.name, body.scene, body.mesh, own, energy)
-        for body, own, energy in zip(prepared.bodies, fields, energies, strict=True)
-    }
-    rigid = {
-        body.name: RigidResult(body.name, *reaction.tolist(), *moved.tolist())
-        for body, (moved, reaction) in zip(prepared.scene.rigid, model.rigid_bodies(state), strict=True)
-    }
     resultants = nodal_resultants(table, prepared.frame, prepared.acting_at)
-    return AssemblySolution(
-        assembly=cast(Any, prepared.scene),
-        bodies=bodies,
+    transitions = find_transitions(table, table.u_t - model.problem.slip_origin * model.units.displacement)
+    solution = Solution(
+        scene=prepared.scene,
+        bodies={
+            body.name: SolvedBody(body.name, body.scene, body.mesh, own, energy)
+            for body, own, (_, _, energy) in zip(prepared.bodies, fields, solved, strict=True)
+        },
         contact_sides=_contact_sides(prepared),
         contact_directions=prepared.frame[:, 0].copy(),
         friction_bound=bound_at(table, law),
-        contacts=contact_forces(table, resultants, common["transitions"]),
-        rigid=rigid,
-        **common,
+        contacts=contact_forces(table, resultants, transitions),
+        rigid={
+            body.name: RigidResult(body.name, *reaction.tolist(), *moved.tolist())
+            for body, (moved, reaction) in zip(prepared.scene.rigid, model.rigid_bodies(state), strict=True)
+        },
+        status=result.status,
+        certificate=result.certificate,
+        contact=table,
+        history=result.history,
+        linear_solves=result.linear_solves,
+        outer_steps=result.steps,
+        transitions=transitions,
+        timings=clock.timings,
+        memory=clock.memory,
+        plan=plan,
+        work=model.work,
+        message=result.message,
     )
+    return solution.with_warnings(partial(_warnings, of_contact))
 
 
 def _contact_sides(prepared: Prepared) -> dict[str, tuple[SideName, ...]]:
     """Return the sides of elastic bodies in each contact, first the one with the nodes."""
-    from bemkit.results.assembly_solution import SideName
-
     sides = {pair.name: tuple(SideName(*each) for each in pair.elastic_parts) for pair in prepared.scene.contacts}
     for rows in prepared.rows:
         with_nodes = SideName(prepared.bodies[rows.body].name, rows.part)
@@ -128,7 +95,7 @@ def _contact_sides(prepared: Prepared) -> dict[str, tuple[SideName, ...]]:
     return sides
 
 
-def _warnings(of_contact: tuple[ResultWarning, ...], solution: Any) -> tuple[ResultWarning, ...]:
+def _warnings(of_contact: tuple[ResultWarning, ...], solution: Solution) -> tuple[ResultWarning, ...]:
     """Return the warnings about a solution, last those about its contact."""
     return (*find_warnings(solution), *of_contact)
 

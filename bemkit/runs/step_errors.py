@@ -5,21 +5,18 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Generic, TypeVar
+from typing import Any
 
 import numpy as np
 
 from bemkit.arrays import FloatArray
 from bemkit.errors import InputError
-from bemkit.results.assembly_solution import AssemblySolution
 from bemkit.results.solution import Solution
 from bemkit.results.surface_errors import SurfaceErrors
 
-AnySolution = TypeVar("AnySolution", Solution, AssemblySolution)
-
 
 @dataclass(frozen=True, eq=False)
-class StepErrors(Generic[AnySolution]):
+class StepErrors:
     """The largest errors of all steps on each element.
 
     The largest energy among the steps measures all of them, so that those of an unloaded body are not measured by
@@ -27,14 +24,14 @@ class StepErrors(Generic[AnySolution]):
 
     Parameters
     ----------
-    steps : sequence of Solution or AssemblySolution
+    steps : sequence of Solution
         On one mesh of each body.
     """
 
-    steps: Sequence[AnySolution]
+    steps: Sequence[Solution]
 
     @classmethod
-    def of(cls, solution: AnySolution) -> StepErrors[AnySolution]:
+    def of(cls, solution: Solution) -> StepErrors:
         """Return the errors of all finished steps of a solution; a single load is one step."""
         ends: list[Any] = [] if solution.loading is None else [step.end for step in solution.loading.steps]
         return cls(ends or [solution])
@@ -47,7 +44,7 @@ class StepErrors(Generic[AnySolution]):
     @cached_property
     def bodies(self) -> list[FloatArray] | None:
         """(n_elements,) arrays [J/m]: squared errors in the energy norm of each body; None without an estimate."""
-        errors = [[body.element_errors for body in step.solved_bodies] for step in self.steps]
+        errors = [[body.element_errors for body in step.bodies.values()] for step in self.steps]
         known = [[own for own in of_step if own is not None] for of_step in errors]
         if any(len(own) < len(each) for own, each in zip(known, errors, strict=True)):
             return None
@@ -76,12 +73,12 @@ class StepErrors(Generic[AnySolution]):
         return float(np.sqrt(squared / self.unit)) if self.unit > 0.0 else float("inf")
 
     @cached_property
-    def worst(self) -> AnySolution:
+    def worst(self) -> Solution:
         """The step with the largest error, at whose places of change a mesh is cut; without an estimate the last."""
         if len(self.steps) == 1 or self.bodies is None:
             return self.steps[-1]
         totals = [
-            sum(float(body.element_errors.sum()) for body in step.solved_bodies if body.element_errors is not None)
+            sum(float(body.element_errors.sum()) for body in step.bodies.values() if body.element_errors is not None)
             for step in self.steps
         ]
         return self.steps[int(np.argmax(totals))]
@@ -89,14 +86,14 @@ class StepErrors(Generic[AnySolution]):
     @cached_property
     def surface(self) -> SurfaceErrors | None:
         """Errors of the tractions of a half-plane that is the only body; None of other bodies."""
-        if len(self.worst.solved_bodies) > 1:
+        if len(self.worst.bodies.values()) > 1:
             return None
-        errors = [step.solved_bodies[0].surface_errors for step in self.steps]
+        errors = [step.body.surface_errors for step in self.steps]
         known = [each for each in errors if each is not None]
-        own = self.worst.solved_bodies[0].surface_errors
+        own = self.worst.body.surface_errors
         return None if own is None else own.at_worst(known)
 
 
-def in_which_step(solution: Solution | AssemblySolution) -> str:
+def in_which_step(solution: Solution) -> str:
     """Return what follows an error in words: nothing of a single load."""
     return "" if solution.stated.n_steps == 1 else " in one of the steps"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Generic, TypeVar
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -21,11 +21,11 @@ from bemkit.operators.linear.threads import blas_threads_for
 from bemkit.plan import Plan, announce_plan, check_elements, check_memory, plan_steps
 from bemkit.results.load_history import LoadHistory, LoadStep
 from bemkit.results.missed_contact import with_missed_contact_named
-from bemkit.results.solved_problem import following
+from bemkit.results.solved_steps import following
 from bemkit.runs.load_path import Callback, Path, ReachedStep, Standing, reach
 from bemkit.runs.solution_of import solution_of
 from bemkit.scene.load_history import load_steps
-from bemkit.scene.steps import Stated
+from bemkit.scene.scene import Scene
 from bemkit.solvers.active_sets import NodeStatus
 from bemkit.solvers.base import ContactSolution, Status
 from bemkit.stopwatch import Stage, StageClock, announce, assembly_time
@@ -33,17 +33,14 @@ from bemkit.stopwatch import Stage, StageClock, announce, assembly_time
 if TYPE_CHECKING:
     from concurrent.futures import Executor
 
-    from bemkit.results.assembly_solution import AssemblySolution
     from bemkit.results.solution import Solution
-
-AnySolution = TypeVar("AnySolution", "Solution", "AssemblySolution")
 
 
 class UnsolvableSceneError(InputError):
     """The scene has no solution; the message says why."""
 
 
-def planned(steps: Sequence[Stated], meshes: Meshes = None) -> tuple[tuple[Prepared, ...], Plan, StageClock]:
+def planned(steps: Sequence[Scene], meshes: Meshes = None) -> tuple[tuple[Prepared, ...], Plan, StageClock]:
     """Return load steps ready to solve, their plan, and the clock of their run; refuse what does not fit."""
     clock = StageClock.start()
     if meshes is None:
@@ -102,36 +99,36 @@ def explained(model: Model, load: UnsolvableLoad) -> str:
 
 
 @dataclass(frozen=True, eq=False)
-class History(Generic[AnySolution]):
+class History:
     """Options of a load history, and its known data.
 
     Parameters
     ----------
-    asked : Scene or Assembly
+    asked : Scene
     times : sequence of float [s]
         Of its steps.
     is_recorded : bool
         Whether results say what the steps were.
-    done : Solution or AssemblySolution, optional
+    done : Solution, optional
         Up to some step, with its `loading`: that is where to go on.
     finished : callable, optional
         Receives the solution of each step but the last, with the steps up to it as its load history.
     """
 
-    asked: Stated
+    asked: Scene
     times: Sequence[float]
     is_recorded: bool
-    done: AnySolution | None = None
-    finished: Callable[[AnySolution], None] | None = None
+    done: Solution | None = None
+    finished: Callable[[Solution], None] | None = None
 
     @classmethod
     def of(
         cls,
-        asked: Stated,
-        steps: Sequence[Stated],
-        done: AnySolution | None = None,
-        finished: Callable[[AnySolution], None] | None = None,
-    ) -> History[AnySolution]:
+        asked: Scene,
+        steps: Sequence[Scene],
+        done: Solution | None = None,
+        finished: Callable[[Solution], None] | None = None,
+    ) -> History:
         """Return the history of scenes with single loads; those that say no time follow each other at 1, 2, 3.
 
         Raises
@@ -149,19 +146,19 @@ class History(Generic[AnySolution]):
 
 
 def solved_history(
-    scenes: Sequence[Stated],
+    scenes: Sequence[Scene],
     meshes: Meshes = None,
     callback: Callback = None,
-    done: AnySolution | None = None,
-    finished: Callable[[AnySolution], None] | None = None,
+    done: Solution | None = None,
+    finished: Callable[[Solution], None] | None = None,
     guess: Callable[[Model], ContactState | None] | None = None,
     executor: Executor | None = None,
-) -> tuple[History[AnySolution], tuple[AnySolution, ...]]:
+) -> tuple[History, tuple[Solution, ...]]:
     """Solve scenes that follow each other in time on one mesh of each body.
 
     Parameters
     ----------
-    scenes : sequence of Scene or of Assembly
+    scenes : sequence of Scene
         One with several steps or load factors is as many.
     meshes : BoundaryMesh, or mapping of str to BoundaryMesh, optional
         As `bemkit.run` takes them.
@@ -180,7 +177,7 @@ def solved_history(
         See `solve_steps`.
     """
     steps = [step for each in scenes for step in load_steps(each)]
-    history: History[AnySolution] = History.of(scenes[-1], steps, done, finished)
+    history: History = History.of(scenes[-1], steps, done, finished)
     prepared, plan, clock = planned(steps, meshes)
     with blas_threads_for(prepared[0].largest_matrix):
         model, clock = built(prepared[0], clock, executor)
@@ -192,12 +189,12 @@ def solve_steps(
     model: Model,
     steps: Sequence[Prepared],
     plan: Plan,
-    history: History[AnySolution],
+    history: History,
     *,
     clock: StageClock,
     guess: ContactState | None = None,
     callback: Callback = None,
-) -> tuple[AnySolution, ...]:
+) -> tuple[Solution, ...]:
     """Solve the steps of a load history, up to the first that does not converge.
 
     Parameters
@@ -223,7 +220,7 @@ def solve_steps(
     UnsolvableSceneError
         If nothing can balance the first load.
     """
-    solutions: list[AnySolution] = []
+    solutions: list[Solution] = []
     before, end = None, Standing.at_rest(model)
     done = None if history.done is None else history.done.loading
     n_done = 0 if done is None else len(done.steps)
@@ -264,7 +261,7 @@ def solve_steps(
     return tuple(solutions)
 
 
-def joined(history: History[AnySolution], solutions: Sequence[AnySolution]) -> AnySolution:
+def joined(history: History, solutions: Sequence[Solution]) -> Solution:
     """Return the last of the steps, with the records, solves, times, memory and warnings of all."""
     whole = history.done
     n_done = 0 if whole is None or whole.loading is None else len(whole.loading.steps)
@@ -275,7 +272,7 @@ def joined(history: History[AnySolution], solutions: Sequence[AnySolution]) -> A
     return whole
 
 
-def _path(model: Model, before: Model | None, end: Standing, history: History[AnySolution], number: int) -> Path:
+def _path(model: Model, before: Model | None, end: Standing, history: History, number: int) -> Path:
     def between(share: float) -> ContactProblem:
         problem: ContactProblem = model.problem if before is None else model.between(before, share)
         return problem
@@ -287,11 +284,11 @@ def _path(model: Model, before: Model | None, end: Standing, history: History[An
 
 
 def _loading(
-    history: History[AnySolution],
-    solutions: Sequence[AnySolution],
+    history: History,
+    solutions: Sequence[Solution],
     model: Model,
     reached: ReachedStep,
-    solution: AnySolution,
+    solution: Solution,
 ) -> LoadHistory:
     """Return the history up to a step that is finished."""
     former = solutions[-1] if solutions else history.done
@@ -311,7 +308,7 @@ def _loading(
     return LoadHistory(history.asked, len(history.times), (*steps, step))
 
 
-def _not_reached(before: AnySolution | None, result: ContactSolution, clock: StageClock) -> AnySolution:
+def _not_reached(before: Solution | None, result: ContactSolution, clock: StageClock) -> Solution:
     """Return the result of a step that failed: the fields of the step before, and why they are the last."""
     if before is None or before.loading is None:
         raise InputError("there is no step before the one that failed")

@@ -10,16 +10,16 @@ from bemkit.arrays import FloatArray
 from bemkit.contact.body import ContactState
 from bemkit.errors import InputError
 from bemkit.model.model import Model
-from bemkit.results.solved_problem import SolvedProblem
+from bemkit.results.solution import Solution
 
 
-def state_on(model: Model, solution: SolvedProblem) -> ContactState:
+def state_on(model: Model, solution: Solution) -> ContactState:
     """Interpolate the contact state of a solution onto the contact nodes of a model.
 
     Parameters
     ----------
     model : Model
-    solution : Solution or AssemblySolution
+    solution : Solution
         On any mesh, coarse or fine, of a scene with the same contacts.
 
     Returns

@@ -20,6 +20,7 @@ from bemkit.scene.copies import Copies
 from bemkit.scene.discretisation import Discretisation
 from bemkit.scene.mesh_options import MeshOptions
 from bemkit.scene.objects import check_objects
+from bemkit.scene.plane_motion import FarField
 from bemkit.scene.steps import check_names
 
 _ALONG = np.linspace(0.0, 1.0, 33)
@@ -32,7 +33,7 @@ _ON_LINE = 1e-9
 
 @dataclass(frozen=True, kw_only=True)
 class Body:
-    """An elastic body of an `Assembly`.
+    """An elastic body of a `Scene`.
 
     Parameters
     ----------
@@ -46,14 +47,16 @@ class Body:
         and obstacles are in those of the scene, where the body is placed.
     body_forces : tuple of BodyForce
         What acts inside the body, in the coordinates of the scene.
+    far : FarField, optional
+        Motion or load of a half-plane far away from its surface. By default it is at rest there.
     placement : Placement
         Position of the body: turned, then shifted.
     copies : Copies, optional
         Makes many of it, each named ``"name-..."``; copies that no support holds share one factorisation.
     discretisation : Discretisation, optional
-        By default that of the assembly.
+        By default that of the scene.
     mesh : MeshOptions, optional
-        A number of elements for this body; by default that of the assembly.
+        A number of elements for this body; by default that of the scene.
 
     Raises
     ------
@@ -66,6 +69,7 @@ class Body:
     material: Material
     parts: tuple[Part, ...] = ()
     body_forces: tuple[BodyForce, ...] = ()
+    far: FarField | None = None
     placement: Placement = field(default_factory=Placement)
     copies: Copies | None = None
     discretisation: Discretisation | None = None
@@ -77,7 +81,7 @@ class Body:
         check_objects(self, f"body {self.name!r}")
         check_names(f"body {self.name!r}", (part.name for part in self.parts), "parts")
         if self.mesh is not None and self.mesh.accuracy is not None:
-            raise InputError(f"body {self.name!r}: an accuracy is that of all bodies: give it to the assembly")
+            raise InputError(f"body {self.name!r}: an accuracy is that of all bodies: give it to the scene")
 
     def check_name(self) -> None:
         """Raise InputError unless contacts can name the body; the only body of a scene needs no name."""

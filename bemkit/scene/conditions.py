@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import ClassVar, TypeAlias, cast
+from typing import TypeAlias, cast
 
 import numpy as np
 
@@ -139,7 +139,7 @@ class Pressure(Load):
 
 
 @dataclass(frozen=True)
-class Force(Load):
+class Force:
     """A resultant force and moment of tractions that are uniform, or grow linearly from the middle of the part.
 
     The traction is ``F / L + M J (x - c) / I`` with the length L of the part, its middle c, the second moment
@@ -161,7 +161,6 @@ class Force(Load):
     x: float = 0.0
     y: float = 0.0
     moment: float = 0.0
-    _part: ClassVar[tuple[float, FloatArray, float] | None] = None
 
     def __post_init__(self) -> None:
         for name in ("x", "y", "moment"):
@@ -169,38 +168,14 @@ class Force(Load):
             if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
                 raise InputError(f"{name} is {value!r}: give a finite number, the resultant on the whole part")
 
-    @property
-    def is_placed(self) -> bool:
-        """Whether the part is known."""
-        return self._part is not None
+    def over(self, length: float, middle: FloatArray, second_moment: float) -> Traction:
+        """Return the tractions on a part of a length [m], middle (2,) [m] and second moment of its length [m^3]."""
 
-    def as_traction(self) -> Traction:
-        """Return the tractions as functions of the coordinates."""
-        return Traction(partial(self._component, 0), partial(self._component, 1))
+        def component(axis: int, x: FloatArray, y: FloatArray) -> FloatArray:
+            turning = self.moment / second_moment * turned_left(np.column_stack([x, y]) - middle)
+            return np.asarray((self.x, self.y)[axis] / length + turning[:, axis])
 
-    def _component(self, axis: int, x: FloatArray, y: FloatArray) -> FloatArray:
-        points = np.column_stack([x, y])
-        return self.at(points, points)[:, axis]
-
-    def on(self, length: float, middle: FloatArray, second_moment: float) -> Force:
-        """Return the force on a part of a length [m], middle (2,) [m] and second moment of its length [m^3]."""
-        placed = Force(self.x, self.y, self.moment)
-        object.__setattr__(placed, "_part", (length, middle, second_moment))
-        return placed
-
-    def at(self, points: FloatArray, normals: FloatArray) -> FloatArray:
-        """Evaluate the traction at (n, 2) points [m] as an (n, 2) array [Pa]; the normals do not matter.
-
-        Raises
-        ------
-        InputError
-            If the force is not yet on a part of a scene.
-        """
-        if self._part is None:
-            raise InputError(f"{self} acts on no part: take the condition of a part of a scene")
-        length, middle, second_moment = self._part
-        turning = self.moment / second_moment * turned_left(points - middle)
-        return np.asarray(np.array([self.x, self.y]) / length + turning)
+        return Traction(partial(component, 0), partial(component, 1))
 
 
 @dataclass(frozen=True)
@@ -291,17 +266,17 @@ class Part:
         return Selection(sides=self.sides, where=self.where)
 
     def on(self, outline: Outline, placement: Placement) -> Part:
-        """Return the part with its resultant force, if it has one, spread over its piece of a placed outline.
+        """Return the part with the tractions of its resultant force, if it has one, on its piece of a placed outline.
 
         Raises
         ------
         GeometryError
             If the part is empty.
         """
-        if not isinstance(self.condition, Force) or self.condition.is_placed:
+        if not isinstance(self.condition, Force):
             return self
         points, lengths = quadrature(outline, self.name, self.selection)
         points, length = placement.forward(points), float(lengths.sum())
-        middle = lengths @ points / length
+        middle: FloatArray = lengths @ points / length
         second_moment = float(lengths @ np.sum((points - middle) ** 2, axis=1))
-        return replace(self, condition=self.condition.on(length, middle, second_moment))
+        return replace(self, condition=self.condition.over(length, middle, second_moment))

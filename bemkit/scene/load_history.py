@@ -11,7 +11,7 @@ import math
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields, replace
-from typing import TYPE_CHECKING, Any, TypeVar, cast
+from typing import TYPE_CHECKING, Any
 
 from bemkit.arrays import FloatArray
 from bemkit.errors import InputError
@@ -19,22 +19,20 @@ from bemkit.formulas import Expression, ExpressionError, ScalarField
 from bemkit.scene.body_forces import scaled_body_force
 from bemkit.scene.conditions import with_fields
 from bemkit.scene.scene import Scene
-from bemkit.scene.steps import Stated, Step, TimeValue
+from bemkit.scene.steps import Step, TimeValue
 
 if TYPE_CHECKING:
     from bemkit.scene.body import Body
 
 _TIME, _COORDINATES = re.compile(r"\bt\b"), re.compile(r"\b[xy]\b")
 
-AnyScene = TypeVar("AnyScene", bound=Stated)
 
-
-def load_steps(scene: AnyScene) -> tuple[AnyScene, ...]:
-    """Return the steps of a load history, each a scene or an assembly of its own.
+def load_steps(scene: Scene) -> tuple[Scene, ...]:
+    """Return the steps of a load history, each a scene of its own.
 
     Returns
     -------
-    tuple of Scene or of Assembly
+    tuple of Scene
         One for each increment of each step, or for each load factor. Each has a single load and, in a history, a single
         step with a time and nothing else.
 
@@ -50,8 +48,8 @@ def load_steps(scene: AnyScene) -> tuple[AnyScene, ...]:
         return (scene,)
     factors = enumerate(scene.load_factors, start=1)
     steps = scene.steps or [Step(float(number), load_factor=factor) for number, factor in factors]
-    base: AnyScene = replace(scene, load_factors=(1.0,), steps=(Step(steps[-1].time),))
-    states: list[AnyScene] = []
+    base: Scene = replace(scene, load_factors=(1.0,), steps=(Step(steps[-1].time),))
+    states: list[Scene] = []
     changes: dict[str, Any] = {}
     load_factor: TimeValue = 1.0
     last = 0.0
@@ -72,18 +70,18 @@ def load_steps(scene: AnyScene) -> tuple[AnyScene, ...]:
     return tuple(states)
 
 
-def with_changed_steps(scene: AnyScene, change: Callable[[AnyScene], AnyScene]) -> AnyScene:
+def with_changed_steps(scene: Scene, change: Callable[[Scene], Scene]) -> Scene:
     """Return a scene with each of its load steps changed.
 
     Parameters
     ----------
-    scene : Scene or Assembly
+    scene : Scene
     change : callable
-        Takes a scene or an assembly of one step, and returns the changed one.
+        Takes a scene of one step, and returns the changed one.
 
     Returns
     -------
-    Scene or Assembly
+    Scene
         With the changes of its steps as objects of Python, so that no file can hold them, if it has several.
     """
     first, *others = (change(step) for step in load_steps(scene))
@@ -96,7 +94,7 @@ def with_changed_steps(scene: AnyScene, change: Callable[[AnyScene], AnyScene]) 
     return replace(first, steps=tuple(steps))
 
 
-def _at_time(scene: AnyScene, changes: Mapping[str, Any], factor: TimeValue, time: float) -> AnyScene:
+def _at_time(scene: Scene, changes: Mapping[str, Any], factor: TimeValue, time: float) -> Scene:
     """Return a scene at a time of its history, under the changes that hold there."""
     from bemkit.scene.places import Place, with_value
 
@@ -126,29 +124,26 @@ def _value(value: Any, time: float) -> Any:
     return text if formula.is_condition else float(formula(0.0, 0.0))
 
 
-def with_scaled_loads(scene: AnyScene, factor: float) -> AnyScene:
+def with_scaled_loads(scene: Scene, factor: float) -> Scene:
     """Return a scene whose loads, prescribed displacements and body forces are multiplied by a number.
 
     Returns
     -------
-    Scene or Assembly
+    Scene
         With the load factor 1; obstacles, gaps, laws, and body forces that are constant are unchanged.
     """
     if factor == 1.0 and scene.load_factors == (1.0,):
         return scene
     changes: dict[str, Any] = {"load_factors": (1.0,)}
-    if isinstance(scene, Scene):
-        changes |= _scaled(scene, factor, {})
-        changes["far"] = None if scene.far is None else scene.far.scaled(factor)
-    else:
-        known: dict[int, Any] = {}
-        changes["rigid"] = tuple(body.scaled(factor) for body in scene.rigid)
-        changes["bodies"] = tuple(replace(body, **_scaled(body, factor, known)) for body in cast(Any, scene).bodies)
+    known: dict[int, Any] = {}
+    changes |= _scaled(scene, factor, known)
+    changes["rigid"] = tuple(body.scaled(factor) for body in scene.rigid)
+    changes["bodies"] = tuple(replace(body, **_scaled(body, factor, known)) for body in scene.bodies)
     return replace(scene, **changes)
 
 
 def _scaled(loaded: Scene | Body, factor: float, known: dict[int, Any]) -> dict[str, Any]:
-    """Return parts and body forces under scaled loads; those without loads are the same objects.
+    """Return parts, body forces and the far field under scaled loads; those without loads are the same objects.
 
     Objects that several bodies share stay shared: `known` maps the identity of each to its scaled copy.
     """
@@ -166,6 +161,7 @@ def _scaled(loaded: Scene | Body, factor: float, known: dict[int, Any]) -> dict[
     return {
         "parts": tuple(known[id(part)] for part in loaded.parts),
         "body_forces": tuple(known[id(force)] for force in loaded.body_forces),
+        "far": None if loaded.far is None else loaded.far.scaled(factor),
     }
 
 

@@ -99,7 +99,7 @@ def with_settings(scene: Node, texts: Sequence[str]) -> Node:
 
 
 def value_at(scene: object, place: Place) -> Any:
-    """Return the value at a place of a scene or an assembly.
+    """Return the value at a place of a scene.
 
     Raises
     ------
@@ -113,11 +113,11 @@ def value_at(scene: object, place: Place) -> Any:
 
 
 def with_value(scene: Node, place: Place, value: object) -> Node:
-    """Return a scene or an assembly with another value at a place; all else are the same objects.
+    """Return a scene with another value at a place; all else are the same objects.
 
     Parameters
     ----------
-    scene : Scene or Assembly
+    scene : Scene
     place : Place
     value : object
         As scene files state it (a number, also with a unit, a formula, a word, a list or a table), or an object of

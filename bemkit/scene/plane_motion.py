@@ -1,4 +1,4 @@
-"""Prescribed and driven rigid motions: of rigid bodies in an assembly, and of half-planes far away."""
+"""Prescribed and driven rigid motions: of rigid bodies in a scene, and of half-planes far away."""
 
 from __future__ import annotations
 

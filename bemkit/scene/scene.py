@@ -1,4 +1,4 @@
-"""A scene: the body, its boundary parts, loads, obstacles, the friction law, mesh and solver.
+"""A scene: bodies, their parts, loads and obstacles, contacts, friction laws, meshes and the solver.
 
 Everything here is a frozen value. A scene can be written in Python or as a TOML file (`bemkit.scene.toml`), and either
 form can be turned into the other. All quantities are in one consistent set of units, for example m, N and Pa.
@@ -6,79 +6,90 @@ form can be turned into the other. All quantities are in one consistent set of u
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
+from itertools import pairwise
+from typing import Any
 
 import numpy as np
 
-from bemkit.arrays import FloatArray, IntArray
-from bemkit.contact.further_laws import PiecewiseLaw
 from bemkit.contact.laws import FrictionLaw, Frictionless
-from bemkit.contact.problem import LawError
 from bemkit.errors import InputError
-from bemkit.formulas import choices
 from bemkit.geometry.mesh import BoundaryMesh
-from bemkit.geometry.meshing.discretise import discretise
-from bemkit.geometry.meshing.division import divide
-from bemkit.geometry.outline import Outline, Selection
-from bemkit.geometry.placement import Placement
 from bemkit.geometry.shapes import Shape
 from bemkit.geometry.symmetry import Symmetry
+from bemkit.notebook import ShownInNotebooks
 from bemkit.operators.linear.solvers import Automatic, LinearSolverChoice
 from bemkit.operators.material import Material
+from bemkit.scene.body import Body, check_place, lines_across
 from bemkit.scene.body_forces import BodyForce
-from bemkit.scene.conditions import Clamped, Contact, Part, PrescribedDisplacement, Roller
+from bemkit.scene.body_scene import BodyScene
+from bemkit.scene.conditions import Contact, Force, Free, Part
+from bemkit.scene.contact_checks import check_contacts
+from bemkit.scene.contacts import ContactPair, Touching
 from bemkit.scene.discretisation import Discretisation, Galerkin
 from bemkit.scene.mesh_options import MeshOptions
-from bemkit.scene.plane_motion import FarField
-from bemkit.scene.steps import Stated, Step, check_laws, check_names
-from bemkit.scene.unit_names import UnitNames, check_length_of_file
+from bemkit.scene.objects import check_objects
+from bemkit.scene.plane_motion import FarField, RigidBody
+from bemkit.scene.steps import Step, check_laws, check_names
+from bemkit.scene.unit_names import UnitNames
 from bemkit.solvers.base import ContactSolver
 from bemkit.solvers.fallbacks import Fallbacks
 
-if TYPE_CHECKING:
-    from bemkit.geometry.meshing.partition import Partition
-    from bemkit.scene.body import Body
+OF_ONE_BODY = ("shape", "material", "parts", "body_forces", "far")
+"""Fields of the short form."""
+OF_SEVERAL = ("bodies", "rigid", "contacts", "touching")
+"""Fields that the short form does without."""
 
 
 class NoContactError(InputError):
-    """Something that needs contact was asked of a scene without contact parts."""
+    """Something that needs contact was asked of a scene without contact."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class Scene(Stated):
-    """One body with its supports, loads and contacts: everything that determines the solution.
+class Scene(ShownInNotebooks):
+    """Elastic bodies with their contacts, supports and loads: everything that determines the solution.
 
-    Boundary that belongs to no part is free of traction. Without contact this is a problem of elasticity.
+    A scene lists its `bodies`, or states a single one in the short form, by `shape`, `material`, `parts`, `body_forces`
+    and `far`. Boundary that belongs to no part is free of traction. Without contact this is a problem of elasticity.
 
     Parameters
     ----------
     title : str
-    shape : Shape
-    material : Material
+    shape, material : Shape, Material
+        Of the body in the short form.
     parts : tuple of Part
-        They must not overlap (checked when the boundary is divided).
-    law : FrictionLaw
-        On all contact parts that have no law of their own.
-    load_factors : tuple of float
-        A short form of load history: all tractions, pressures, prescribed displacements and body forces times these
-        numbers, at the times 1, 2, 3 and so on.
-    steps : tuple of Step
-        The load history: what changes from step to step. Without one, or with a single step, slip counts from the
-        undeformed body (the static law); with several, from the end of the step before (the incremental law).
-    symmetry : Symmetry, optional
-        Lines about which the scene, which describes the whole body, is symmetric. Only the elements on the side
-        x <= a, y <= b carry unknowns, the others are their images; results are those of that side.
+        Its supports, loads and rigid obstacles. They must not overlap (checked when the boundary is divided).
     body_forces : tuple of BodyForce
         Gravity, rotation, heating.
     far : FarField, optional
         Motion or load of a half-plane far away from its surface. By default it is at rest there.
+    bodies : tuple of Body
+    rigid : tuple of RigidBody
+        Obstacles that move; each takes part in a contact.
+    contacts : tuple of ContactPair
+    touching : Touching, optional
+        Finds contacts where bodies face each other, besides those that are listed.
+    law : FrictionLaw
+        In all contacts that have no law of their own, with bodies and with rigid obstacles.
+    load_factors : tuple of float
+        A short form of load history: all loads, given displacements and body forces that are not constant times these
+        numbers, at the times 1, 2, 3 and so on. Gaps and obstacles stay as they are.
+    steps : tuple of Step
+        The load history: what changes from step to step. Without one, or with a single step, slip counts from the
+        undeformed bodies (the static law); with several, from the end of the step before (the incremental law).
+    symmetry : Symmetry, optional
+        Lines about which the scene, which describes the whole, is symmetric. Only elements on the side x <= a, y <= b
+        carry unknowns, the others are their images; results are those of that side. Of several bodies those that a line
+        crosses are drawn in their places; of those beside it only the ones on the side of smaller x, or y, are listed.
+        A body that touches its own image at a line needs an obstacle there.
     discretisation : Discretisation
+        Of all bodies that have none of their own.
     linear_solver : LinearSolver or Automatic
-        How the displacements of the body away from the contact boundary are solved for.
+        How the displacements of bodies away from the contacts are solved for.
     mesh : MeshOptions
+        Of each body that has none of its own; `elements` are those of one body. An accuracy is that of all bodies.
     solver : ContactSolver
     units : UnitNames, optional
         Names of the units that everything is stated in; they label results.
@@ -87,26 +98,32 @@ class Scene(Stated):
 
     Raises
     ------
-    ValueError
-        If the title is empty, two parts share a name, a part names an unknown side, a load factor is missing or not
-        finite, times do not increase, a law needs slip or time without steps, body forces act in an exterior, an
-        accuracy is asked of collocation, or a law with friction or a solver is given without any contact.
+    InputError
+        If the title is empty, there is no body, or both forms are used; two bodies or parts share a name, a part names
+        an unknown side, a contact names what does not exist or is listed twice, a rigid body takes part in no contact;
+        a load factor is missing or not finite, times do not increase, a law needs slip or time without steps; body
+        forces act in an exterior, an accuracy is asked of collocation or goes with elements of a body; or a law with
+        friction or a solver is given without any contact.
     GeometryError
-        If the outline of the shape is not a valid boundary.
+        If the outline of a shape is not a valid boundary.
     """
 
     title: str
-    shape: Shape
-    material: Material
-    parts: tuple[Part, ...]
+    shape: Shape | None = None
+    material: Material | None = None
+    parts: tuple[Part, ...] = ()
+    body_forces: tuple[BodyForce, ...] = ()
+    far: FarField | None = None
+    bodies: tuple[Body, ...] = ()
+    rigid: tuple[RigidBody, ...] = ()
+    contacts: tuple[ContactPair, ...] = ()
+    touching: Touching | None = None
     law: FrictionLaw = field(default_factory=Frictionless)
     load_factors: tuple[float, ...] = (1.0,)
     steps: tuple[Step, ...] = ()
-    symmetry: Symmetry | None = None
-    body_forces: tuple[BodyForce, ...] = ()
-    far: FarField | None = None
     discretisation: Discretisation = field(default_factory=lambda: Galerkin(1))
     linear_solver: LinearSolverChoice = field(default_factory=Automatic)
+    symmetry: Symmetry | None = None
     mesh: MeshOptions = field(default_factory=MeshOptions)
     solver: ContactSolver = field(default_factory=Fallbacks)
     units: UnitNames | None = None
@@ -114,206 +131,264 @@ class Scene(Stated):
     reference: str = ""
 
     def __post_init__(self) -> None:
-        super().__post_init__()
+        check_objects(self)
+        object.__setattr__(self, "load_factors", tuple(self.load_factors))
+        object.__setattr__(self, "steps", tuple(self.steps))
+        if not self.title or not self.title.isprintable():
+            raise InputError(f"title is {self.title!r}: give one line of printable text")
+        self._check_form()
+        self._check_steps()
+        for body in self.bodies:
+            body.check_name()
+        names = [*(body.name for body in self.placed_bodies), *(body.name for body in self.rigid)]
+        check_names("bodies", names, "bodies")
         check_names("parts", (part.name for part in self.parts), "parts")
-        if not self.contact_parts:
+        laws = {f"law of contact {pair.name!r}": self.law_of(pair) for pair in self.contacts}
+        check_laws(({"law": self.law} if self.bodies else {}) | laws, self.steps)
+        if not self.has_contact:
             self._check_without_contact()
-        check_laws({f"law of part {name!r}": law for name, law in self.laws.items()}, self.steps)
+        check_contacts(self.contacts, self.rigid, self._by_name, self._side_names)
+        if self.symmetry is not None and self.bodies:
+            if self.rigid:
+                raise InputError("symmetry goes only with elastic bodies: remove it, or the rigid bodies")
+            for body in self.placed_bodies:
+                check_place(body, self.symmetry)
         if self.mesh.accuracy is not None:
             self._check_accuracy(self.mesh.accuracy)
-        outline = self.shape.outline()
-        if outline.surface is not None or self.far is not None:
-            _check_half_plane(outline, self.far, self.discretisation, self.mesh, self.parts)
-        if self.units is not None and outline.drawing is not None:
-            check_length_of_file(outline.drawing.unit, self.units)
-        if self.body_forces and outline.is_exterior:
-            raise InputError(
-                f"body_forces is {self.body_forces!r}, but the body has no end: nothing holds its infinite weight, and "
-                "heat expands it without bound: remove the body forces, or give a bounded shape"
-            )
-        names = outline.selectable_names
-        for part in self.parts:
-            for side in part.sides:
-                if side not in names:
-                    raise InputError(f"part {part.name!r}: unknown side {side!r}: the sides are {choices(side, names)}")
-        object.__setattr__(self, "parts", tuple(part.on(outline, Placement()) for part in self.parts))
+        for body in self.placed_bodies:
+            scene = self.scene_of(body)  # parts and sides are checked
+            if len(self.placed_bodies) > 1:
+                _check_among_others(body, scene)
 
-    def _check_without_contact(self) -> None:
-        for name, default in (("law", Frictionless()), ("solver", Fallbacks())):
-            if getattr(self, name) != default:
+    def __getstate__(self) -> dict[str, Any]:
+        """Pickle the fields only: what is cached is known by the identity of objects."""
+        return {entry.name: getattr(self, entry.name) for entry in fields(self)}
+
+    def _check_form(self) -> None:
+        if not self.bodies:
+            for name in ("shape", "material"):
+                if getattr(self, name) is None:
+                    raise InputError(
+                        f"{name} is missing: give the body a shape and a material, [{name}] in a file, or bodies"
+                    )
+            for name in OF_SEVERAL:
+                if getattr(self, name):
+                    raise InputError(f"{name} is given, but the body has no name: list it in bodies")
+            return
+        for name in OF_ONE_BODY:
+            if getattr(self, name) not in (None, ()):
+                raise InputError(f"{name} is given besides bodies: state it of one of the bodies")
+
+    def _check_steps(self) -> None:
+        if not (self.load_factors and np.all(np.isfinite(self.load_factors))):
+            raise InputError(f"load_factors is {self.load_factors}: give finite numbers such as (0.5, 1.0)")
+        if self.steps and self.load_factors != (1.0,):
+            raise InputError(
+                f"load_factors is {self.load_factors} besides {len(self.steps)} steps: give each step its load_factor"
+            )
+        for number, (before, step) in enumerate(pairwise(self.steps), start=1):
+            if step.time <= before.time:
                 raise InputError(
-                    f"{name} is {getattr(self, name)!r}, but no part is in contact: remove the {name}, or give one "
-                    "part the condition 'contact' with an obstacle"
+                    f"steps[{number}]: time is {step.time:g} after {before.time:g}: give times that increase"
                 )
 
+    def _check_without_contact(self) -> None:
+        remedy = "no part is in contact: remove the {name}, or give one part the condition 'contact' with an obstacle"
+        if self.bodies:
+            remedy = "no two bodies are in contact: list contacts, or remove the {name}"
+        for name, default in (("law", Frictionless()), ("solver", Fallbacks())):
+            if getattr(self, name) != default:
+                raise InputError(f"{name} is {getattr(self, name)!r}, but {remedy.format(name=name)}")
+
     def _check_accuracy(self, accuracy: float) -> None:
-        if self.mesh.rising_degrees and not isinstance(self.discretisation, Galerkin):
-            raise InputError(
-                f"mesh.rising_degrees is True: {self.discretisation} has no degree: choose Galerkin elements"
+        for body in self.bodies:
+            if self.mesh.rising_degrees and body.discretisation is not None:
+                raise InputError(
+                    f"body {body.name!r} has a fixed degree, the scene rising degrees: degrees rise for all bodies "
+                    "or for none: give only the scene a discretisation"
+                )
+            if body.mesh is not None:
+                raise InputError(
+                    f"mesh.accuracy is {accuracy}, and body {body.name!r} has mesh options of its own: give one of them"
+                )
+
+    def _side_names(self, body: Body) -> tuple[tuple[str, str], ...]:
+        """Return the name and the group of each side of a body; copies share them, since making an outline is slow."""
+        if id(body.shape) not in self._sides:
+            self._sides[id(body.shape)] = tuple(
+                (side.name, side.group or side.name) for side in body.shape.outline().sides
             )
-        if not self.discretisation.estimates_error:
-            raise InputError(
-                f"mesh.accuracy is {accuracy}: {self.discretisation.method} has no error estimate: choose the "
-                "discretisation 'quadratic' or 'linear', or give elements"
-            )
+        return self._sides[id(body.shape)]
+
+    @cached_property
+    def _sides(self) -> dict[int, tuple[tuple[str, str], ...]]:
+        """The names and groups of the sides of shapes."""
+        return {}
+
+    @property
+    def n_steps(self) -> int:
+        """Number of load steps, increments counted."""
+        return sum(step.increments for step in self.steps) if self.steps else len(self.load_factors)
 
     @cached_property
     def placed_bodies(self) -> tuple[Body, ...]:
-        """The only body, which has no name."""
-        from bemkit.scene.body import Body
+        """The bodies, every copy a body of its own; that of the short form has no name."""
+        if self.shape is not None and self.material is not None:
+            own = {name: getattr(self, name) for name in OF_ONE_BODY}
+            return (Body(name="", **own),)
+        return tuple(placed for body in self.bodies for placed in body.copied())
 
-        body = Body(name="", shape=self.shape, material=self.material, parts=self.parts, body_forces=self.body_forces)
-        return (body,)
+    @property
+    def has_contact(self) -> bool:
+        """Whether anything may touch: obstacles, rigid bodies or other bodies."""
+        parts = (*self.parts, *(part for body in self.bodies for part in body.parts))
+        at_obstacles = any(isinstance(part.condition, Contact) for part in parts)
+        return at_obstacles or bool(self.contacts) or self.touching is not None
 
-    def scene_of(self, body: Body) -> Scene:
-        """Return the scene itself."""
-        return self
+    @property
+    def has_obstacles_only(self) -> bool:
+        """Whether there is one elastic body that touches nothing but fixed obstacles."""
+        return len(self.placed_bodies) == 1 and not self.contacts and self.touching is None
+
+    @property
+    def only(self) -> BodyScene:
+        """The statement of the only body.
+
+        Raises
+        ------
+        InputError
+            If there are several.
+        """
+        if len(self.placed_bodies) > 1:
+            raise InputError(f"there are {len(self.placed_bodies)} bodies: only scenes of one body can do this")
+        return self.scene_of(self.placed_bodies[0])
 
     @property
     def contact_parts(self) -> tuple[Part, ...]:
-        """The parts that may touch an obstacle."""
-        return tuple(part for part in self.parts if isinstance(part.condition, Contact))
-
-    def parts_on(self, mesh: BoundaryMesh) -> list[tuple[Part, IntArray]]:
-        """Return the parts with their elements (k,) on a mesh, without parts beyond a symmetry line."""
-        return [(part, elements) for part in self.parts if (elements := mesh.part(part.name)).size]
-
-    @property
-    def laws(self) -> dict[str, FrictionLaw]:
-        """The friction law of each contact part, by name."""
-        laws = {part.name: part.condition.law for part in self.parts if isinstance(part.condition, Contact)}
-        return {name: self.law if law is None else law for name, law in laws.items()}
-
-    @property
-    def selections(self) -> dict[str, Selection]:
-        """The pieces of the outline that the parts cover, by name."""
-        return {part.name: part.selection for part in self.parts}
-
-    def law_at(self, parts: Sequence[str], points: FloatArray) -> FrictionLaw:
-        """Return the friction law of given contact nodes, every coefficient in numbers.
-
-        Parameters
-        ----------
-        parts : sequence of n_contact str
-            The contact part that each node belongs to.
-        points : (n_contact, 2) array [m]
-
-        Raises
-        ------
-        LawError
-            If a coefficient is not finite or negative somewhere; the message names the part.
-        """
-        laws: list[FrictionLaw] = []
-        nodes: list[IntArray] = []
-        for name, law in self.laws.items():
-            part_nodes = np.flatnonzero(np.array([part == name for part in parts], bool))
-            try:
-                laws.append(law.at(points[part_nodes]))
-            except ValueError as error:
-                raise LawError(f"part {name!r}: friction law: {error}") from error
-            nodes.append(part_nodes)
-        if not laws:  # a scene without contact
-            return self.law
-        if len(laws) == 1 or all(law is laws[0] for law in laws):
-            return laws[0]
-        return PiecewiseLaw(laws, nodes)
-
-    @property
-    def takes_layers(self) -> bool:
-        """Whether meshes that follow an accuracy are few elements of high degree in geometric layers."""
-        degree = self.discretisation.largest_degree if isinstance(self.discretisation, Galerkin) else 0
-        return self.n_steps == 1 and self.mesh.accuracy is not None and (self.mesh.rising_degrees or degree > 2)
-
-    def first_partition(self, contact: Collection[str]) -> Partition:
-        """Divide the boundary for the first time if an accuracy decides.
-
-        Parameters
-        ----------
-        contact : collection of str
-            Names of the parts that may touch something. They are divided evenly; where the next mesh is made anew in
-            layers, this one only looks for places where their status changes.
-        """
-        outline = self.shape.outline()
-        if self.takes_layers and contact:
-            from bemkit.geometry.meshing.layers import looking_partition
-
-            base = divide(outline, self.selections)
-            base = base if self.symmetry is None else base.half(self.symmetry)
-            return looking_partition(base, contact, self.mesh.n_elements)
-        from bemkit.geometry.meshing.partition import first_partition
-
-        return first_partition(outline, self.selections, self.mesh.n_elements, even=contact, symmetry=self.symmetry)
-
-    def divided(self, contact: Collection[str]) -> BoundaryMesh:
-        """Return the mesh by number of elements, or the first mesh for an accuracy; see `first_partition`."""
-        if self.mesh.elements is None:
-            return self.first_partition(contact).mesh
-        return discretise(
-            self.shape.outline(),
-            n_elements=self.mesh.elements,
-            parts=self.selections,
-            grading=self.mesh.grading,
-            density=self.mesh.density,
-            symmetry=self.symmetry,
-        )
+        """The parts of all bodies that may touch a rigid obstacle."""
+        return tuple(part for body in self.placed_bodies for part in self.scene_of(body).contact_parts)
 
     def build_mesh(self) -> BoundaryMesh:
-        """Divide the boundary into elements, with one mesh part for each part of the scene.
+        """Divide the boundary of the only body into elements; see `BodyScene.build_mesh`."""
+        return self.only.build_mesh()
 
-        Raises
-        ------
-        GeometryError
-            If parts overlap or are empty, or there are too few elements, or the scene lacks its symmetry.
+    @property
+    def elastic_contacts(self) -> tuple[ContactPair, ...]:
+        """The contacts that no rigid body takes part in."""
+        return tuple(pair for pair in self.contacts if pair.rigid_body is None)
+
+    @cached_property
+    def _by_name(self) -> Mapping[str, Body]:
+        """The placed bodies by name."""
+        return {body.name: body for body in self.placed_bodies}
+
+    @cached_property
+    def _listed_parts(self) -> Mapping[str, tuple[str, ...]]:
+        named: dict[str, list[str]] = {}
+        for pair in self.contacts:
+            for body, part in pair.elastic_parts:
+                named.setdefault(body, []).append(part)
+        return {body: tuple(dict.fromkeys(parts)) for body, parts in named.items()}
+
+    def listed_parts(self, body: str) -> tuple[str, ...]:
+        """Return the parts and sides of a placed body that contacts name."""
+        return self._listed_parts.get(body, ())
+
+    def touching_parts(self, body: Body) -> tuple[str, ...]:
+        """Return the names of the parts and sides of a placed body that may touch other bodies."""
+        listed = self.listed_parts(body.name)
+        if self.touching is None:
+            return listed
+        parts = (*body.parts, *(body.contact_part(name) for name in listed))
+        taken = {side for part in parts for side in part.sides}
+        whole = any(not part.sides for part in parts)
+        free = [part.name for part in body.parts if isinstance(part.condition, Free)]
+        sides = [] if whole else [name for name, group in self._side_names(body) if not {name, group} & taken]
+        return tuple(dict.fromkeys([*listed, *free, *sides]))
+
+    @cached_property
+    def _scenes(self) -> dict[tuple[object, ...], BodyScene]:
+        """Statements of bodies; copies share one."""
+        return {}
+
+    def scene_of(self, body: Body) -> BodyScene:
+        """Return what the scene says of one placed body, in which sides in contact are free parts.
+
+        Its shape is in the coordinates of the body; loads, given displacements and obstacles are those in its place.
+        Copies without moments share one, and so do bodies that are made of the same objects.
         """
-        mesh = self.divided([part.name for part in self.contact_parts])
-        if self.symmetry is not None:
-            from bemkit.scene.symmetry import check_symmetry
+        stated = (body.shape, body.mesh, body.discretisation, *body.parts, None, *body.body_forces)
+        key = (
+            *(id(entry) for entry in stated),
+            body.material,
+            self.touching_parts(body),
+            self._lines_across(body),
+            body.placement
+            if any(isinstance(part.condition, Force) and part.condition.moment for part in body.parts)
+            else None,
+        )
+        if key not in self._scenes:
+            self._scenes[key] = self._new_scene(body)
+        return self._scenes[key]
 
-            check_symmetry(self, mesh)
-        return mesh
+    def _lines_across(self, body: Body) -> Symmetry | None:
+        """Return the symmetry lines that halve a body: in the short form all."""
+        return lines_across(body, self.symmetry) if self.bodies else self.symmetry
+
+    def _new_scene(self, body: Body) -> BodyScene:
+        named = {part.name for part in body.parts}
+        try:
+            own = tuple(part.on(body.shape.outline(), body.placement) for part in body.parts)
+            facing = [body.contact_part(name) for name in self.touching_parts(body)]
+            return BodyScene(
+                shape=body.shape,
+                material=body.material,
+                parts=(*own, *(part for part in facing if part.name not in named)),
+                body_forces=body.body_forces,
+                far=body.far,
+                law=self.law,
+                steps=self.steps,
+                n_steps=self.n_steps,
+                symmetry=self._lines_across(body),
+                discretisation=self.discretisation if body.discretisation is None else body.discretisation,
+                mesh=self.mesh if body.mesh is None else body.mesh,
+                units=self.units,
+            )
+        except InputError as error:
+            if not body.name:
+                raise
+            raise type(error)(f"body {body.name!r}: {error}") from error
+
+    def rigid_body_of(self, pair: ContactPair) -> RigidBody:
+        """Return the rigid body of a contact that has one."""
+        return next(body for body in self.rigid if body.name == pair.rigid_body)
+
+    def law_of(self, pair: ContactPair | Touching) -> FrictionLaw:
+        """Return the friction law of a contact."""
+        return self.law if pair.law is None else pair.law
+
+    def with_contacts(self, contacts: tuple[ContactPair, ...]) -> Scene:
+        """Return the scene with all its contacts listed."""
+        return replace(self, contacts=contacts, touching=None)
 
 
-def _check_half_plane(
-    outline: Outline, far: FarField | None, discretisation: Discretisation, mesh: MeshOptions, parts: Sequence[Part]
-) -> None:
-    """Check that a half-plane has nothing that only other bodies have, and another body no far field.
+def _check_among_others(body: Body, scene: BodyScene) -> None:
+    """Raise InputError if a body has what only a single one may have."""
+    if isinstance(scene.discretisation, Galerkin) and isinstance(scene.discretisation.degree, tuple):
+        raise InputError(
+            f"degree is a list, of body {body.name!r}: elements have several degrees in scenes of one body only; give "
+            "one degree"
+        )
+
+
+def check_scene(scene: object) -> None:
+    """Refuse what is not a scene, such as the name of one.
 
     Raises
     ------
     InputError
-        Naming the key, its value and the remedy.
+        Naming the value and what reads a scene.
     """
-    if outline.surface is None:
-        if far is not None:
-            raise InputError(
-                f"far is {far}, but the body is not a half-plane: hold or load its parts, or give the shape "
-                "'half-plane' or 'periodic-half-plane'"
-            )
-        return
-    if discretisation != Galerkin(1) or mesh.rising_degrees:
-        raise InputError(
-            f"discretisation is {discretisation}, but tractions on a half-plane are constant on each element: choose "
-            "the discretisation 'linear', or remove it"
-        )
-    if outline.surface.is_periodic:
-        _check_periodic(far, mesh, parts)
-
-
-def _check_periodic(far: FarField | None, mesh: MeshOptions, parts: Sequence[Part]) -> None:
-    if far is not None and far.strain:
-        raise InputError(f"far.strain is {far.strain}: a strained surface does not repeat: remove it")
-    if far is not None and (far.turn or far.moment is not None):
-        name = "turn" if far.turn else "moment"
-        raise InputError(f"far.{name} is {getattr(far, name)}: a periodic half-plane cannot turn: remove it")
-    for part in parts:
-        if isinstance(part.condition, Clamped | PrescribedDisplacement | Roller):
-            raise InputError(
-                f"part {part.name!r} holds the surface of a periodic half-plane: hold it far away, or let the part "
-                "touch an obstacle"
-            )
-    if mesh.accuracy is not None:
-        raise InputError(
-            f"mesh.accuracy is {mesh.accuracy}: the elements of a periodic half-plane are equal: give elements"
-        )
-    if not any(isinstance(part.condition, Contact) for part in parts):
-        raise InputError("no part of the periodic half-plane is in contact: give one an obstacle")
+    if not isinstance(scene, Scene):
+        remedy = f"load_scene({scene!r}) reads one" if isinstance(scene, str) else "load_scene(path) reads one"
+        raise InputError(f"scene is {scene!r}: give a Scene; {remedy}")

@@ -17,11 +17,10 @@ from typing import Any, cast, get_args, get_origin
 from bemkit.arrays import FloatArray
 from bemkit.errors import InputError
 from bemkit.formulas import Expression
-from bemkit.scene.assembly import Assembly
 from bemkit.scene.declared_types import default_of, heading_of, hints_of, is_required, options_of, registry_of
 from bemkit.scene.docstrings import parameters, summary
 from bemkit.scene.registry import RISING, Registry
-from bemkit.scene.scene import Scene
+from bemkit.scene.scene import OF_ONE_BODY, OF_SEVERAL, Scene
 from bemkit.scene.written_tables import unstructure
 
 _QUANTITY = r"^\s*[+-]?[\d.]+([eE][+-]?\d+)?\s*[^\d\s.,]"
@@ -51,25 +50,25 @@ def scene_schema() -> Schema:
         To be written as JSON.
     """
     definitions = _Definitions()
-    one, several = definitions.table(Scene), definitions.table(Assembly)
-    for table in (one, several):
-        table["properties"]["discretisation"] = _or_word(table["properties"]["discretisation"], RISING)
+    table = definitions.table(Scene)
+    table["properties"]["discretisation"] = _or_word(table["properties"]["discretisation"], RISING)
+    names = list(table["properties"])
     return {
         "$schema": DRAFT,
         "title": "bemkit scene",
         "description": "A contact problem of one elastic body, or of several if there are tables [bodies.NAME].",
         "type": "object",
-        "properties": several["properties"] | one["properties"],
+        "properties": table["properties"],
         "if": {"required": ["bodies"]},
-        "then": _keys(several),
-        "else": _keys(one),
+        "then": _keys(["title", "bodies"], [name for name in names if name not in OF_ONE_BODY]),
+        "else": _keys(["title", "shape", "material"], [name for name in names if name not in OF_SEVERAL]),
         "definitions": dict(sorted(definitions.made.items())),
     }
 
 
-def _keys(table: Schema) -> Schema:
+def _keys(required: list[str], allowed: list[str]) -> Schema:
     """Return which keys a table must and may have."""
-    return {"required": table["required"], "propertyNames": {"enum": list(table["properties"])}}
+    return {"required": required, "propertyNames": {"enum": allowed}}
 
 
 class _Definitions:

@@ -10,7 +10,7 @@ from dataclasses import fields, replace
 from importlib import resources
 from importlib.resources.abc import Traversable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, TypeVar, cast
+from typing import Any, Literal, cast
 
 from bemkit.errors import InputError, printable
 from bemkit.formulas import closest
@@ -20,27 +20,20 @@ from bemkit.scene.mesh_options import MeshOptions
 from bemkit.scene.registry import FILE_KINDS, RISING, SOLVERS
 from bemkit.scene.scene import Scene
 from bemkit.scene.serialisation import StructureError, structure
-from bemkit.scene.steps import Stated
 from bemkit.scene.unit_names import UnitNames
 from bemkit.scene.written_tables import UnstructureError, unstructure
 from bemkit.solvers.base import ContactSolver
 from bemkit.solvers.fallbacks import Fallbacks
-
-if TYPE_CHECKING:
-    from bemkit.scene.assembly import Assembly
 
 MAX_BYTES = 1_000_000
 
 # the order of keys in files that are written, as a reader wants it
 _SCENE_KEYS = (
     *("title", "description", "reference", "units", "discretisation", "linear_solver", "solver"),
-    *("load_factors", "steps", "symmetry", "law", "shape", "material", "body_forces", "far", "mesh", "parts"),
+    *("load_factors", "steps", "symmetry", "law", "shape", "material", "body_forces", "far", "touching", "mesh"),
+    *("parts", "bodies", "rigid", "contacts"),
 )
-_ASSEMBLY_KEYS = (
-    *("title", "description", "reference", "units", "discretisation", "linear_solver", "solver"),
-    *("load_factors", "steps", "symmetry", "law", "touching", "mesh", "bodies", "rigid", "contacts"),
-)
-_BODY_KEYS = ("shape", "material", "body_forces", "placement", "copies", "discretisation", "mesh", "parts")
+_BODY_KEYS = ("shape", "material", "body_forces", "far", "placement", "copies", "discretisation", "mesh", "parts")
 _RIGID_KEYS = ("obstacle", "centre", "x", "y", "turn", "force_x", "force_y", "moment")
 _PART_KEYS = ("sides", "where", "condition")
 
@@ -61,7 +54,7 @@ def shipped_scenes() -> dict[str, str]:
     return {name: tomllib.loads(file.read_text("utf-8"))["title"] for name, file in shipped_files().items()}
 
 
-def load_scene(source: str | Path) -> Scene | Assembly:
+def load_scene(source: str | Path) -> Scene:
     """Read a scene file, or a scene that is shipped with bemkit.
 
     Parameters
@@ -71,8 +64,8 @@ def load_scene(source: str | Path) -> Scene | Assembly:
 
     Returns
     -------
-    Scene or Assembly
-        An assembly if the file has tables ``[bodies.NAME]``.
+    Scene
+
 
     Raises
     ------
@@ -113,15 +106,15 @@ def load_single_body(source: str | Path) -> Scene:
     return single_body(load_scene(source), str(source))
 
 
-def single_body(scene: Scene | Assembly, name: str) -> Scene:
-    """Return a scene, and refuse an assembly; the name is for the message."""
-    if not isinstance(scene, Scene):
+def single_body(scene: Scene, name: str) -> Scene:
+    """Return a scene, and refuse one of several bodies; the name is for the message."""
+    if scene.shape is None:
         raise SceneError(f"{name}: there are {len(scene.placed_bodies)} bodies: only scenes of one body can do this")
     return scene
 
 
-def scene_from_toml(text: str, *, name: str = "scene", folder: Path | None = None) -> Scene | Assembly:
-    """Turn TOML text into a scene, or an assembly if it has tables ``[bodies.NAME]``.
+def scene_from_toml(text: str, *, name: str = "scene", folder: Path | None = None) -> Scene:
+    """Turn TOML text into a scene.
 
     Parameters
     ----------
@@ -151,7 +144,7 @@ def scene_from_toml(text: str, *, name: str = "scene", folder: Path | None = Non
         raise SceneError(f"{name}: " + "\n".join(mistakes)) from error
 
 
-def scene_from_table(table: dict[str, Any], folder: Path | None = None) -> Scene | Assembly:
+def scene_from_table(table: dict[str, Any], folder: Path | None = None) -> Scene:
     """Turn the table that a TOML text holds into a scene; see `scene_from_toml`.
 
     Raises
@@ -161,7 +154,7 @@ def scene_from_table(table: dict[str, Any], folder: Path | None = None) -> Scene
     """
     table = _with_rising_degrees(_with_places_of_files(table, folder, ""))
     try:
-        scene = structure(table, _kind_of(table), _units_of(table))
+        scene = structure(table, Scene, _units_of(table))
         if scene.steps:
             _ = load_steps(scene)  # every change of a step is checked
     except StructureError as error:
@@ -169,14 +162,6 @@ def scene_from_table(table: dict[str, Any], folder: Path | None = None) -> Scene
     except InputError as error:
         raise SceneError(printable(str(error))) from error
     return scene
-
-
-def _kind_of(table: dict[str, Any]) -> type[Scene | Assembly]:
-    if "bodies" not in table:
-        return Scene
-    from bemkit.scene.assembly import Assembly
-
-    return Assembly
 
 
 def _units_of(table: dict[str, Any]) -> UnitNames | None:
@@ -214,7 +199,7 @@ def _with_places_of_files(table: dict[str, Any], folder: Path | None, path: str)
     return located
 
 
-def scene_to_toml(scene: Stated) -> str:
+def scene_to_toml(scene: Scene) -> str:
     """Write a scene as TOML text, without keys that have their default value.
 
     Returns
@@ -236,25 +221,17 @@ def scene_to_toml(scene: Stated) -> str:
     if scene.mesh.rising_degrees and scene.discretisation == Galerkin(2):
         table["discretisation"] = RISING
         del table["mesh"]["rising_degrees"]
-    if not isinstance(scene, Scene):
-        for body in table["bodies"]:
-            body["parts"] = _named(body.get("parts", []), _PART_KEYS)
-        table["bodies"] = _named(table["bodies"], _BODY_KEYS)
-        table["rigid"] = _named(table["rigid"], _RIGID_KEYS)
-        return tomli_w.dumps(_ordered(table, _ASSEMBLY_KEYS), multiline_strings=True)
-    if not scene.contact_parts:  # nothing to be said about friction, and nothing to iterate
+    for body in table["bodies"]:
+        body["parts"] = _named(body.get("parts", []), _PART_KEYS)
+    keys_of = {"parts": _PART_KEYS, "bodies": _BODY_KEYS, "rigid": _RIGID_KEYS}
+    table |= {name: _named(table[name], keys) for name, keys in keys_of.items()}
+    if not scene.has_contact:  # nothing to be said about friction, and nothing to iterate
         del table["law"], table["solver"]
-    if not scene.body_forces:
-        del table["body_forces"]
-    table["parts"] = _named(table["parts"], _PART_KEYS)
     return tomli_w.dumps(_ordered(table, _SCENE_KEYS), multiline_strings=True)
 
 
-AnyScene = TypeVar("AnyScene", bound=Stated)
-
-
 def with_overrides(
-    scene: AnyScene,
+    scene: Scene,
     *,
     elements: int | None = None,
     accuracy: float | None = None,
@@ -262,14 +239,14 @@ def with_overrides(
     degree: int | Literal["hp"] | None = None,
     solver: str | None = None,
     rho: float | None = None,
-) -> AnyScene:
+) -> Scene:
     """Change a scene by the words and numbers of the command line; what is None stays.
 
     Parameters
     ----------
-    scene : Scene or Assembly
+    scene : Scene
     elements : int, optional
-        Of an assembly those of each body, also where bodies have options of their own.
+        Of several bodies those of each, also where bodies have options of their own.
     accuracy : float, optional
         Instead of a number of elements.
     discretisation, solver : str, optional
@@ -309,9 +286,8 @@ def with_overrides(
             changes["solver"] = structure(solver, cast(Any, ContactSolver))
         if rho is not None:
             changes["solver"] = _with_rho(changes.get("solver", scene.solver), rho)
-        if not isinstance(scene, Scene):
-            own: dict[str, Any] = {name: None for name in ("mesh", "discretisation") if name in changes}
-            changes["bodies"] = tuple(replace(body, **own) for body in cast(Any, scene).bodies)
+        own: dict[str, Any] = {name: None for name in ("mesh", "discretisation") if name in changes}
+        changes["bodies"] = tuple(replace(body, **own) for body in scene.bodies)
         return replace(scene, **changes)
     except ValueError as error:
         raise SceneError(printable(str(error))) from error

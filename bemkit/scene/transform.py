@@ -17,7 +17,16 @@ from bemkit.geometry.outline import Outline, Side
 from bemkit.geometry.shapes import CheckedShape, Shape
 from bemkit.geometry.symmetry import Symmetry
 from bemkit.scene.body_forces import BodyForce, Gravity, Heating, Rotation
-from bemkit.scene.conditions import Condition, Contact, Force, Part, Pressure, Region, Traction, with_fields
+from bemkit.scene.conditions import (
+    Condition,
+    Contact,
+    Force,
+    Part,
+    Pressure,
+    Region,
+    Traction,
+    with_fields,
+)
 from bemkit.scene.plane_motion import FarField
 from bemkit.scene.scene import Scene
 
@@ -169,14 +178,15 @@ def transformed_scene(
         Its fields, regions and obstacles are functions, so it cannot be written to a file.
     """
     factor = affine.factor[0] if displacement is None else displacement
-    material = replace(scene.material, youngs_modulus=scene.material.youngs_modulus * modulus)
-    parts = tuple(_transformed_part(part, affine, stress, factor) for part in scene.parts)
+    body = scene.only
+    material = replace(body.material, youngs_modulus=body.material.youngs_modulus * modulus)
+    parts = tuple(_transformed_part(part, affine, stress, factor) for part in body.parts)
     law = TransformedLaw(scene.law, 1.0 / stress, affine) if scene.contact_parts else scene.law
     symmetry = None if scene.symmetry is None else affine.transformed(scene.symmetry)
     forces = tuple(_transformed_body_force(force, affine, stress, modulus) for force in scene.body_forces)
     return replace(
         scene,
-        shape=TransformedShape(scene.shape, affine),
+        shape=TransformedShape(body.shape, affine),
         material=material,
         parts=parts,
         law=law,
@@ -209,8 +219,8 @@ def with_turned_loads(scene: Scene, angle: float) -> Scene:
         match condition:
             case Traction(x, y):
                 return Traction(_combined(x, cosine, y, -sine), _combined(x, sine, y, cosine))
-            case Force():
-                return turned(condition.as_traction())
+            case Force(x, y):
+                return replace(condition, x=cosine * x - sine * y, y=sine * x + cosine * y)
             case Pressure(pressure, shear):  # the load is -pressure n + shear t, and t is n turned by 90 degrees
                 return Pressure(_combined(pressure, cosine, shear, sine), _combined(shear, cosine, pressure, -sine))
         return condition
@@ -276,7 +286,7 @@ def _transformed_condition(condition: Condition, affine: AffineMap, stress: floa
         own = None if condition.law is None else TransformedLaw(condition.law, 1.0 / stress, affine)
         return Contact(TransformedObstacle(condition.obstacle, affine, displacement), own)
     return with_fields(
-        condition.as_traction() if isinstance(condition, Force) else condition,
+        condition,
         lambda load: TransformedField(load, affine, stress),
         lambda motion: TransformedField(motion, affine, displacement),
     )

@@ -15,7 +15,7 @@ from threading import Thread
 from typing import Generic, NamedTuple
 
 from bemkit.errors import CANNOT_BE_SENT, BemkitError, InputError, printable, why_not_sent
-from bemkit.results.solved_problem import AnySolution
+from bemkit.results.solution import Solution
 from bemkit.studies.row_file import R
 
 REFUSED = "refused"
@@ -34,10 +34,10 @@ class StudyError(InputError):
     """A study that cannot begin or cannot go on."""
 
 
-class Attempt(NamedTuple, Generic[AnySolution]):
+class Attempt(NamedTuple):
     """A solution, or why there is none."""
 
-    solution: AnySolution | None
+    solution: Solution | None
     message: str
     seconds: float
 
@@ -52,7 +52,7 @@ class Attempt(NamedTuple, Generic[AnySolution]):
         return self.solution is not None and self.solution.is_converged
 
 
-def attempt(solve: Callable[[], AnySolution]) -> Attempt[AnySolution]:
+def attempt(solve: Callable[[], Solution]) -> Attempt:
     """Solve a scene; errors that bemkit names are answers too."""
     begin = time.perf_counter()
     try:

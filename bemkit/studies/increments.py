@@ -9,7 +9,7 @@ import numpy as np
 
 from bemkit.errors import InputError
 from bemkit.runs.run import run
-from bemkit.scene.steps import Stated
+from bemkit.scene.scene import Scene
 
 
 @dataclass(frozen=True)
@@ -35,12 +35,12 @@ class IncrementErrors:
     tractions: float | None
 
 
-def increment_errors(scene: Stated) -> IncrementErrors:
+def increment_errors(scene: Scene) -> IncrementErrors:
     """Solve a load history as stated and with every increment halved, and compare.
 
     Parameters
     ----------
-    scene : Scene or Assembly
+    scene : Scene
         With steps or load factors, on one mesh.
 
     Returns
@@ -73,7 +73,7 @@ def increment_errors(scene: Stated) -> IncrementErrors:
     )
 
 
-def with_halved_increments(scene: Stated) -> Any:
+def with_halved_increments(scene: Scene) -> Any:
     """Return a load history with twice as many increments, which meets every increment of the first one."""
     given: Any = scene
     if given.steps:

@@ -3,22 +3,19 @@
 from __future__ import annotations
 
 from bemkit.errors import InputError
-from bemkit.results.assembly_solution import AssemblySolution
 from bemkit.results.solution import Solution
 from bemkit.testing.failure import demand
 from bemkit.testing.independent_check import energy_fault, violations_of
 from bemkit.testing.independent_check.verdict import Violations
 
 
-def check_solution(
-    solution: Solution | AssemblySolution, before: Solution | AssemblySolution | None = None
-) -> Violations:
+def check_solution(solution: Solution, before: Solution | None = None) -> Violations:
     """Check a converged solution by its own fields; call it on what your discretisation, body, law or solver returns.
 
     Parameters
     ----------
-    solution : Solution or AssemblySolution
-    before : Solution or AssemblySolution, optional
+    solution : Solution
+    before : Solution, optional
         The end of the load step before, from which slip counts. Without it, the direction of friction is not checked at
         the end of a load history.
 

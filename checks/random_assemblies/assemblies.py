@@ -8,10 +8,10 @@ from dataclasses import replace
 import numpy as np
 
 from bemkit.operators.linear.solvers import Automatic, DenseCholesky, LinearSolverChoice
-from bemkit.scene.assembly import Assembly
 from bemkit.scene.body import Body
 from bemkit.scene.conditions import Part, Pressure, Traction
 from bemkit.scene.mesh_options import MeshOptions
+from bemkit.scene.scene import Scene
 from bemkit.solvers.alm import AugmentedLagrangian
 from bemkit.solvers.base import ContactSolver
 from bemkit.solvers.fallbacks import Fallbacks
@@ -30,7 +30,7 @@ _STREAM, _HISTORIES = 2, 4
 _LINEAR_SOLVERS: tuple[LinearSolverChoice, ...] = (Automatic(), Automatic(), DenseCholesky(), Automatic())
 
 
-def random_assembly(seed: int, index: int) -> RandomCase[Assembly]:
+def random_assembly(seed: int, index: int) -> RandomCase:
     """Draw assembly number `index` of a seed; the same numbers always give the same assembly.
 
     Raises
@@ -43,7 +43,7 @@ def random_assembly(seed: int, index: int) -> RandomCase[Assembly]:
     layout = random_layout(draw, members)
     discretisation = members.discretisation()
     spaces = [discretisation if body.discretisation is None else body.discretisation for body in layout.bodies]
-    assembly = Assembly(
+    assembly = Scene(
         title=f"random assembly {index} of seed {seed}",
         bodies=layout.bodies,
         contacts=layout.contacts,
@@ -82,7 +82,7 @@ def _solver(draw: Draw) -> ContactSolver:
     return draw.one_by_weight(drivers)
 
 
-def _sheared(draw: Draw, assembly: Assembly) -> Assembly | None:
+def _sheared(draw: Draw, assembly: Scene) -> Scene | None:
     """Return the assembly now and then with steps: the loads come, a part is sheared to and fro, the loads go."""
     places = [
         (f'bodies."{body.name}".{found[0]}', found[1])
@@ -95,7 +95,7 @@ def _sheared(draw: Draw, assembly: Assembly) -> Assembly | None:
     return replace(assembly, steps=sheared_steps(draw, *draw.one_of(tuple(places))))
 
 
-def _history(draw: Draw, assembly: Assembly) -> tuple[Assembly, ...]:
+def _history(draw: Draw, assembly: Scene) -> tuple[Scene, ...]:
     """Return the assembly, sometimes followed by one whose loads have changed."""
     if assembly.mesh.accuracy is not None or not draw.chance(0.15):
         return (assembly,)

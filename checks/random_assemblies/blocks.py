@@ -9,8 +9,8 @@ import numpy as np
 from bemkit.contact.obstacle import RigidHalfPlane
 from bemkit.geometry.placement import Placement
 from bemkit.geometry.shapes import Polygon, Rectangle
-from bemkit.scene.assembly import Touching
 from bemkit.scene.conditions import Clamped, Condition, Contact, Part, Pressure, Roller
+from bemkit.scene.contacts import Touching
 from bemkit.scene.copies import CircleCopies, GridCopies
 from checks.random_assemblies.members import Layout, Members, base
 from checks.random_scenes.draw import Draw

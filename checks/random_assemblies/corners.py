@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from bemkit.geometry.placement import Placement
 from bemkit.geometry.shapes import Polygon, Rectangle
-from bemkit.scene.assembly import Touching
+from bemkit.scene.contacts import Touching
 from checks.random_assemblies.members import Layout, Members, base
 from checks.random_scenes.draw import Draw
 

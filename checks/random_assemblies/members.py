@@ -12,10 +12,10 @@ from bemkit.geometry.meshing.discretise import Algebraic, Uniform
 from bemkit.geometry.placement import Placement
 from bemkit.geometry.shapes import Shape
 from bemkit.operators.material import Material, Plane
-from bemkit.scene.assembly import ContactPair, Touching
 from bemkit.scene.body import Body
 from bemkit.scene.body_forces import BodyForce, Gravity, Heating, Rotation
 from bemkit.scene.conditions import Clamped, Contact, Part, PrescribedDisplacement, Pressure, Roller, Traction
+from bemkit.scene.contacts import ContactPair, Touching
 from bemkit.scene.copies import Copies
 from bemkit.scene.discretisation import ConstantCollocation, Discretisation, Galerkin
 from bemkit.scene.mesh_options import MeshOptions

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Generic, TypeVar
+from typing import TypeVar
 
 import numpy as np
 
 from bemkit.arrays import FloatArray
-from bemkit.scene.assembly import Assembly
-from bemkit.scene.load_history import AnyScene
+from bemkit.scene.scene import Scene
 from bemkit.scene.toml import scene_to_toml
 
 T = TypeVar("T")
@@ -55,16 +54,16 @@ class Draw(np.random.Generator):
 
 
 @dataclass(frozen=True)
-class RandomCase(Generic[AnyScene]):
+class RandomCase:
     """Scenes or assemblies that follow each other in time, mostly a single one, and the numbers they were drawn by."""
 
     seed: int
     index: int
-    scenes: tuple[AnyScene, ...]
+    scenes: tuple[Scene, ...]
 
     def files(self) -> dict[str, str]:
         """Return scene files (TOML) by name, one for each scene."""
-        kind = "random-assembly" if isinstance(self.scenes[0], Assembly) else "random"
+        kind = "random-assembly" if self.scenes[0].bodies else "random"
         name = f"{kind}-{self.seed}-{self.index}"
         names = [name] if len(self.scenes) == 1 else [f"{name}-step-{k}" for k in range(1, len(self.scenes) + 1)]
         return {f"{each}.toml": scene_to_toml(scene) for each, scene in zip(names, self.scenes, strict=True)}

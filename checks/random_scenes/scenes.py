@@ -37,7 +37,7 @@ HALF_PLANES = 0.12
 _NEARLY_INCOMPRESSIBLE = (0.45, 0.49, 0.4995, 0.499995, 0.49999995, 0.5, 0.5)
 
 
-def random_case(seed: int, index: int) -> RandomCase[Scene]:
+def random_case(seed: int, index: int) -> RandomCase:
     """Draw scene number `index` of a seed; the same numbers always give the same scene.
 
     Raises

@@ -25,6 +25,7 @@ from checks.trials import (
     try_case,
 )
 from tests.scenes import FLOOR, block
+from tests.solutions import changed
 
 REMEDY = re.compile(
     r"\b(give|use|change|hold|raise|make|check|try|start|allow|choose|remove|restrict|list|subtract|move|keep|press|name|take|leave|describe|let|bring|put)\b"
@@ -52,7 +53,7 @@ def test_random_scenes_end_in_the_right_answer_or_a_named_failure() -> None:
     assert counts[Outcome.SUCCESS] + counts[Outcome.WARNED] >= 3  # a generator of scenes without answers tests nothing
 
 
-def half_planes_among(seed: int, count: int) -> list[RandomCase[bk.Scene]]:
+def half_planes_among(seed: int, count: int) -> list[RandomCase]:
     """Return the half-planes among single bodies; what was drawn and is not a scene is not among them."""
     cases = []
     for index in range(count):
@@ -133,7 +134,7 @@ def solved_block() -> bk.Solution:
 def test_a_wrong_success_is_called_wrong() -> None:
     solution = solved_block()
     assert judge([solution])[0] in (Outcome.SUCCESS, Outcome.WARNED)
-    outcome, reason, message = judge([dataclasses.replace(solution, energy=-solution.energy)])
+    outcome, reason, message = judge([changed(solution, energy=-solution.energy)])
     assert (outcome, reason) == (Outcome.WRONG, "energy")
     assert "negative_energy" in message
 
@@ -162,17 +163,17 @@ def test_round_off_of_a_body_that_only_moves_is_no_missing_work() -> None:
     (step, *_) = bk.run([dataclasses.replace(loop, mesh=bk.MeshOptions(elements=40), steps=loop.steps[:1])])
     assert step.loading is not None
     last = step.loading.steps[-1]
-    size = step.scene.material.plane_modulus * float(np.abs(step.boundary.displacement).max()) ** 2
+    size = step.body.scene.material.plane_modulus * float(np.abs(step.boundary.displacement).max()) ** 2
     for share, is_fault in ((1e-15, False), (1e-11, True)):  # either side of ROUND_OFF
         work = dataclasses.replace(last.work, external_work=share * size, dissipation=0.0, increment_work=0.0)
-        idle = dataclasses.replace(last, work=work, end=dataclasses.replace(step, energy=0.0))
+        idle = dataclasses.replace(last, work=work, end=changed(step, energy=0.0))
         moved = dataclasses.replace(step, loading=dataclasses.replace(step.loading, steps=(idle,)))
         assert ("missing" in energy_fault(moved)) is is_fault
 
 
 def test_fields_of_another_body_are_wrong_unless_the_solution_says_that_it_is_coarse() -> None:
     solution = solved_block()
-    strained = dataclasses.replace(
+    strained = changed(
         solution,
         scene=dataclasses.replace(solution.scene, material=bk.Material(3.0, 0.3)),
         energy=solution.energy,
@@ -186,7 +187,7 @@ def test_fields_of_another_body_are_wrong_unless_the_solution_says_that_it_is_co
 
 
 def test_a_status_is_a_named_failure() -> None:
-    stalled = dataclasses.replace(solved_block(), status=bk.Status.STALLED, energy=-1.0)
+    stalled = changed(solved_block(), status=bk.Status.STALLED, energy=-1.0)
     assert judge([stalled])[:2] == (Outcome.NAMED, "stalled")
 
 

@@ -209,9 +209,9 @@ def slanted(friction_coefficient: float = 0.5, solver: ContactSolver = NEWTON) -
     )
 
 
-def assembled(scene: bk.Scene) -> bk.Assembly:
+def assembled(scene: bk.Scene) -> bk.Scene:
     body = bk.Body(name="body", shape=scene.shape, material=scene.material, parts=scene.parts)
-    return bk.Assembly(title=scene.title, bodies=(body,), law=scene.law, mesh=scene.mesh, solver=scene.solver)
+    return bk.Scene(title=scene.title, bodies=(body,), law=scene.law, mesh=scene.mesh, solver=scene.solver)
 
 
 @pytest.mark.parametrize(

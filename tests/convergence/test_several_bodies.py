@@ -15,7 +15,7 @@ def quadrants(name: str) -> tuple[str, ...]:
     return tuple(f"{name}-{number}" for number in (1, 2, 3, 4))
 
 
-def fit(plane: bk.Plane, pressure: float, heat: float | None = None) -> bk.Assembly:
+def fit(plane: bk.Plane, pressure: float, heat: float | None = None) -> bk.Scene:
     """Ring 0.5 < r < 1 (E = 1, nu = 0.3) in a ring 1 < r < 2 (E = 0.5, nu = 0.2), an interference of 1e-3.
 
     A small arc of the outer boundary is moved as Lame says, so that nothing turns and nothing is added. With `heat` the
@@ -38,7 +38,7 @@ def fit(plane: bk.Plane, pressure: float, heat: float | None = None) -> bk.Assem
                 parts=(bk.Part("fit", bk.Free(), quadrants("inner")), hold)),
     )  # fmt: skip
     pair = bk.ContactPair(("inner.fit", "outer.fit"), gap=-1e-3 if heat is None else 0.0)
-    return bk.Assembly(
+    return bk.Scene(
         title="Shrink fit", bodies=rings, contacts=(pair,), law=bk.Coulomb(0.2), discretisation=bk.Galerkin(8),
         mesh=bk.MeshOptions(elements=32),
     )  # fmt: skip
@@ -81,7 +81,7 @@ def test_pin_in_a_hole_of_an_infinite_sheet(clearance: float, half_angle: float,
         parts=(core, bk.Part("surface", bk.Free(), quadrants("outer"))),
     )  # fmt: skip
     pair, options = bk.ContactPair(("pin.surface", "sheet.hole")), bk.MeshOptions(accuracy=0.005)
-    scene = bk.Assembly(title="Pin", bodies=(sheet, pin), contacts=(pair,), discretisation=bk.Galerkin(2), mesh=options)
+    scene = bk.Scene(title="Pin", bodies=(sheet, pin), contacts=(pair,), discretisation=bk.Galerkin(2), mesh=options)
     solution = bk.run(scene)
     assert solution.is_converged
     (contact,) = solution.contacts
@@ -106,7 +106,7 @@ def test_cylinders_approach_each_other_as_the_closed_form_says() -> None:
     upper = bk.Body(name="upper", shape=bk.Disk(1.0, (0.0, 3.0)), material=material, parts=(top, bottom))
     plate = bk.RigidBody(name="plate", obstacle=bk.RigidHalfPlane((0.0, 4.0), (0.0, -1.0)), force_y=-load)
     solution = bk.run(
-        bk.Assembly(
+        bk.Scene(
             title="Cylinders between plates",
             bodies=(lower, upper),
             rigid=(plate,),
@@ -134,7 +134,7 @@ def test_cylinders_pressed_then_sheared_are_those_of_cattaneo_and_mindlin() -> N
     """Two steps on meshes that fit the sheared state: stick zone, shear and slip at the edge to half a per cent."""
     scene, friction = bk.load_scene("two-cylinders"), 0.5
 
-    def sheared(shift: float, mesh: bk.MeshOptions) -> bk.Assembly:
+    def sheared(shift: float, mesh: bk.MeshOptions) -> bk.Scene:
         upper, lower = scene.bodies
         pushed = replace(upper.parts[0], condition=bk.PrescribedDisplacement(shift, -0.0022))
         bodies = (replace(upper, parts=(pushed, *upper.parts[1:])), lower)
@@ -180,7 +180,7 @@ def test_two_sides_of_one_body_touch_as_its_half_touches_a_wall() -> None:
         parts=(wall, press, bk.Part("push", bk.Pressure(0.02), ("bottom",), bk.Expression("x > 1"))),
     )  # fmt: skip
     pair = bk.ContactPair(("clamp.lower", "clamp.upper"))
-    solution = bk.run(bk.Assembly(title="Slot", bodies=(whole,), contacts=(pair,), discretisation=bk.Galerkin(2)))
+    solution = bk.run(bk.Scene(title="Slot", bodies=(whole,), contacts=(pair,), discretisation=bk.Galerkin(2)))
     half = bk.Scene(
         title="Half of it", material=material, mesh=bk.MeshOptions(elements=70), discretisation=bk.Galerkin(2),
         shape=bk.Polygon(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from bemkit import Assembly, Body, ContactPair, Placement, RigidBody, Touching, scene_from_toml
+from bemkit import Body, ContactPair, Placement, RigidBody, Scene, Touching, scene_from_toml
 from bemkit.model.prepared import prepare_steps
 from bemkit.scene import registry as kinds
 from bemkit.scene.toml import SceneError
@@ -19,7 +19,6 @@ EXAMPLES = [
     if language == "toml"
 ]
 TABLES = {
-    "The assembly": Assembly,
     "Bodies": Body,
     "Placement": Placement,
     "Contacts": ContactPair,
@@ -31,7 +30,7 @@ TABLES = {
 @pytest.mark.parametrize("text", [content for content, error in EXAMPLES if not error])
 def test_every_example_can_be_prepared(text: str) -> None:
     scene = scene_from_toml(text)
-    assert isinstance(scene, Assembly)
+    assert isinstance(scene, Scene)
     assert prepare_steps([scene])[0].n_contact > 0
 
 

@@ -422,14 +422,14 @@ def test_the_estimated_error_is_that_of_the_part_with_an_error(n_elements: int) 
         mesh = mesh.refined(np.arange(mesh.n_elements))
     coarse, fine = make_space(solution.mesh), make_space(mesh)
     points, own = dof_points(fine), np.arange(mesh.n_elements)
-    assert solution.particular is not None
+    assert solution.body.particular is not None
     exact = np.column_stack([0.0 * points[:, 0], -(points[:, 1] - 0.5 * points[:, 1] ** 2) / oedometric(MATERIAL)])
     error = np.zeros_like(exact)
-    at_nodes = solution.map_boundary.displacement[coarse.element_dofs[own // 8]]
+    at_nodes = solution.body.map_boundary.displacement[coarse.element_dofs[own // 8]]
     places = (2.0 * (own % 8)[:, None] + 1.0 + fine.local_nodes) / 8.0 - 1.0
     for local, dofs in enumerate(fine.element_dofs.T):
         inherited = np.einsum("pe,epc->ec", coarse.basis(places[:, local]), at_nodes)
-        error[dofs] = exact[dofs] - solution.particular.displacement(points[dofs]) - inherited
+        error[dofs] = exact[dofs] - solution.body.particular.displacement(points[dofs]) - inherited
     stiffness = SteklovPoincareOperator(GalerkinElasticity(mesh, MATERIAL, fine)).matrix()
     true = np.sqrt(error.ravel() @ stiffness @ error.ravel() * 3.0 * oedometric(MATERIAL))
     assert solution.estimated_error is not None

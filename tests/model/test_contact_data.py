@@ -42,7 +42,7 @@ def block(
 
 def contact_of(scene: bk.Scene) -> Any:
     mesh = scene.build_mesh()
-    return find_contact(scene, mesh, scene.discretisation.displacement_space(mesh.unit))
+    return find_contact(scene.only, mesh, scene.discretisation.displacement_space(mesh.unit))
 
 
 FLOOR_PART = bk.Part("floor", bk.Contact(FLOOR), sides=("bottom",))

@@ -23,10 +23,10 @@ def square(bottom: float) -> bk.RigidPolygon:
     return bk.RigidPolygon(((-0.8, bottom), (0.8, bottom), (0.8, 1.0), (-0.8, 1.0)))
 
 
-def pressed(obstacle: bk.Obstacle, law: bk.FrictionLaw, **motion: float) -> bk.Assembly:
+def pressed(obstacle: bk.Obstacle, law: bk.FrictionLaw, **motion: float) -> bk.Scene:
     """Return a rigid body above a block."""
     punch = bk.RigidBody(name="punch", obstacle=obstacle, centre=(0.0, 0.0), **motion)
-    return bk.Assembly(
+    return bk.Scene(
         title="Pressed",
         bodies=(BLOCK,),
         rigid=(punch,),
@@ -37,7 +37,7 @@ def pressed(obstacle: bk.Obstacle, law: bk.FrictionLaw, **motion: float) -> bk.A
     )
 
 
-def on_block(shape: bk.Shape, sides: tuple[str, ...], held: tuple[str, ...], drag: float) -> bk.Assembly:
+def on_block(shape: bk.Shape, sides: tuple[str, ...], held: tuple[str, ...], drag: float) -> bk.Scene:
     """Return an elastic body that is pressed onto a block and dragged."""
     upper = bk.Body(
         name="upper",
@@ -52,7 +52,7 @@ def on_block(shape: bk.Shape, sides: tuple[str, ...], held: tuple[str, ...], dra
     return replace(pressed(square(0.0), bk.Frictionless(), x=0.0), bodies=(BLOCK, upper), rigid=(), contacts=(contact,))
 
 
-def refused(assembly: bk.Assembly) -> None:
+def refused(assembly: bk.Scene) -> None:
     solution = bk.run(assembly)
     assert solution.status is bk.Status.FINITE_SLIDING, solution.message
     assert "draw the bodies where they come to rest" in solution.message

@@ -16,7 +16,7 @@ LOWER = bk.Polygon(
 )
 
 
-def blocks(left: float = 0.3, interference: float = 0.0) -> bk.Assembly:
+def blocks(left: float = 0.3, interference: float = 0.0) -> bk.Scene:
     """A block on a block with a step, into which it reaches by 0.3 beside their contact."""
     lower = bk.Body(name="lower", shape=LOWER, material=STEEL, parts=(bk.Part("base", bk.Clamped(), ("bottom",)),))
     upper = bk.Body(
@@ -26,7 +26,7 @@ def blocks(left: float = 0.3, interference: float = 0.0) -> bk.Assembly:
         parts=(bk.Part("load", bk.Traction(0.0, -0.01), ("top",)),),
     )
     pair = bk.ContactPair(("upper.bottom", "lower.top"), interference=interference)
-    return bk.Assembly(
+    return bk.Scene(
         title="blocks", bodies=(lower, upper), contacts=(pair,), law=bk.Coulomb(0.3), mesh=bk.MeshOptions(elements=40)
     )
 
@@ -37,7 +37,7 @@ def test_blocks_that_overlap_beside_their_contact_are_refused() -> None:
 
 
 @pytest.mark.parametrize("scene", [blocks(-0.1), blocks(interference=0.21)])
-def test_blocks_that_stay_apart_or_are_meant_to_overlap_are_solved(scene: bk.Assembly) -> None:
+def test_blocks_that_stay_apart_or_are_meant_to_overlap_are_solved(scene: bk.Scene) -> None:
     assert bk.run(scene).is_certified
 
 
@@ -51,7 +51,7 @@ def test_a_rigid_body_inside_of_a_body_beside_their_contact_is_refused() -> None
     )
     vertices = ((1.5, 1.0), (2.5, 1.0), (2.5, 0.6), (1.9, 0.6))
     punch = bk.RigidBody(name="punch", obstacle=bk.RigidPolygon(vertices), centre=(2.0, 1.0), y=-1e-3)
-    scene = bk.Assembly(
+    scene = bk.Scene(
         title="punch", bodies=(block,), rigid=(punch,), contacts=(bk.ContactPair(("block.left", "punch")),),
         law=bk.Frictionless(), discretisation=bk.Galerkin(1),
     )  # fmt: skip

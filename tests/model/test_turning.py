@@ -20,7 +20,7 @@ ROCK = bk.Body(
 OUTSIDE = bk.Part("out", bk.Free(), sides=tuple(f"outer-{k}" for k in range(1, 5)))
 
 
-def tunnel(inside: bk.Condition, **options: object) -> bk.Assembly:
+def tunnel(inside: bk.Condition, **options: object) -> bk.Scene:
     """A ring in a hole of the plane, under a load from inside."""
     part = bk.Part("in", inside, sides=tuple(f"inner-{k}" for k in range(1, 5)))
     lining = bk.Body(
@@ -28,7 +28,7 @@ def tunnel(inside: bk.Condition, **options: object) -> bk.Assembly:
     )
     settings: dict[str, object] = {"discretisation": bk.Galerkin(1), "law": bk.Frictionless(), **options}
     contacts = (bk.ContactPair(("rock.wall", "lining.out")),)
-    return bk.Assembly(title="tunnel", bodies=(ROCK, lining), contacts=contacts, **settings)  # type: ignore[arg-type]
+    return bk.Scene(title="tunnel", bodies=(ROCK, lining), contacts=contacts, **settings)  # type: ignore[arg-type]
 
 
 TWISTED = tunnel(bk.Pressure(1.0, 0.1))
@@ -69,7 +69,7 @@ def test_bodies_that_friction_joins_turn_together() -> None:
     ],
     ids=["no moment", "friction", "pushed", "clamped"],
 )
-def test_what_does_not_turn_is_solved(held: bk.Assembly) -> None:
+def test_what_does_not_turn_is_solved(held: bk.Scene) -> None:
     assert bk.run(held).is_converged
 
 
@@ -85,7 +85,7 @@ def test_corners_keep_a_body_from_turning() -> None:
     loads = bk.Part("push", bk.Traction(0.0, bk.Expression("-1 - x")), sides=("top",))
     block = bk.Body(name="block", shape=square, material=STEEL, parts=(loads,), mesh=bk.MeshOptions(16))
     contacts = (bk.ContactPair(("block.bottom", "base.top")),)
-    assembly = bk.Assembly(title="block", bodies=(base, block), contacts=contacts, discretisation=bk.Galerkin(1))
+    assembly = bk.Scene(title="block", bodies=(base, block), contacts=contacts, discretisation=bk.Galerkin(1))
     assert bk.run(assembly).is_converged
 
 

@@ -151,7 +151,7 @@ def test_teeth_of_a_small_body_do_not_cross_it() -> None:
     cube = bk.Body(
         name="cube", shape=bk.Rectangle(1.0, 1.0), material=steel, parts=(load,), placement=bk.Placement((9.0, 10.0))
     )
-    scene = bk.Assembly(
+    scene = bk.Scene(
         title="A small cube on a large block",
         bodies=(block, cube),
         contacts=(bk.ContactPair(("cube.bottom", "block.top")),),

@@ -22,6 +22,7 @@ from bemkit.scene.plane_motion import FarField
 from bemkit.scene.toml import load_scene, with_overrides
 from bemkit.scene.unit_names import UnitNames
 from tests.slow import slow_except
+from tests.solutions import changed
 
 STEEL = bk.Material(1.0, 0.3)
 INNER = tuple(f"inner-{number}" for number in (1, 2, 3, 4))
@@ -217,7 +218,7 @@ def test_displacements_at_nodes_are_those_of_a_linear_field(solution: Solution) 
     points, centres = solution.boundary.points, solution.boundary.centres
     gradient = np.array([[0.5, -2.0], [3.0, 0.25]])
     linear = BoundaryFields(points.copy(), points @ gradient, centres.copy(), np.zeros_like(centres))
-    (body,) = shown(dataclasses.replace(solution, boundary=linear)).bodies
+    (body,) = shown(changed(solution, boundary=linear)).bodies
     before, after = solution.mesh.node_elements.T
     is_corner = np.sum(solution.mesh.tangents[before] * solution.mesh.tangents[after], axis=1) < 0.5
     assert is_corner.sum() == 4

@@ -23,7 +23,7 @@ def moved(shapes: tuple[bk.Shape, bk.Shape], placement: bk.Placement, motion: tu
         for name, shape, where in zip("ab", shapes, placements, strict=True)
     )
     first, second = (
-        shown(bk.Assembly(title="two", bodies=bodies, contacts=(), touching=bk.Touching(0.2), law=bk.Coulomb(0.3)))
+        shown(bk.Scene(title="two", bodies=bodies, contacts=(), touching=bk.Touching(0.2), law=bk.Coulomb(0.3)))
     ).bodies
     displacement = np.broadcast_to(np.array(motion), second.displacement.shape)
     pair = (first, replace(second, displacement=displacement))

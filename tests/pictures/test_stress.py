@@ -25,7 +25,7 @@ MATERIALS = bk.Material(100.0, 0.3), bk.Material(100.0, 0.5)
 
 
 def points_of(solution: bk.Solution) -> StressMesh:
-    return stress_mesh(solution, 0.1, shown(solution).frame)
+    return stress_mesh(solution.body, 0.1, shown(solution).frame)
 
 
 def test_points_stay_as_far_from_short_elements_as_a_picture_shows() -> None:
@@ -33,7 +33,7 @@ def test_points_stay_as_far_from_short_elements_as_a_picture_shows() -> None:
     solution = bk.run(scene)
     spacing = 20.0 * float(solution.mesh.lengths.max())
     low, high = solution.mesh.nodes.min(axis=0), solution.mesh.nodes.max(axis=0)
-    found = stress_mesh(solution, spacing, shown(solution).frame).points
+    found = stress_mesh(solution.body, spacing, shown(solution).frame).points
     distance = np.minimum(found - low, high - found).min(axis=1)
     inner = distance > 1e-9
     assert inner.sum() > 20
@@ -46,7 +46,7 @@ def test_beside_constant_elements_stresses_have_no_kinks() -> None:
     true = bk.run(
         replace(scene, discretisation=bk.Galerkin(2), mesh=bk.MeshOptions(rising_degrees=True, accuracy=1e-4))
     )
-    found = stress_mesh(bk.run(scene), 0.02, shown(true).frame)
+    found = stress_mesh(bk.run(scene).body, 0.02, shown(true).frame)
     x, y = found.points.T
     beside = (x > 0.9) & (x < 0.999) & (y > 0.1) & (y < 0.9)
     assert beside.sum() > 100

@@ -18,6 +18,7 @@ from bemkit.geometry.shapes import Disk, Rectangle
 from bemkit.operators.material import Material
 from bemkit.operators.steklov_poincare.needs import physical_memory
 from bemkit.plan import Plan, TooLargeError, check_elements, check_memory, make_plan
+from bemkit.scene.body_scene import BodyScene
 from bemkit.scene.conditions import Clamped, Condition, Contact, Part, PrescribedDisplacement, Roller
 from bemkit.scene.mesh_options import MeshOptions
 from bemkit.scene.scene import Scene
@@ -238,13 +239,13 @@ def test_a_million_elements_are_refused_before_the_mesh_is_made(
     command: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     built: list[int | None] = []
-    divided = bk.Scene.divided
+    divided = BodyScene.divided
 
-    def watched(scene: bk.Scene, contact: Sequence[str]) -> bk.BoundaryMesh:
+    def watched(scene: BodyScene, contact: Sequence[str]) -> bk.BoundaryMesh:
         built.append(scene.mesh.elements)
         return divided(scene, contact)
 
-    monkeypatch.setattr(bk.Scene, "divided", watched)
+    monkeypatch.setattr(BodyScene, "divided", watched)
     with pytest.raises(SystemExit, match="2"):
         main([command, "paper-1", "--elements", "1000000", "--degree", "3"])
     message = r"1000000 elements need about \S+ GB, there are \S+ GB: use at most \d+ elements"

@@ -13,9 +13,10 @@ import pytest
 
 import bemkit as bk
 from bemkit.results import between_bodies
-from bemkit.results.assembly_solution import AssemblySolution, SideName
 from bemkit.results.between_nodes import BetweenNodes
 from bemkit.results.result_file import read_result, write_result
+from bemkit.results.solution import Solution
+from bemkit.results.solved_body import SideName
 from bemkit.results.tables import to_json
 from bemkit.results.warnings import LARGEST_PENETRATION, find_warnings
 from tests.runs.test_assembly import SHEAR, patch
@@ -24,20 +25,20 @@ from tests.slow import slow_except
 DEPTH, RISE = 1e-3, 0.3
 
 
-def measured(solution: AssemblySolution | bk.Solution) -> BetweenNodes:
+def measured(solution: Solution | bk.Solution) -> BetweenNodes:
     assert solution.between_nodes is not None
     return solution.between_nodes
 
 
 @pytest.fixture(scope="module")
-def pressed() -> AssemblySolution:
+def pressed() -> Solution:
     """Two quadratic blocks whose meshes do not match, under a pressure of one and a shear."""
     solution = bk.run(patch(2))
     assert solution.is_converged
     return solution
 
 
-def changed(solution: AssemblySolution, body: str, displacement: float = 0.0, normal: float = 0.0) -> BetweenNodes:
+def changed(solution: Solution, body: str, displacement: float = 0.0, normal: float = 0.0) -> BetweenNodes:
     """Raise the first node of a contact element of a body, or tilt the normal tractions there around their mean."""
     own = solution.bodies[body]
     element = int(own.mesh.part({"upper": "bottom", "lower": "top"}[body])[2])
@@ -61,7 +62,7 @@ def test_uniform_contact_is_perfect_between_the_nodes_too(degree: int, turn: flo
 
 
 @pytest.mark.parametrize(("body", "sign"), [("upper", -1.0), ("lower", 1.0)])
-def test_a_node_of_either_side_is_seen_to_penetrate(pressed: AssemblySolution, body: str, sign: float) -> None:
+def test_a_node_of_either_side_is_seen_to_penetrate(pressed: Solution, body: str, sign: float) -> None:
     found = changed(pressed, body, sign * DEPTH)
     assert found.penetration_depth == pytest.approx(DEPTH, rel=1e-9)  # at an end of a piece
     force = np.hypot(1.0, SHEAR)  # of the tractions on a width of one
@@ -74,7 +75,7 @@ def test_a_node_of_either_side_is_seen_to_penetrate(pressed: AssemblySolution, b
 
 
 @pytest.mark.parametrize("body", ["upper", "lower"])
-def test_tension_on_either_side_is_seen(pressed: AssemblySolution, body: str) -> None:
+def test_tension_on_either_side_is_seen(pressed: Solution, body: str) -> None:
     assert changed(pressed, body).tension == 0.0
     size = np.hypot(1.0, SHEAR)
     assert changed(pressed, body, normal=1.0 + RISE).tension == pytest.approx(RISE / size, rel=1e-8)
@@ -111,9 +112,9 @@ def test_pairs_that_are_copies_of_each_other_are_measured_as_if_alone(
         assert one == pytest.approx(other, abs=1e-12)  # round-off of coordinates of ten
 
 
-def test_a_light_contact_is_not_judged_by_a_heavy_one(pressed: AssemblySolution) -> None:
+def test_a_light_contact_is_not_judged_by_a_heavy_one(pressed: Solution) -> None:
     """The same pair once more, a hundred times less loaded: the same depth is a hundred times worse."""
-    base, aside = pressed.assembly, bk.Placement((5.0, 0.0))
+    base, aside = pressed.scene, bk.Placement((5.0, 0.0))
     weak = [
         replace(body, name=f"weak {body.name}", placement=aside.after(body.placement), parts=body.parts[-2:])
         for body in base.bodies
@@ -136,13 +137,13 @@ def test_a_light_contact_is_not_judged_by_a_heavy_one(pressed: AssemblySolution)
     ((strong_name, strong_sides),) = pressed.contact_sides.items()
     weak_sides = tuple(SideName(f"weak {side.body}", side.part) for side in strong_sides)
     sides = {strong_name: strong_sides, pair.name: weak_sides}
-    merged = replace(pressed, assembly=assembly, contact=both, bodies=bodies, contact_sides=sides)
+    merged = replace(pressed, scene=assembly, contact=both, bodies=bodies, contact_sides=sides)
     found = merged.contacts_between_nodes
     strong, light = (found[each.name].penetration for each in assembly.contacts)
     assert light == pytest.approx(100.0 * strong, rel=1e-12)
 
 
-def test_a_contact_without_forces_is_measured_by_what_its_own_bodies_move(pressed: AssemblySolution) -> None:
+def test_a_contact_without_forces_is_measured_by_what_its_own_bodies_move(pressed: Solution) -> None:
     """A third body, which touches nothing, is carried a million times as far."""
     far, own = replace(pressed.bodies["upper"], name="far"), pressed.bodies["upper"].boundary
     bodies = {**pressed.bodies, "far": replace(far, boundary=replace(own, displacement=1e6 + own.displacement))}
@@ -155,9 +156,7 @@ def test_a_contact_without_forces_is_measured_by_what_its_own_bodies_move(presse
 def test_a_contact_with_a_rigid_obstacle_is_that_of_one_body() -> None:
     scene = replace(bk.load_scene("paper-1"), discretisation=bk.Galerkin(2), mesh=bk.MeshOptions(elements=40))
     body = bk.Body(name="square", shape=scene.shape, material=scene.material, parts=scene.parts)
-    assembly = bk.Assembly(
-        title="x", bodies=(body,), law=scene.law, discretisation=scene.discretisation, mesh=scene.mesh
-    )
+    assembly = bk.Scene(title="x", bodies=(body,), law=scene.law, discretisation=scene.discretisation, mesh=scene.mesh)
     alone, one_of_one = bk.run(scene), bk.run(assembly)
     assert measured(alone).worst > 1e-3  # there is something to compare
     for name, value in measured(alone).as_dict().items():
@@ -174,7 +173,7 @@ def test_an_obstacle_that_moves_is_measured_where_it_is() -> None:
     )
     disc = bk.RigidBody(name="disc", obstacle=bk.RigidCircle((1.0, 2.0), 1.0), centre=(1.0, 2.0), x=0.0, turn=0.0)
     pair = bk.ContactPair(("block.top", "disc"))
-    pressed = bk.Assembly(
+    pressed = bk.Scene(
         title="x", bodies=(block,), rigid=(replace(disc, y=-0.01),), contacts=(pair,), discretisation=bk.Galerkin(2)
     )
     gap = replace(pressed, rigid=(replace(disc, y=0.0),), contacts=(replace(pair, gap=-0.01),))
@@ -187,7 +186,7 @@ def test_an_obstacle_that_moves_is_measured_where_it_is() -> None:
     assert deeper.penetration_depth == pytest.approx(0.01, rel=0.02)
 
 
-def coarse_disc(elements: int) -> bk.Assembly:
+def coarse_disc(elements: int) -> bk.Scene:
     """A disc of constant elements between a plate that is clamped and one that comes down: it touches at two points."""
     common = {"material": bk.Material(1.0, 0.3), "mesh": bk.MeshOptions(elements=40)}
     plate = bk.Rectangle(2.0, 1.0)
@@ -202,7 +201,7 @@ def coarse_disc(elements: int) -> bk.Assembly:
         parts=halves,
         mesh=bk.MeshOptions(elements=elements),
     )
-    return bk.Assembly(
+    return bk.Scene(
         title="x",
         bodies=(low, high, disc),
         contacts=(bk.ContactPair(("low.top", "disc.down")), bk.ContactPair(("disc.up", "high.bottom"))),
@@ -268,7 +267,7 @@ def test_results_and_files_say_it(tmp_path: Path) -> None:
     assert measured(again).as_dict() == expected
 
 
-def test_what_is_not_finite_is_nan(pressed: AssemblySolution) -> None:
+def test_what_is_not_finite_is_nan(pressed: Solution) -> None:
     own = pressed.bodies["upper"]
     lost = replace(own.boundary, displacement=np.full_like(own.boundary.displacement, np.inf))
     bodies = {**pressed.bodies, "upper": replace(own, boundary=lost)}

@@ -65,7 +65,7 @@ def test_at_a_corner_each_side_has_its_own_stress() -> None:
     node = mesh.elements[mesh.part(part)[0], 0]
     corner = mesh.nodes[[node]]
     before, after = (
-        solution.boundary_stress.at(mesh.node_elements[[node], k], np.array([at]))[0, 0]
+        solution.body.boundary_stress.at(mesh.node_elements[[node], k], np.array([at]))[0, 0]
         for k, at in ((0, 1.0), (1, -1.0))
     )
     np.testing.assert_allclose(solution.stress(corner)[0], 0.5 * (before + after), rtol=1e-12)

@@ -15,8 +15,8 @@ import bemkit as bk
 from bemkit.atomic_files import OutputFileError
 from bemkit.cli.main import main
 from bemkit.pictures.shown import shown
-from bemkit.results.assembly_solution import AssemblySolution
 from bemkit.results.export import FORMATS, boundary_arrays, export_result
+from bemkit.results.solution import Solution
 from bemkit.results.stress_measures import STRESSES
 from bemkit.results.stress_mesh import stress_mesh
 from bemkit.scene.toml import with_overrides
@@ -30,7 +30,7 @@ def solution() -> bk.Solution:
 
 
 @pytest.fixture(scope="module")
-def bodies() -> AssemblySolution:
+def bodies() -> Solution:
     return bk.run(with_overrides(bk.load_scene("two-cylinders"), elements=40))
 
 
@@ -51,7 +51,7 @@ def test_every_ending_writes_and_replaces_its_own(
     assert [file.name for file in tmp_path.iterdir()] == [path.name]
 
 
-def test_numpy_reads_the_arrays(bodies: AssemblySolution, tmp_path: Path) -> None:
+def test_numpy_reads_the_arrays(bodies: Solution, tmp_path: Path) -> None:
     export_result(tmp_path / "r.npz", bodies)
     with np.load(tmp_path / "r.npz") as arrays:
         assert set(arrays) == set(boundary_arrays(bodies))
@@ -128,7 +128,7 @@ def test_triangles_end_at_the_boundary_and_hold_the_largest_stress(is_biaxial: b
     assert mesh.point_data["von_mises"].max() == pytest.approx(largest, rel=1e-6)
     # the picture draws the same triangles and values
     size = np.ptp(solution.mesh.whole.nodes, axis=0).max()
-    drawn = stress_mesh(solution, float(size) / 48, shown(solution).frame)
+    drawn = stress_mesh(solution.body, float(size) / 48, shown(solution).frame)
     triangles = next(block.data for block in mesh.cells if block.type == "triangle")
     used = mesh.point_data["von_mises"][-len(drawn.points) :]
     np.testing.assert_allclose(used, STRESSES["von-mises"].of(drawn.stress, scene.material), rtol=1e-9)
@@ -142,7 +142,7 @@ def test_triangles_end_at_the_boundary_and_hold_the_largest_stress(is_biaxial: b
 @pytest.mark.parametrize("name", ["pin-in-plate", "clamped-angle", "two-cylinders"])
 def test_triangles_fill_every_body(name: str) -> None:
     solution = bk.run(bk.load_scene(name))
-    for body in solution.solved_bodies:
+    for body in solution.bodies.values():
         filled = stress_mesh(body, 0.05 * body.mesh.diameter, shown(solution).frame)
         corners = filled.points[filled.triangles]
         first, second = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
@@ -173,7 +173,7 @@ def test_the_command_line_goes_by_the_ending(capsys: pytest.CaptureFixture[str])
 
 
 @pytest.mark.parametrize("ending", [".vtu", ".vtp"])
-def test_pyvista_reads_named_fields_on_the_same_cells(ending: str, bodies: AssemblySolution, tmp_path: Path) -> None:
+def test_pyvista_reads_named_fields_on_the_same_cells(ending: str, bodies: Solution, tmp_path: Path) -> None:
     pyvista = pytest.importorskip("pyvista")
     export_result(tmp_path / f"r{ending}", bodies, inside=9)
     data = pyvista.read(tmp_path / f"r{ending}")
@@ -192,7 +192,7 @@ def test_pyvista_reads_named_fields_on_the_same_cells(ending: str, bodies: Assem
     assert np.isfinite(data.point_data["von_mises"][square.point_ids]).all()
 
 
-def test_polygonal_data_hold_the_arrays_of_the_grid(bodies: AssemblySolution, tmp_path: Path) -> None:
+def test_polygonal_data_hold_the_arrays_of_the_grid(bodies: Solution, tmp_path: Path) -> None:
     """Read by nothing but the standard library: the number of bytes and the data, in base64."""
     arrays = []
     for ending in (".vtu", ".vtp"):

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import bemkit as bk
-from bemkit.results.assembly_solution import AssemblySolution
+from bemkit.results.solution import Solution
 from bemkit.results.wedge import HELD, JoinedWedge, WedgeSide, joined_exponent
 from bemkit.solvers.active_sets import NodeStatus
 from tests.slow import slow_except
@@ -20,7 +20,7 @@ RIGHT = round(0.5 * math.pi, 6)
 PUNCH, PLANE = JoinedWedge(RIGHT, MATERIAL.kappa, 1.0), JoinedWedge(math.pi, MATERIAL.kappa, 1.0)
 
 
-def pressed(friction: float, *, softness: float = 1.0, width: float = 4.0) -> bk.Assembly:
+def pressed(friction: float, *, softness: float = 1.0, width: float = 4.0) -> bk.Scene:
     """A punch of width 1 on a block; on one of the same width both sides end together."""
     base, table = bk.Part("base", bk.Clamped(), ("bottom",)), bk.Part("table", bk.Free(), ("top",))
     foot, load = bk.Part("foot", bk.Free(), ("bottom",)), bk.Part("load", bk.Traction(y=-1e-3), ("top",))
@@ -32,7 +32,7 @@ def pressed(friction: float, *, softness: float = 1.0, width: float = 4.0) -> bk
     )
     pair = bk.ContactPair(("punch.foot", "block.table"))
     mesh = bk.MeshOptions(elements=40)
-    return bk.Assembly(
+    return bk.Scene(
         title="punch",
         bodies=bodies,
         contacts=(pair,),
@@ -43,10 +43,10 @@ def pressed(friction: float, *, softness: float = 1.0, width: float = 4.0) -> bk
 
 
 @lru_cache
-def solved(friction: float, accuracy: float) -> AssemblySolution:
+def solved(friction: float, accuracy: float) -> Solution:
     mesh = bk.MeshOptions(accuracy=accuracy, rising_degrees=True)
     scene = replace(pressed(friction), discretisation=bk.Galerkin(2), mesh=mesh)
-    solution: AssemblySolution = bk.run(scene)
+    solution: Solution = bk.run(scene)
     return solution
 
 
@@ -61,13 +61,13 @@ def test_the_accuracy_is_reached_and_both_corners_are_named(
     assert solution.estimated_traction_error <= accuracy
     expected = joined_exponent(PUNCH, PLANE, contact)
     for name, partner in (("block", "punch"), ("punch", "block")):
-        corners = solution.singular_corners[name]
+        corners = solution.places.corners[name]
         assert [(corner.x, corner.y, corner.partner) for corner in corners] == [(-0.5, 0, partner), (0.5, 0, partner)]
         assert [corner.exponent for corner in corners] == pytest.approx(
             [expected, expected], abs=1e-6
         )  # of the angles' digits
         left_out = np.concatenate([corner.elements for corner in corners])
-        assert not np.isin(left_out, solution.contact_elements(name)).any()
+        assert not np.isin(left_out, solution.places.elements(name)).any()
         assert np.abs(np.abs(solution.bodies[name].mesh.centres[left_out, 0]) - 0.5).max() < 5e-3
     assert any("singular at (-0.5, 0)" in str(warning) for warning in solution.warnings)
 
@@ -90,10 +90,10 @@ def test_below_it_the_slip_zone_has_a_length_that_settles() -> None:
 def test_sides_that_end_together_have_corners_if_their_materials_differ() -> None:
     """Equal ones are one body with a straight side."""
     same, softer = (bk.run(pressed(2.0, softness=softness, width=1.0)) for softness in (1.0, 0.1))
-    assert same.singular_corners == {"block": (), "punch": ()}
+    assert same.singular_corners == ()
     soft = replace(PUNCH, stiffness=0.1)
     expected = joined_exponent(soft, replace(PUNCH, stiffness=1.0), HELD)
     assert expected is not None
     for name in ("block", "punch"):
-        found = [(corner.x, corner.exponent) for corner in softer.singular_corners[name]]
+        found = [(corner.x, corner.exponent) for corner in softer.places.corners[name]]
         assert sorted(found) == [(-0.5, pytest.approx(expected)), (0.5, pytest.approx(expected))]

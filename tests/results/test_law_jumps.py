@@ -10,7 +10,7 @@ import bemkit as bk
 from tests.scenes import paper
 
 
-def warned(coefficient: bk.Expression, scene: bk.Scene | bk.Assembly) -> list[str]:
+def warned(coefficient: bk.Expression, scene: bk.Scene | bk.Scene) -> list[str]:
     solution = bk.run(replace(scene, law=bk.Coulomb(coefficient)))
     return [str(each) for each in solution.warnings if each.kind == "jump of friction"]
 

@@ -98,7 +98,7 @@ def test_a_rigid_body_that_meets_no_node_ends_by_name(approach: float) -> None:
     ball = bk.RigidBody(name="ball", obstacle=bk.RigidCircle((0.013, 1.0), 1.0), centre=(0.013, 1.0), y=-approach)
     contact = bk.ContactPair(("block.top", "ball"))
     solution = bk.run(
-        bk.Assembly(
+        bk.Scene(
             title="ball", bodies=(block,), rigid=(ball,), contacts=(contact,), law=bk.Frictionless(),
             discretisation=bk.Galerkin(1),
         )
@@ -159,7 +159,7 @@ def test_sides_with_a_force_that_touch_nowhere_end_by_name(approach: float) -> N
     )
     pair = bk.ContactPair(("disc.arc", "block.top"))
     solution = bk.run(
-        bk.Assembly(
+        bk.Scene(
             title="disc", bodies=(block, disc), contacts=(pair,), law=bk.Frictionless(), discretisation=bk.Galerkin(1)
         )
     )

@@ -7,7 +7,6 @@ from dataclasses import replace
 import pytest
 
 import bemkit as bk
-from bemkit.results.assembly_solution import AssemblySolution
 
 CYLINDER = bk.RigidCircle((0.5, -1.0), 1.0)
 
@@ -28,7 +27,7 @@ def block(x: float, obstacle: bk.Obstacle = CYLINDER) -> bk.Scene:
     )
 
 
-def doubts(solution: bk.Solution | AssemblySolution) -> list[str]:
+def doubts(solution: bk.Solution) -> list[str]:
     return [sentence for sentence in map(str, solution.warnings) if "moves so far" in sentence]
 
 
@@ -62,7 +61,7 @@ def test_bodies_of_an_assembly_are_judged_where_they_are_placed() -> None:
         parts=(bk.Part("end", bk.Clamped(), ("right",)),),
     )  # fmt: skip
     pair = bk.ContactPair(("block.right", "lid.left"), gap=1.0)
-    assembly = bk.Assembly(
+    assembly = bk.Scene(
         title="Block on a cylinder", bodies=(placed, lid), contacts=(pair,), law=scene.law, mesh=scene.mesh
     )
     solution = bk.run(assembly)

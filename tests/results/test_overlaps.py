@@ -9,7 +9,7 @@ import bemkit as bk
 STEEL = bk.Material(1.0, 0.3)
 
 
-def blocks(push: float, gap: float, *, in_contact: bool) -> bk.Assembly:
+def blocks(push: float, gap: float, *, in_contact: bool) -> bk.Scene:
     """Two blocks on their base, beside each other; the left one is pushed to the right one."""
     mesh = bk.MeshOptions(elements=32)
     left = bk.Body(
@@ -30,7 +30,7 @@ def blocks(push: float, gap: float, *, in_contact: bool) -> bk.Assembly:
     contacts = (bk.ContactPair(("left.top", "floor")),)
     if in_contact:
         contacts += (bk.ContactPair(("left.right", "right.left")),)
-    return bk.Assembly(
+    return bk.Scene(
         title="blocks", bodies=(left, right), contacts=contacts, rigid=(floor,), law=bk.Frictionless(),
         discretisation=bk.Galerkin(1),
     )  # fmt: skip

@@ -10,6 +10,7 @@ import pytest
 
 import bemkit as bk
 from bemkit.errors import InputError
+from tests.solutions import changed
 
 BLOCK = bk.Scene(
     title="Block on a clamped base, beside a smooth wall",
@@ -58,7 +59,7 @@ def test_every_body_of_an_assembly_is_in_equilibrium_wherever_it_is_turned() -> 
     lower = replace(lower, placement=bk.Placement(turn=30.0))
     upper = replace(upper, placement=bk.Placement(turn=30.0, shift=(0.0, 1.2)))
     pair = bk.ContactPair(("upper.bottom", "lower.top"), reach=2.0)
-    assembly = bk.Assembly(
+    assembly = bk.Scene(
         title="Turned", bodies=(lower, upper), contacts=(pair,), law=bk.Coulomb(1.0), mesh=bk.MeshOptions(elements=32)
     )
     forces = resultants(bk.run(assembly).bodies["lower"])
@@ -82,11 +83,11 @@ def test_results_without_reactions_are_written_and_read(tmp_path: Path) -> None:
     assert solution.loading is not None
     none = np.zeros((0, 2))
     steps = tuple(
-        replace(step, end=replace(step.end, boundary=replace(step.end.boundary, reaction=none)))
+        replace(step, end=changed(step.end, boundary=replace(step.end.boundary, reaction=none)))
         for step in solution.loading.steps
     )
     loading = replace(solution.loading, steps=steps)
-    older = replace(solution, boundary=replace(solution.boundary, reaction=none), loading=loading)
+    older = changed(solution, boundary=replace(solution.boundary, reaction=none), loading=loading)
     bk.write_result(tmp_path / "r.h5", older)
     read = bk.read_result(tmp_path / "r.h5")
     assert not read.boundary.reaction.size
@@ -96,7 +97,7 @@ def test_results_without_reactions_are_written_and_read(tmp_path: Path) -> None:
 def test_without_reactions_tractions_are_summed_up() -> None:
     """As of files of older versions: with the error of the tractions."""
     solution = bk.run(BLOCK)
-    older = replace(solution, boundary=replace(solution.boundary, reaction=np.zeros((0, 2))))
+    older = changed(solution, boundary=replace(solution.boundary, reaction=np.zeros((0, 2))))
     missing = sum(resultants(older).values())
     assert 1e-3 < np.abs(missing).max() < 0.1
     with pytest.raises(InputError, match=r"reaction has the shape \(1, 2\): give \(30, 2\) to match points"):

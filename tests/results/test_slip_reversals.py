@@ -75,7 +75,7 @@ def test_short_stick_zones_are_resolved(accuracy: float) -> None:
     assert solution.n_elements <= (60 if accuracy == 1e-3 else 140)
     stick = [transition.s for transition in solution.transitions]
     assert stick == pytest.approx([0.3101956, 0.3106496], abs=0.05 * accuracy)
-    assert solution.reversal_ends == ()
+    assert solution.places.reversals == ()
 
 
 def test_both_sides_of_a_contact_are_cut_where_slip_reverses() -> None:
@@ -96,8 +96,8 @@ def test_both_sides_of_a_contact_are_cut_where_slip_reverses() -> None:
     ]
     pair = bk.ContactPair(sides=("low.face", "high.face"))
     mesh = bk.MeshOptions(elements=20)
-    assembly = bk.Assembly(title="pair", bodies=tuple(halves), contacts=(pair,), law=bk.Tresca(1e-4), mesh=mesh)
-    ends = bk.run(assembly).reversal_ends
+    assembly = bk.Scene(title="pair", bodies=tuple(halves), contacts=(pair,), law=bk.Tresca(1e-4), mesh=mesh)
+    ends = bk.run(assembly).places.reversals
     assert [end.body for end in ends] == ["low", "high"]
     for end in ends:
         start, stop = end.mesh.start[end.element, 0], end.mesh.end[end.element, 0]

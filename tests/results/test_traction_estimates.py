@@ -9,17 +9,17 @@ import pytest
 
 import bemkit as bk
 from bemkit.arrays import FloatArray
-from bemkit.results.assembly_solution import AssemblySolution
+from bemkit.results.solution import Solution
 from tests.slow import slow_except
 
 
-def solved(name: str, degree: int, mesh: bk.MeshOptions) -> AssemblySolution:
+def solved(name: str, degree: int, mesh: bk.MeshOptions) -> Solution:
     scene = bk.load_scene(name)
     bodies = tuple(replace(body, mesh=None, discretisation=None) for body in scene.bodies)
     return bk.run(replace(scene, bodies=bodies, discretisation=bk.Galerkin(degree), mesh=mesh))
 
 
-def along_hole(solution: AssemblySolution) -> FloatArray:
+def along_hole(solution: Solution) -> FloatArray:
     """Return the angle, both tractions and the weight of each node, in the order of the angles."""
     table = solution.contact
     angle = np.arctan2(table.y, table.x)

@@ -9,7 +9,7 @@ import bemkit as bk
 FRICTION = 0.6
 
 
-def wall(courses: int, per_course: int, *, push: bool, elements: int = 24) -> bk.Assembly:
+def wall(courses: int, per_course: int, *, push: bool, elements: int = 24) -> bk.Scene:
     """Blocks of 2 x 1 of weight 1 for each square metre, halves at the ends of every other course.
 
     Parameters
@@ -48,4 +48,4 @@ def wall(courses: int, per_course: int, *, push: bool, elements: int = 24) -> bk
                     mesh=meshes[right - left],
                 )
             )
-    return bk.Assembly(title="A wall", bodies=tuple(bodies), touching=bk.Touching(0.01), law=bk.Coulomb(FRICTION))
+    return bk.Scene(title="A wall", bodies=tuple(bodies), touching=bk.Touching(0.01), law=bk.Coulomb(FRICTION))

@@ -57,7 +57,7 @@ def _on_two(placed: FloatArray, radius: float) -> FloatArray:
     return np.concatenate([foot + across, foot - across])
 
 
-def packing(n: int, width: float, *, seed: int = 0, elements: int = 48) -> bk.Assembly:
+def packing(n: int, width: float, *, seed: int = 0, elements: int = 48) -> bk.Scene:
     """Return discs of weight 1 for each square metre; those away from floor and walls are copies of five.
 
     Each contact reaches as far as a tenth of a metre, so that no point faces two discs.
@@ -100,7 +100,7 @@ def packing(n: int, width: float, *, seed: int = 0, elements: int = 48) -> bk.As
             bodies.append(
                 bk.Body(name=f"disc {10 * radius:g}", shape=bk.Disk(radius), parts=rim, copies=copies, **common)
             )
-    return bk.Assembly(
+    return bk.Scene(
         title=f"A packing of {n} discs",
         bodies=tuple(bodies),
         touching=bk.Touching(_NEAR, reach=0.1),

@@ -11,7 +11,7 @@ import pytest
 import bemkit as bk
 from bemkit.errors import InputError
 from bemkit.model.contacts import OverlapError
-from bemkit.results.assembly_solution import AssemblySolution
+from bemkit.results.solution import Solution
 from bemkit.runs.adaptive import run_adaptive
 from bemkit.runs.steps import UnsolvableSceneError
 from tests.slow import slow_except
@@ -21,7 +21,7 @@ SHEAR = 0.2
 """Beside the pressure one: less than friction 0.5 can hold."""
 
 
-def patch(degree: int, elements: tuple[int, int] = (28, 44), turn: float = 0.0) -> bk.Assembly:
+def patch(degree: int, elements: tuple[int, int] = (28, 44), turn: float = 0.0) -> bk.Scene:
     """Two squares on each other under a pressure of one and a shear, the lower one held as the exact field moves.
 
     Both stresses are uniform: u = (nu (1 + nu) x + 2 (1 + nu) tau y, -(1 - nu^2) y) / E.
@@ -59,7 +59,7 @@ def patch(degree: int, elements: tuple[int, int] = (28, 44), turn: float = 0.0) 
         placement=turned.after(bk.Placement((0.0, 1.0))),
         mesh=bk.MeshOptions(elements=elements[0]),
     )
-    return bk.Assembly(
+    return bk.Scene(
         title="Patch",
         bodies=(lower, upper),
         contacts=(bk.ContactPair(("upper.bottom", "lower.top")),),
@@ -146,7 +146,7 @@ def test_nine_blocks_pass_the_patch(degree: int, turn: float) -> None:
                 mesh=bk.MeshOptions(elements=int(counts[k])),
             )
         )
-    wall = bk.Assembly(
+    wall = bk.Scene(
         title="Nine blocks",
         bodies=tuple(blocks),
         touching=bk.Touching(1e-6),
@@ -181,9 +181,7 @@ def test_columns_between_smooth_walls_settle_under_their_weight() -> None:
     lower = replace(lower, parts=(*lower.parts, bk.Part("floor", bk.Contact(bk.RigidHalfPlane()), ("bottom",))))
     upper = column("upper", 1.5, 1.0, 1.0, 0.3, 1.0)
     pair = bk.ContactPair(("upper.bottom", "lower.top"))
-    solution = bk.run(
-        bk.Assembly(title="Columns", bodies=(lower, upper), contacts=(pair,), discretisation=bk.Galerkin(2))
-    )
+    solution = bk.run(bk.Scene(title="Columns", bodies=(lower, upper), contacts=(pair,), discretisation=bk.Galerkin(2)))
     between, floor = solution.contacts
     assert (between.force_y, floor.force_y) == pytest.approx((1.0, 4.0), rel=1e-12)  # sums of fifty numbers
     rows = solution.contact.rows("lower.floor")
@@ -230,7 +228,7 @@ def test_an_accuracy_out_of_reach_is_said() -> None:
 def test_an_incompressible_body_wholly_in_contact_is_named_and_a_nearly_incompressible_one_is_solved() -> None:
     """A plug in a ring, an interference of 1e-3: of Poisson's ratio one half it could not change its volume at all."""
 
-    def plugged(poisson_ratio: float) -> bk.Assembly:
+    def plugged(poisson_ratio: float) -> bk.Scene:
         rim, wall, far = (tuple(f"{side}-{k}" for k in range(1, 5)) for side in ("arc", "inner", "outer"))
         plug = bk.Body(
             name="plug",
@@ -247,7 +245,7 @@ def test_an_incompressible_body_wholly_in_contact_is_named_and_a_nearly_incompre
             mesh=bk.MeshOptions(elements=32),
         )
         pair = bk.ContactPair(("plug.rim", "ring.wall"), gap=-1e-3)
-        return bk.Assembly(title="Plug", bodies=(plug, ring), contacts=(pair,))
+        return bk.Scene(title="Plug", bodies=(plug, ring), contacts=(pair,))
 
     with pytest.raises(InputError, match=r"body 'plug': .* supports and contact take all of it: .* 0\.4999"):
         bk.run(plugged(0.5))
@@ -277,7 +275,7 @@ def test_what_nothing_feels_turns_where_it_slips_least(play: float) -> None:
             placement=bk.Placement((0.75, 0.5), turn),
             mesh=bk.MeshOptions(elements=40),
         )
-        assembly = bk.Assembly(title="Pin", bodies=(plate, pin), contacts=(pair,), law=bk.Frictionless())
+        assembly = bk.Scene(title="Pin", bodies=(plate, pin), contacts=(pair,), law=bk.Frictionless())
         solution = bk.run(assembly)
         assert solution.is_converged
         boundary = solution.bodies["pin"].boundary
@@ -290,7 +288,7 @@ def test_what_nothing_feels_turns_where_it_slips_least(play: float) -> None:
 RIMS = {"rim": "arc", "hole": "hole"}
 
 
-def arch(n: int, thickness: float) -> bk.Assembly:
+def arch(n: int, thickness: float) -> bk.Scene:
     """A semicircle of mean radius 1 of n wedges under their weight, springings on a rigid floor."""
     angle, inner, outer = 180.0 / n, 1.0 - thickness / 2.0, 1.0 + thickness / 2.0
     end = bk.Placement(turn=angle)
@@ -311,7 +309,7 @@ def arch(n: int, thickness: float) -> bk.Assembly:
         bk.Body(name="stone", placement=end, copies=bk.CircleCopies(n - 2, angle), **common),
         bk.Body(name="last", parts=on_floor("after"), placement=bk.Placement(turn=180.0 - angle), **common),
     )
-    return bk.Assembly(title="Arch", bodies=bodies, touching=bk.Touching(1e-3), law=bk.Coulomb(0.7))
+    return bk.Scene(title="Arch", bodies=bodies, touching=bk.Touching(1e-3), law=bk.Coulomb(0.7))
 
 
 def test_an_arch_stands_where_limit_analysis_says_so() -> None:
@@ -333,7 +331,7 @@ def test_steps_follow_each_other_and_slip_is_remembered() -> None:
     pressed = patch(2)
     upper = pressed.bodies[1]
 
-    def under(shear: float) -> bk.Assembly:
+    def under(shear: float) -> bk.Scene:
         load = bk.Part("load top", bk.Traction(shear, -1.0), ("top",))
         free = tuple(part for part in upper.parts if part.name != "load top")
         sides = tuple(replace(part, condition=bk.Traction(0.0, np.sign(part.condition.y) * shear)) for part in free)
@@ -409,7 +407,7 @@ def test_what_one_side_feels_the_other_gives_back() -> None:
     (contact,) = solution.contacts
     assert upper.force_y == pytest.approx(contact.force_y, rel=1e-12)
     assert lower.force_y == pytest.approx(-contact.force_y, rel=1e-12)
-    wall = bk.Assembly(
+    wall = bk.Scene(
         title="Three blocks",
         bodies=tuple(
             bk.Body(
@@ -451,7 +449,7 @@ def test_forces_are_passed_on_whole_where_a_partner_ends_inside_an_element(degre
     )
     pair = bk.ContactPair(("upper.bottom", "lower.top"), multipliers_on=multipliers_on)
     solution = bk.run(
-        bk.Assembly(title="Offset", bodies=(lower, upper), contacts=(pair,), discretisation=bk.Galerkin(degree))
+        bk.Scene(title="Offset", bodies=(lower, upper), contacts=(pair,), discretisation=bk.Galerkin(degree))
     )
     sides = {"upper.bottom": 1.0, "lower.top": -1.0}
     (contact,) = solution.contacts
@@ -478,13 +476,13 @@ def test_a_body_whose_energy_can_be_negative_is_named() -> None:
     )
     pair = bk.ContactPair(("split.lip low", "split.lip high"), gap=-0.041)
     solution = bk.run(
-        bk.Assembly(title="Split", bodies=(split,), contacts=(pair,), discretisation=bk.ConstantCollocation())
+        bk.Scene(title="Split", bodies=(split,), contacts=(pair,), discretisation=bk.ConstantCollocation())
     )
     assert solution.status is bk.Status.NEGATIVE_ENERGY
     assert "body 'split'" in solution.message
 
 
-def _between_soft_ones(ratio: float) -> AssemblySolution:
+def _between_soft_ones(ratio: float) -> Solution:
     """Two bodies on each other, so many times stiffer than those below and above them, pressed and sheared."""
     foot, load = bk.Part("foot", bk.Clamped(), ("bottom",)), bk.Part("top", bk.Traction(x=2e-3, y=-1e-2), ("top",))
     given = (("a", 1.0, (foot,)), ("b", ratio, ()), ("c", ratio, ()), ("d", 1.0, (load,)))
@@ -500,7 +498,7 @@ def _between_soft_ones(ratio: float) -> AssemblySolution:
     )
     contacts = tuple(bk.ContactPair((f"{low}.top", f"{high}.bottom")) for low, high in ("ab", "bc", "cd"))
     mesh = bk.MeshOptions(elements=40)
-    return bk.run(bk.Assembly(title="Stiff", bodies=bodies, contacts=contacts, law=bk.Coulomb(0.3), mesh=mesh))
+    return bk.run(bk.Scene(title="Stiff", bodies=bodies, contacts=contacts, law=bk.Coulomb(0.3), mesh=mesh))
 
 
 def test_stiff_bodies_between_soft_ones_touch_each_other() -> None:

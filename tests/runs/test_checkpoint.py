@@ -12,7 +12,6 @@ import pytest
 
 import bemkit as bk
 from bemkit.cli.main import main
-from bemkit.results.assembly_solution import AssemblySolution
 from bemkit.results.export import export_result
 from bemkit.results.load_history import LoadHistory
 from bemkit.runs import load_path
@@ -53,13 +52,13 @@ def kill_after(file: Path, n_steps: int) -> Callable[[StepRecord], None]:
     return callback
 
 
-def loading_of(solution: bk.Solution | AssemblySolution) -> LoadHistory:
+def loading_of(solution: bk.Solution) -> LoadHistory:
     assert solution.loading is not None
     return solution.loading
 
 
 @pytest.mark.parametrize("scene", slow_except((LOOP, PUNCH), LOOP), ids=["one body", "punch"])
-def test_a_killed_run_is_continued_to_the_same_bits(scene: bk.Scene | bk.Assembly, tmp_path: Path) -> None:
+def test_a_killed_run_is_continued_to_the_same_bits(scene: bk.Scene | bk.Scene, tmp_path: Path) -> None:
     whole = bk.run(scene, file=tmp_path / "whole.h5")
     file = tmp_path / "killed.h5"
     with pytest.raises(Killed):
@@ -105,7 +104,7 @@ CYLINDERS = replace(
 
 
 @pytest.mark.parametrize("scene", slow_except((SHORT, CYLINDERS), SHORT), ids=["one body", "two bodies"])
-def test_a_killed_run_with_an_accuracy_goes_on_on_its_mesh(scene: bk.Scene | bk.Assembly, tmp_path: Path) -> None:
+def test_a_killed_run_with_an_accuracy_goes_on_on_its_mesh(scene: bk.Scene | bk.Scene, tmp_path: Path) -> None:
     file, in_file = tmp_path / "killed.h5", dict[int, int]()  # number of elements -> finished steps
 
     def look(record: StepRecord) -> None:
@@ -181,7 +180,7 @@ def test_writing_is_a_stage_of_its_own(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("scene", slow_except((LOOP, PUNCH), PUNCH), ids=["one body", "punch"])
-def test_files_hold_all_fields_of_all_steps(scene: bk.Scene | bk.Assembly, tmp_path: Path) -> None:
+def test_files_hold_all_fields_of_all_steps(scene: bk.Scene | bk.Scene, tmp_path: Path) -> None:
     whole = bk.run(scene, file=tmp_path / "a.h5")
     read = bk.read_result(tmp_path / "a.h5")
     for number in range(1, scene.n_steps + 1):
@@ -226,7 +225,7 @@ def test_a_failed_step_leaves_the_finished_ones_in_the_file(
 
 @pytest.mark.parametrize("scene", slow_except([LOOP, PUNCH], PUNCH), ids=["one body", "punch"])
 @pytest.mark.parametrize("ending", slow_only(["h5", "hdf5", "json", "csv", "npz", "vtu"], "hdf5"))
-def test_histories_are_written_in_every_format(scene: bk.Scene | bk.Assembly, ending: str, tmp_path: Path) -> None:
+def test_histories_are_written_in_every_format(scene: bk.Scene | bk.Scene, ending: str, tmp_path: Path) -> None:
     if ending == "vtu":
         pytest.importorskip("meshio")
     short = replace(scene, steps=scene.steps[:1])

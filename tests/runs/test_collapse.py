@@ -47,7 +47,7 @@ def first_of_top(blocks: np.ndarray) -> int:
 
 def assembly_of(
     blocks: np.ndarray, friction: float, elements: int, *, turn: float = 0.0, push: bool = False
-) -> bk.Assembly:
+) -> bk.Scene:
     """Return rectangular blocks on ground, of weight one; what grows is a force to the right.
 
     The force is on all blocks and as large as their weight, or a pressure of one on the left end of the
@@ -75,7 +75,7 @@ def assembly_of(
         )
         for number, (x0, y0, x1, y1) in enumerate(blocks.tolist())
     )
-    return bk.Assembly(title="Blocks", bodies=bodies, touching=bk.Touching(1e-3), law=bk.Coulomb(friction))
+    return bk.Scene(title="Blocks", bodies=bodies, touching=bk.Touching(1e-3), law=bk.Coulomb(friction))
 
 
 def factor_of(blocks: np.ndarray, friction: float, *, push: bool = False) -> float:
@@ -180,7 +180,7 @@ def test_a_block_that_overhangs_a_table_tips_about_its_edge() -> None:
         ),
         body_forces=(bk.Gravity(1.0, (0.0, -1.0), is_constant=True),),
     )
-    assembly = bk.Assembly(title="Overhang", bodies=(block,), law=bk.Coulomb(0.5))
+    assembly = bk.Scene(title="Overhang", bodies=(block,), law=bk.Coulomb(0.5))
     for elements in (6, 35):
         found = bk.largest_load_factor(replace(assembly, mesh=bk.MeshOptions(elements=elements)))
         assert found == pytest.approx(2.0 * 0.3 / 0.7, rel=1e-6)
@@ -207,7 +207,7 @@ def test_a_rigid_punch_slides_off_under_what_friction_holds() -> None:
     )
     square = bk.RigidPolygon(((0.53, 1.0), (1.5, 1.0), (1.5, 1.5), (0.53, 1.5)))
     punch = bk.RigidBody(name="punch", obstacle=square, centre=(1.0, 1.0), force_y=-0.01, force_x=0.001, moment=0.0)
-    assembly = bk.Assembly(
+    assembly = bk.Scene(
         title="Punch",
         bodies=(base,),
         rigid=(punch,),

@@ -83,7 +83,7 @@ def test_a_leg_has_three_solutions_above_and_one_below() -> None:
 
 def test_one_of_several_bodies_is_as_critical_as_alone() -> None:
     body = bk.Body(name="leg", shape=LEG.shape, material=LEG.material, parts=LEG.parts, mesh=LEG.mesh)
-    assembly = bk.Assembly(title="leg", bodies=(body,), law=LEG.law, discretisation=LEG.discretisation)
+    assembly = bk.Scene(title="leg", bodies=(body,), law=LEG.law, discretisation=LEG.discretisation)
     assert bk.critical_friction(assembly).backward == pytest.approx(bk.critical_friction(LEG).backward, rel=1e-8)
 
 
@@ -164,7 +164,7 @@ def test_bodies_that_follow_an_accuracy_are_placed_once() -> None:
     )
     contact = bk.ContactPair(("punch.bottom", "plate.top"))
     options = bk.MeshOptions(accuracy=0.2)
-    assembly = bk.Assembly(title="punch", bodies=(plate, punch), contacts=(contact,), law=bk.Coulomb(0.3), mesh=options)
+    assembly = bk.Scene(title="punch", bodies=(plate, punch), contacts=(contact,), law=bk.Coulomb(0.3), mesh=options)
     assert bk.critical_friction(assembly).n_contact > 4
 
 
@@ -176,8 +176,8 @@ def test_bodies_that_do_not_touch_are_named() -> None:
         parts=(bk.Part("top", bk.Clamped(), ("top",)),),
         mesh=LEG.mesh,
     )
-    with pytest.raises(NoContactError, match="no two bodies are in contact: nothing slides"):
-        bk.critical_friction(bk.Assembly(title="leg", bodies=(body,)))
+    with pytest.raises(NoContactError, match="no part is in contact: nothing slides"):
+        bk.critical_friction(bk.Scene(title="leg", bodies=(body,)))
 
 
 def call(*arguments: str) -> int:

@@ -167,7 +167,7 @@ def test_wrong_lists_are_refused() -> None:
 
 def test_several_bodies_take_one_degree() -> None:
     assembly = bk.load_scene("two-cylinders")
-    assert isinstance(assembly, bk.Assembly)
+    assert isinstance(assembly, bk.Scene)
     with pytest.raises(InputError, match=r"degree is a list, of body .*[:;].* give one degree"):
         dataclasses.replace(assembly, discretisation=bk.Galerkin((2, 3)))
 

@@ -73,7 +73,7 @@ def test_the_estimate_scales_with_stiffness_and_squared_displacement() -> None:
 
 def test_collocation_has_no_estimate() -> None:
     solution = bk.run(dataclasses.replace(bk.load_scene("paper-1"), mesh=bk.MeshOptions(elements=40)))
-    assert solution.element_errors is None
+    assert solution.body.element_errors is None
     assert solution.summary()["estimated_error"] is None
 
 

@@ -19,7 +19,7 @@ from bemkit.model.model import build_model
 from bemkit.model.prepared import prepare
 from bemkit.model.shapes import NotSentError
 from bemkit.operators.linear.dense import SingularMatrixError
-from bemkit.results.assembly_solution import AssemblySolution
+from bemkit.results.solution import Solution
 
 SAME = 1e-9
 """The same operations on the same numbers, but BLAS may take another number of threads."""
@@ -31,14 +31,14 @@ def processes() -> Iterator[ProcessPoolExecutor]:
         yield executor
 
 
-def coarse(name: str = "pin-in-plate", discretisation: Any = None, n_elements: int = 40, **changes: Any) -> bk.Assembly:
+def coarse(name: str = "pin-in-plate", discretisation: Any = None, n_elements: int = 40, **changes: Any) -> bk.Scene:
     loaded = bk.load_scene(name)
-    assert isinstance(loaded, bk.Assembly)
+    assert isinstance(loaded, bk.Scene)
     mesh = replace(loaded.mesh, elements=n_elements, accuracy=None)
     return replace(loaded, discretisation=discretisation or bk.Galerkin(1), mesh=mesh, **changes)
 
 
-def assert_same(one: AssemblySolution, other: AssemblySolution) -> None:
+def assert_same(one: Solution, other: Solution) -> None:
     assert one.is_converged
     assert other.is_converged
     size = np.abs(one.contact.sigma_n).max()

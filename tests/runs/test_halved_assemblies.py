@@ -11,8 +11,8 @@ import pytest
 import bemkit as bk
 from bemkit.contact.mortar.sides import ContactSide
 from bemkit.errors import InputError
-from bemkit.results.assembly_solution import AssemblySolution
 from bemkit.results.result_file import read_result, write_result
+from bemkit.results.solution import Solution
 from bemkit.scene.symmetry import AsymmetricSceneError
 from bemkit.studies.stability.assembly_axes import ASSEMBLY_AXES
 from bemkit.studies.stability.axes import find_axes
@@ -24,14 +24,14 @@ STEEL, SOFT = bk.Material(1.0, 0.3), bk.Material(0.5, 0.2)
 ABOUT_X = bk.Symmetry(x=0.0)
 
 
-def solved(assembly: bk.Assembly) -> AssemblySolution:
+def solved(assembly: bk.Scene) -> Solution:
     solution = bk.run(assembly)
-    assert isinstance(solution, AssemblySolution)
+    assert isinstance(solution, Solution)
     assert solution.is_converged, solution.message
     return solution
 
 
-def blocks(**changes: object) -> bk.Assembly:
+def blocks(**changes: object) -> bk.Scene:
     """A block pressed onto a wider one, and on its left a small one that is pushed inwards as well."""
     base, load = bk.Part("base", bk.Clamped(), ("bottom",)), bk.Part("load", bk.Traction(y=-1e-3), ("top",))
     push = bk.Part("push", bk.Traction(x=2e-5, y=-2e-4), ("top",))
@@ -60,7 +60,7 @@ def blocks(**changes: object) -> bk.Assembly:
         ),
     )
     pairs = tuple(bk.ContactPair((f"{name}.bottom", "lower.top")) for name in ("upper", "left"))
-    half = bk.Assembly(
+    half = bk.Scene(
         title="Blocks",
         bodies=bodies,
         contacts=pairs,
@@ -71,7 +71,7 @@ def blocks(**changes: object) -> bk.Assembly:
     return replace(half, **changes)  # type: ignore[arg-type]
 
 
-def both_halves() -> bk.Assembly:
+def both_halves() -> bk.Scene:
     """The same with the other small block, and no line."""
     half = blocks()
     push = bk.Part("push", bk.Traction(x=-2e-5, y=-2e-4), ("top",))
@@ -129,7 +129,7 @@ def test_normals_at_a_line_are_those_of_the_whole_side() -> None:
 @pytest.mark.slow
 def test_halved_cylinders_on_meshes_that_follow_the_solution() -> None:
     whole = bk.load_scene("two-cylinders")
-    assert isinstance(whole, bk.Assembly)
+    assert isinstance(whole, bk.Scene)
     one, two = solved(replace(whole, symmetry=ABOUT_X)), solved(whole)
     assert one.n_elements < 0.75 * two.n_elements
     pressure = [each.contacts[0].peak_pressure for each in (one, two)]
@@ -153,7 +153,7 @@ def test_a_quarter_of_a_shrink_fit() -> None:
         for name, shape, side in (("inner", bk.Ring(0.5, 1.0), "outer"), ("outer", bk.Ring(1.0, 2.0), "inner"))
     )
     pair = bk.ContactPair(("inner.fit", "outer.fit"), gap=-1e-3)
-    whole = bk.Assembly(title="Rings", bodies=(inner, outer), contacts=(pair,), discretisation=bk.Galerkin(3))
+    whole = bk.Scene(title="Rings", bodies=(inner, outer), contacts=(pair,), discretisation=bk.Galerkin(3))
     quarter = solved(replace(whole, symmetry=bk.Symmetry(x=0.0, y=0.0)))
     assert quarter.n_elements == 2 * 96 // 4
     pressures = -quarter.contact.sigma_n
@@ -170,7 +170,7 @@ def test_files_hold_it(tmp_path: Path) -> None:
     solution = solved(half)
     write_result(tmp_path / "half.h5", solution)
     again = read_result(tmp_path / "half.h5")
-    assert isinstance(again, AssemblySolution)
+    assert isinstance(again, Solution)
     assert again.bodies["lower"].mesh.symmetry == ABOUT_X
     assert again.summary()["between_nodes"] == solution.summary()["between_nodes"]
 
@@ -202,8 +202,8 @@ def test_what_does_not_go_with_a_line_is_refused(changes: dict[str, object], mes
 
 def test_contacts_beside_a_line_are_found() -> None:
     found, listed = solved(blocks(touching=bk.Touching(1e-3), contacts=())), solved(blocks())
-    assert {frozenset(pair.sides) for pair in found.assembly.contacts} == {
-        frozenset(pair.sides) for pair in listed.assembly.contacts
+    assert {frozenset(pair.sides) for pair in found.scene.contacts} == {
+        frozenset(pair.sides) for pair in listed.scene.contacts
     }
     assert found.force_normal == pytest.approx(listed.force_normal, rel=1e-12)
     np.testing.assert_allclose(np.sort(found.contact.sigma_n), np.sort(listed.contact.sigma_n), atol=1e-12)

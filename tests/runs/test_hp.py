@@ -290,7 +290,7 @@ def test_layers_follow_places_that_move() -> None:
 def test_free_elements_gain_by_degrees() -> None:
     """Their tractions are round-off, which does not fall, and say nothing of their error."""
     solution = next(each for each in risen("paper-1", 3e-5) if degree_of(each) > 4)
-    errors, loaded = solution.coefficient_errors, np.concatenate(list(solution.mesh.parts.values()))
+    errors, loaded = solution.body.coefficient_errors, np.concatenate(list(solution.mesh.parts.values()))
     assert errors is not None
     free = np.setdiff1d(np.arange(solution.mesh.n_elements), loaded)
     assert free.size > 5
@@ -408,7 +408,7 @@ def pushed(side: str, y: float) -> bk.Part:
     return bk.Part("pushed", condition, sides=(side,), where=lambda x, _: (x > middle[0]) & (x < middle[1]))
 
 
-def two_blocks(accuracy: float, law: bk.FrictionLaw, degree: int | None = None) -> bk.Assembly:
+def two_blocks(accuracy: float, law: bk.FrictionLaw, degree: int | None = None) -> bk.Scene:
     """Two mirrored blocks, pressed together in the middle: their ends lift off."""
     material = bk.Material(youngs_modulus=1.0, poisson_ratio=0.3)
     upper = bk.Body(
@@ -419,7 +419,7 @@ def two_blocks(accuracy: float, law: bk.FrictionLaw, degree: int | None = None) 
         placement=bk.Placement(shift=(0.0, 0.5)),
     )
     lower = bk.Body(name="lower", shape=BLOCK, material=material, parts=(pushed("bottom", 1e-3),))
-    return bk.Assembly(
+    return bk.Scene(
         title="Two mirrored blocks",
         bodies=(upper, lower),
         contacts=(bk.ContactPair(("upper.bottom", "lower.top")),),
@@ -502,7 +502,7 @@ def test_copies_have_one_mesh_as_fine_as_the_worst_needs() -> None:
         placement=bk.Placement(shift=(0.5, 0.5)),
         copies=bk.GridCopies(2, 1, (1.2, 0.0)),
     )
-    feet = bk.Assembly(
+    feet = bk.Scene(
         title="Two feet",
         bodies=(base, foot),
         touching=bk.Touching(within=1e-9),
@@ -512,14 +512,14 @@ def test_copies_have_one_mesh_as_fine_as_the_worst_needs() -> None:
     )
     solution = bk.run(feet)
     assert solution.is_converged, solution.message
-    _, one, two = solution.solved_bodies
+    _, one, two = solution.bodies.values()
     np.testing.assert_allclose(one.mesh.lengths, two.mesh.lengths, rtol=1e-12)
     assert one.energy != pytest.approx(two.energy, rel=1e-6)
     quadratic = bk.run(dataclasses.replace(feet, discretisation=bk.Galerkin(2)))
     assert solution.energy == pytest.approx(quadratic.energy, rel=2e-4)  # the square of both accuracies
 
 
-def filled_hole(accuracy: float) -> bk.Assembly:
+def filled_hole(accuracy: float) -> bk.Scene:
     """A quarter of a plate under pressure whose hole is filled by a disc of its material: uniform stress."""
     material = bk.Material(youngs_modulus=1.0, poisson_ratio=0.3)
     sides = ("bottom", "right", "top", "left")
@@ -531,7 +531,7 @@ def filled_hole(accuracy: float) -> bk.Assembly:
         material=material,
         parts=(hole, bk.Part("load", bk.Pressure(1.0), sides)),
     )
-    return bk.Assembly(
+    return bk.Scene(
         title="filled hole",
         bodies=(plate, bk.Body(name="disc", shape=bk.Disk(1.0), material=material, parts=(rim,))),
         contacts=(bk.ContactPair(("disc.rim", "plate.hole")),),
@@ -541,7 +541,7 @@ def filled_hole(accuracy: float) -> bk.Assembly:
     )
 
 
-def press_fit(accuracy: float) -> bk.Assembly:
+def press_fit(accuracy: float) -> bk.Scene:
     """Two whole rings of different materials, one 1e-3 too large for the other; the outer one is held on its rim."""
     held = bk.PrescribedDisplacement(bk.Expression("3e-4 * x"), bk.Expression("3e-4 * y"))
     inner = bk.Body(name="inner", shape=bk.Ring(0.5, 1.0), material=bk.Material(1.0, 0.3))
@@ -549,7 +549,7 @@ def press_fit(accuracy: float) -> bk.Assembly:
     out = bk.Part("fit", bk.Free(), ("outer-1", "outer-2", "outer-3", "outer-4"))
     rim = bk.Part("rim", held, ("outer-1", "outer-2", "outer-3", "outer-4"))
     inside = bk.Part("fit", bk.Free(), ("inner-1", "inner-2", "inner-3", "inner-4"))
-    return bk.Assembly(
+    return bk.Scene(
         title="press fit",
         bodies=(dataclasses.replace(inner, parts=(out,)), dataclasses.replace(outer, parts=(inside, rim))),
         contacts=(bk.ContactPair(("inner.fit", "outer.fit"), gap=-1e-3),),
@@ -561,7 +561,7 @@ def press_fit(accuracy: float) -> bk.Assembly:
 @pytest.mark.parametrize("accuracy", slow_except([1e-2, 1e-3, 1e-4, 1e-5], 1e-3))
 @pytest.mark.parametrize("scene", [filled_hole, press_fit])
 def test_uniform_pressures_between_bodies_are_as_accurate_as_asked(
-    scene: Callable[[float], bk.Assembly], accuracy: float
+    scene: Callable[[float], bk.Scene], accuracy: float
 ) -> None:
     """The first look has no estimate of traction errors: a missing one is never small."""
     solution = bk.run(scene(accuracy))
@@ -589,5 +589,5 @@ def test_errors_that_spread_from_a_corner_lead_to_layers_there() -> None:
     assert last.n_elements <= 120
     (tip, following), *_ = next(corner for corner in last.singular_corners if corner.x == 0.0).beside(last.mesh)
     assert last.mesh.lengths[tip] <= 2e-4 * last.part_length("foot")
-    assert last.coefficient_errors is not None
-    assert last.coefficient_errors.traction_decay[following] < 0.6
+    assert last.body.coefficient_errors is not None
+    assert last.body.coefficient_errors.traction_decay[following] < 0.6

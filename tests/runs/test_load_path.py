@@ -19,7 +19,7 @@ from bemkit.solvers.solution_path import SolutionPath
 from tests.runs.masonry import FRICTION, wall
 
 
-def check_up_to_collapse(assembly: bk.Assembly, expected: float, moved: str, weight: float) -> None:
+def check_up_to_collapse(assembly: bk.Scene, expected: float, moved: str, weight: float) -> None:
     """Increments up to 98 % of the limit converge, 102 % cannot be carried, and the steps before are kept."""
     limit = bk.largest_load_factor(assembly)
     assert limit == pytest.approx(expected, rel=1e-6)  # accuracy of linear programmes
@@ -84,7 +84,7 @@ def test_steps_that_are_reached_are_kept_in_the_result_of_a_scene() -> None:
     assert solution.status is Status.UNSOLVABLE_LOAD
     assert solution.message.startswith("load step 2 of 2: No contact tractions can balance this load")
     assert "Finished: 1 of 2 steps, up to t = 1." in solution.message
-    assert solution.assembly.bodies == assembly.bodies  # the fields are of this one
+    assert solution.scene.bodies == assembly.bodies  # the fields are of this one
     assert not solution.is_certified
     with pytest.raises(UnsolvableSceneError, match="slides bodies 'block 1-0'"):
         bk.run(replace(assembly, load_factors=(5.0, 1.0)))
@@ -138,7 +138,7 @@ def test_what_has_no_largest_factor_says_so() -> None:
         bk.largest_load_factor(replace(assembly, bodies=_without_floor(assembly), touching=None))
 
 
-def _without_floor(assembly: bk.Assembly) -> tuple[bk.Body, ...]:
+def _without_floor(assembly: bk.Scene) -> tuple[bk.Body, ...]:
     held = bk.Part("floor", bk.Clamped(), ("bottom",))
     return tuple(replace(body, parts=(held,)) for body in assembly.bodies)
 
@@ -160,7 +160,7 @@ def test_what_is_given_is_interpolated_between_two_steps() -> None:
         placement=bk.Placement((0.0, 1.0)),
     )
     pair = bk.ContactPair(("upper.bottom", "lower.top"))
-    assembly = bk.Assembly(title="Two", bodies=(lower, upper), contacts=(pair,), law=bk.Coulomb(0.5))
+    assembly = bk.Scene(title="Two", bodies=(lower, upper), contacts=(pair,), law=bk.Coulomb(0.5))
     steps = [
         replace(with_scaled_loads(assembly, factor), contacts=(replace(pair, gap=0.1 * factor),))
         for factor in (1.0, 2.0, 3.0)

@@ -25,7 +25,7 @@ LOOP = replace(bk.load_scene("friction-loop"), mesh=bk.MeshOptions(elements=40))
 SHEAR = "parts.top.condition.x"
 
 
-def solved(scene: bk.Scene | bk.Assembly) -> LoadHistory:
+def solved(scene: bk.Scene | bk.Scene) -> LoadHistory:
     solution = bk.run(scene)
     assert solution.is_converged, solution.message
     assert solution.loading is not None
@@ -106,7 +106,7 @@ def test_nor_is_what_a_body_exerts_on_a_held_node_of_its_partner() -> None:
     upper = _block("upper", 0.5, {"top": bk.PrescribedDisplacement(0.0, -0.01)})
     pair = bk.ContactPair(("upper.bottom", "lower.top"), multipliers_on="upper.bottom")
     steps = tuple(bk.Step(time, {"bodies.lower.parts.left.condition.x": "0.02*t"}) for time in (1.0, 2.0))
-    assembly = bk.Assembly(title="Rubbed", bodies=(lower, upper), contacts=(pair,), law=bk.Coulomb(0.3), steps=steps)
+    assembly = bk.Scene(title="Rubbed", bodies=(lower, upper), contacts=(pair,), law=bk.Coulomb(0.3), steps=steps)
     loading = solved(assembly)
     assert loading.total().dissipation > 0.0
     check_balance(loading, 1e-10)
@@ -305,7 +305,7 @@ def test_histories_of_bodies_with_an_accuracy() -> None:
 def test_the_worst_step_guides_the_mesh() -> None:
     """Errors are the largest of all steps on every element, measured by the largest energy."""
     steps = bk.run([replace(LOOP, steps=(LOOP.steps[0], replace(LOOP.steps[1], increments=3)))])
-    guide, errors = StepErrors(steps), np.array([step.element_errors for step in steps])
+    guide, errors = StepErrors(steps), np.array([step.body.element_errors for step in steps])
     unit = max(step.error_unit for step in steps)
     assert guide.unit == unit
     np.testing.assert_array_equal(guide.required(), [errors.max(axis=0)])

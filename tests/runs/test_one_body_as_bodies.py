@@ -34,18 +34,24 @@ HELD = bk.Scene(  # friction acts at the node that the support guides
 )
 
 
-def as_bodies(scene: bk.Scene) -> bk.Assembly:
+FAR = replace(
+    bk.load_scene("cylinder-on-half-plane"),
+    mesh=bk.MeshOptions(elements=100),
+    far=bk.FarField(y=2e-3),
+)
+
+
+def as_bodies(scene: bk.Scene) -> bk.Scene:
     """Return the scene with its body as the only one of several, of the same names."""
     steps = tuple(
         replace(step, changes={f"bodies.it.{key}" if key.startswith("parts.") else key: value
                                for key, value in step.changes.items()})
         for step in scene.steps
     )  # fmt: skip
-    body = bk.Body(
-        name="it", shape=scene.shape, material=scene.material, parts=scene.parts, body_forces=scene.body_forces
-    )
+    own = {name: getattr(scene, name) for name in ("shape", "material", "parts", "body_forces", "far")}
+    body = bk.Body(name="it", **own)
     common = ("title", "law", "symmetry", "discretisation", "linear_solver", "mesh", "solver", "load_factors")
-    return bk.Assembly(bodies=(body,), steps=steps, **{name: getattr(scene, name) for name in common})
+    return bk.Scene(bodies=(body,), steps=steps, **{name: getattr(scene, name) for name in common})
 
 
 def probed(scene: Any) -> Any:
@@ -68,7 +74,7 @@ def on_a_mesh(scene: Any) -> Any:
     outline = PAPER.shape.outline()
     parts = {part.name: part.selection for part in PAPER.parts}
     mesh = bk.discretise(outline, n_elements=60, parts=parts)
-    return bk.run(scene, mesh=mesh if isinstance(scene, bk.Scene) else {"it": mesh})
+    return bk.run(scene, mesh={"it": mesh} if scene.bodies else mesh)
 
 
 FEATURES: dict[str, tuple[bk.Scene, Callable[[Any], Any]]] = {
@@ -89,6 +95,10 @@ FEATURES: dict[str, tuple[bk.Scene, Callable[[Any], Any]]] = {
         bk.run,
     ),
     "without contact": (bk.load_scene("bending"), bk.run),
+    "degrees of elements": (replace(PAPER, discretisation=bk.Galerkin((2, 3) * 24)), bk.run),
+    "half-plane": (replace(bk.load_scene("cylinder-on-half-plane"), mesh=bk.MeshOptions(elements=200)), bk.run),
+    "motion far away": (FAR, bk.run),
+    "slip weakening": (replace(PAPER, law=bk.SlipWeakening(0.5, 0.2, 1e-5), steps=STEPS[:1]), bk.run),
     "accuracy": (replace(PAPER, discretisation=bk.Galerkin(2), mesh=bk.MeshOptions(accuracy=2e-2)), bk.run),
     "hp": (
         replace(PAPER, discretisation=bk.Galerkin(2), mesh=bk.MeshOptions(accuracy=2e-3, rising_degrees=True)),
@@ -98,7 +108,7 @@ FEATURES: dict[str, tuple[bk.Scene, Callable[[Any], Any]]] = {
 
 
 def boundary_of(solution: Any) -> Iterator[FloatArray]:
-    body = solution if isinstance(solution, bk.Solution) else solution.bodies["it"]
+    body = solution.body
     yield body.boundary.displacement
     yield body.boundary.traction
     table = solution.contact
@@ -115,8 +125,20 @@ def test_both_forms_have_one_answer(feature: str) -> None:
     np.testing.assert_array_equal(one.contact.status, several.contact.status)
     for ours, theirs in zip(boundary_of(one), boundary_of(several), strict=True):
         np.testing.assert_allclose(ours, theirs, rtol=0.0, atol=CLOSE * np.abs(ours).max(initial=1e-300))
-    if one.estimated_error is not None:
-        assert several.estimated_error == pytest.approx(one.estimated_error, rel=1e-9)
+    for name in ("estimated_error", "estimated_traction_error", "estimated_local_traction_error"):
+        ours, theirs = getattr(one, name), getattr(several, name)
+        assert theirs is None if ours is None else theirs == pytest.approx(ours, rel=1e-9, abs=1e-12), name
+    if one.between_nodes is None:
+        assert several.between_nodes is None
+    else:
+        assert several.between_nodes.as_dict() == pytest.approx(one.between_nodes.as_dict(), rel=1e-9, abs=1e-12)
+    for ours, theirs in zip(one.contacts, several.contacts, strict=True):
+        assert theirs.name == f"it.{ours.name}"
+        numbers, others = (list(vars(each).values())[1:] for each in (ours, theirs))
+        assert others == pytest.approx(numbers, rel=1e-9, abs=1e-12)
+    assert [corner.exponent for corner in several.singular_corners] == [
+        corner.exponent for corner in one.singular_corners
+    ]
 
 
 def test_sweeps_of_both_forms_have_one_answer() -> None:

@@ -10,7 +10,7 @@ import bemkit as bk
 from tests.runs.packing import packing
 
 
-def check_packing(assembly: bk.Assembly) -> None:
+def check_packing(assembly: bk.Scene) -> None:
     solution = bk.run(assembly)
     assert solution.is_converged
     assert solution.certificate.worst <= 1e-9

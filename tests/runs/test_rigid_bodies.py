@@ -14,7 +14,7 @@ from bemkit.model.contacts import OverlapError
 from bemkit.model.model import build_model
 from bemkit.model.prepared import prepare_steps
 from bemkit.pictures import draw_deformation
-from bemkit.results.assembly_solution import AssemblySolution
+from bemkit.results.solution import Solution
 from bemkit.results.tables import to_json
 from bemkit.runs.adaptive import run_adaptive
 from bemkit.runs.steps import UnsolvableSceneError
@@ -32,7 +32,7 @@ BLOCK = bk.Body(
 )
 SQUARE = bk.RigidPolygon(((0.5, 1.0), (1.5, 1.0), (1.5, 1.5), (0.5, 1.5)))
 PUNCH = bk.RigidBody(name="punch", obstacle=SQUARE, centre=(1.0, 1.0), force_y=-FORCE)
-PRESSED = bk.Assembly(
+PRESSED = bk.Scene(
     title="Punch",
     bodies=(BLOCK,),
     rigid=(PUNCH,),
@@ -42,13 +42,13 @@ PRESSED = bk.Assembly(
 SOME = bk.Coulomb(0.3)
 
 
-def solved(assembly: bk.Assembly) -> AssemblySolution:
+def solved(assembly: bk.Scene) -> Solution:
     solution = bk.run(assembly)
     assert solution.is_converged, solution.message
     return solution
 
 
-def driven(**changes: float | None) -> bk.Assembly:
+def driven(**changes: float | None) -> bk.Scene:
     """Return the punch under other loads and motions."""
     return replace(PRESSED, rigid=(replace(PUNCH, **changes),))  # type: ignore[arg-type]
 
@@ -104,7 +104,7 @@ def wedge(name: str, sign: float) -> bk.Body:
     )
 
 
-V = bk.Assembly(
+V = bk.Scene(
     title="V",
     bodies=(wedge("left", -1.0), wedge("right", 1.0)),
     rigid=(
@@ -224,7 +224,7 @@ def test_a_given_motion_is_felt_like_that_of_a_support() -> None:
     atol = 1e-10 * FORCE  # of motions a few times as large as the deformation
     np.testing.assert_allclose(moved.contact.sigma_n, still.contact.sigma_n, atol=atol)
     boundary = still.bodies["block"].boundary
-    floor = moved.assembly.rigid[0]
+    floor = moved.scene.rigid[0]
     expected = boundary.displacement + floor.motions_at(boundary.points) @ floor.motion
     np.testing.assert_allclose(moved.bodies["block"].boundary.displacement, expected, atol=1e-10)
 
@@ -428,7 +428,7 @@ def test_every_output_tells_of_rigid_bodies(tmp_path: Path, capsys: pytest.Captu
     solution = solved(driven(moment=0.0))
     bk.write_result(tmp_path / "r.h5", solution)
     copy = bk.read_result(tmp_path / "r.h5")
-    assert isinstance(copy, AssemblySolution)
+    assert isinstance(copy, Solution)
     assert copy.rigid == solution.rigid
     assert copy.summary() == solution.summary()
     assert '"rigid": {' in to_json(solution)

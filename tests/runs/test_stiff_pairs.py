@@ -6,7 +6,7 @@ import pytest
 import bemkit as bk
 
 
-def stack(ratio: float, law: bk.FrictionLaw) -> bk.Assembly:
+def stack(ratio: float, law: bk.FrictionLaw) -> bk.Scene:
     """Return four slabs under pressure of which the two in the middle are stiffer, with meshes that do not match."""
     bodies = []
     for k, modulus in enumerate((1.0, ratio, ratio, 1.0)):
@@ -21,7 +21,7 @@ def stack(ratio: float, law: bk.FrictionLaw) -> bk.Assembly:
         )
         bodies.append(slab)
     contacts = tuple(bk.ContactPair(sides=(f"slab {k + 1}.bottom", f"slab {k}.top")) for k in range(3))
-    return bk.Assembly(title="A stack", bodies=bodies, contacts=contacts, law=law, discretisation=bk.Galerkin(2))
+    return bk.Scene(title="A stack", bodies=bodies, contacts=contacts, law=law, discretisation=bk.Galerkin(2))
 
 
 @pytest.mark.parametrize("law", [bk.Frictionless(), bk.Coulomb(0.3)], ids=["frictionless", "coulomb"])

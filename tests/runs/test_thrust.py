@@ -18,7 +18,7 @@ from tests.runs.test_collapse import assembly_of
 FRICTION = 0.5
 
 
-def block_at_a_wall() -> bk.Assembly:
+def block_at_a_wall() -> bk.Scene:
     """Return a block, 4 wide, 1 high, of weight 4, on ground and against a wall on its left."""
     assembly = assembly_of(np.array([[0.0, 0.0, 4.0, 1.0]]), FRICTION, 4)
     (body,) = assembly.bodies
@@ -29,9 +29,9 @@ def block_at_a_wall() -> bk.Assembly:
 
 
 @pytest.fixture(scope="module")
-def arch() -> tuple[bk.Assembly, tuple]:  # type: ignore[type-arg]
+def arch() -> tuple[bk.Scene, tuple]:  # type: ignore[type-arg]
     assembly = bk.load_scene("masonry-arch")
-    assert isinstance(assembly, bk.Assembly)
+    assert isinstance(assembly, bk.Scene)
     return assembly, bk.thrust(assembly, "first.springing", (-1.0, 0.0))
 
 

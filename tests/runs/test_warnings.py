@@ -21,7 +21,6 @@ from bemkit.operators.material import Material
 from bemkit.plan import make_plan
 from bemkit.result_warning import ResultWarning, first_of_each_kind, without_duplicates
 from bemkit.results import warnings as warnings_module
-from bemkit.results.assembly_solution import AssemblySolution
 from bemkit.results.result_file import read_result, write_result
 from bemkit.results.solution import Solution
 from bemkit.results.tables import to_json
@@ -36,6 +35,7 @@ from bemkit.scene.toml import load_scene, with_overrides
 from bemkit.solvers.active_sets import NodeStatus
 from bemkit.solvers.base import Status
 from tests.scenes import paper
+from tests.solutions import changed as changed_solution
 
 WARNINGS = (
     ResultWarning("first", "part", "The first: do this.", 1.5),
@@ -90,7 +90,7 @@ def test_large_rotations_are_warned_of() -> None:
 
 def test_large_strains_of_one_body_of_several_are_warned_of(monkeypatch) -> None:
     solution = run(with_overrides(load_scene("two-cylinders"), elements=40))
-    assert isinstance(solution, AssemblySolution)
+    assert isinstance(solution, Solution)
     assert not any(LARGE in words for words in map(str, find_warnings(solution)))
     monkeypatch.setattr(warnings_module, "LARGEST_STRAIN", 1e-4)
     doubts = [words for words in map(str, find_warnings(solution)) if LARGE in words]
@@ -100,7 +100,7 @@ def test_large_strains_of_one_body_of_several_are_warned_of(monkeypatch) -> None
 @pytest.mark.parametrize(("elements", "approach", "is_unseen"), [(8, 2e-4, True), (8, -2e-4, False), (96, 2e-2, False)])
 def test_contact_that_falls_between_coarse_nodes_ends_by_name(elements: int, approach: float, is_unseen: bool) -> None:
     scene = with_overrides(load_scene("two-cylinders"), elements=elements, discretisation="linear")
-    assert isinstance(scene, bk.Assembly)
+    assert isinstance(scene, bk.Scene)
     upper, lower = scene.bodies
     pushed, tip = upper.parts
     pushed = dataclasses.replace(pushed, condition=PrescribedDisplacement(x=0.0, y=-approach))
@@ -217,7 +217,7 @@ def test_a_stick_zone_of_few_nodes_is_doubted_unless_there_is_no_friction() -> N
     status[closed[8]] = NodeStatus.STICK
     twice = dataclasses.replace(fine, contact=dataclasses.replace(table, status=status))
     assert any("2 nodes, and 1 more zone like it" in words for words in map(str, find_warnings(twice)))
-    smooth = dataclasses.replace(changed, scene=dataclasses.replace(fine.scene, law=Frictionless()))
+    smooth = changed_solution(changed, scene=dataclasses.replace(fine.scene, law=Frictionless()))
     assert not [words for words in map(str, find_warnings(smooth)) if " zone of part " in words]
 
 
@@ -225,8 +225,8 @@ def test_a_large_estimated_error_is_doubted(solution: Solution) -> None:
     assert solution.estimated_error is not None
     energy = solution.energy * (solution.estimated_error / 0.06) ** 2
     words = "The estimated error is 6 %: use more elements, or give an accuracy."
-    assert words in map(str, find_warnings(dataclasses.replace(solution, energy=energy)))
-    fine = dataclasses.replace(solution, energy=4.0 * energy)
+    assert words in map(str, find_warnings(changed_solution(solution, energy=energy)))
+    fine = changed_solution(solution, energy=4.0 * energy)
     assert not [words for words in map(str, find_warnings(fine)) if "estimated error" in words]
 
 
@@ -242,7 +242,7 @@ def test_an_accuracy_is_advised_only_where_meshes_can_follow_it() -> None:
 
 
 def test_an_estimate_that_cannot_be_made_is_doubted(solution: Solution) -> None:
-    lost = dataclasses.replace(solution, energy=-1e-9)
+    lost = changed_solution(solution, energy=-1e-9)
     assert lost.estimated_error is None
     assert lost.summary()["estimated_error"] is None
     assert any(
@@ -250,7 +250,7 @@ def test_an_estimate_that_cannot_be_made_is_doubted(solution: Solution) -> None:
     )
     collocation = run(with_overrides(load_scene("paper-1"), elements=40, discretisation="constant"))
     assert not [
-        words for words in map(str, find_warnings(dataclasses.replace(collocation, energy=-1.0))) if "estimate" in words
+        words for words in map(str, find_warnings(changed_solution(collocation, energy=-1.0))) if "estimate" in words
     ]
 
 
@@ -268,7 +268,7 @@ def test_a_held_side_of_one_element_is_doubted() -> None:
 
 
 def test_a_failed_solve_has_the_warnings_of_its_plan_alone(solution: Solution) -> None:
-    failed = dataclasses.replace(solution, status=Status.STALLED, energy=-1.0)
+    failed = changed_solution(solution, status=Status.STALLED, energy=-1.0)
     assert find_warnings(failed) == solution.plan.warnings
 
 

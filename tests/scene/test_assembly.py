@@ -5,7 +5,6 @@ from dataclasses import replace
 import pytest
 
 from bemkit import (
-    Assembly,
     Body,
     CircleCopies,
     Clamped,
@@ -28,6 +27,7 @@ from bemkit import (
     RigidBody,
     RigidHalfPlane,
     RigidSpline,
+    Scene,
     SignedDistance,
     Touching,
     load_scene,
@@ -49,7 +49,7 @@ UPPER = Body(
 PAIR = ContactPair(("upper.bottom", "lower.top"))
 PUNCH = RigidBody(name="punch", obstacle=RigidHalfPlane((0.0, 2.0), (0.0, -1.0)), force_y=-2.0, turn=0.01)
 SMALL = replace(UPPER, parts=UPPER.parts[:1])
-BLOCKS = Assembly(title="Two blocks", bodies=(LOWER, SMALL), contacts=(PAIR,))
+BLOCKS = Scene(title="Two blocks", bodies=(LOWER, SMALL), contacts=(PAIR,))
 
 
 def test_sides_in_contact_are_free_parts_of_the_scene_of_a_body() -> None:
@@ -93,7 +93,7 @@ def test_every_key_survives_its_text() -> None:
     held = replace(
         LOWER, parts=(Part("base", Contact(RigidHalfPlane(), Coulomb(0.2)), ("bottom",)),), copies=GridCopies(2)
     )
-    scene = Assembly(
+    scene = Scene(
         title="All keys",
         description="Two lines\nof text.",
         reference="nobody",
@@ -123,7 +123,7 @@ def test_every_key_survives_its_text() -> None:
     assert scene_from_toml(scene_to_toml(BLOCKS)) == BLOCKS
 
 
-@pytest.mark.parametrize("name", [name for name in shipped_scenes() if isinstance(load_scene(name), Assembly)])
+@pytest.mark.parametrize("name", [name for name in shipped_scenes() if isinstance(load_scene(name), Scene)])
 def test_shipped_assemblies_survive_their_text(name: str) -> None:
     scene = load_scene(name)
     assert scene_from_toml(scene_to_toml(scene)) == scene
@@ -135,7 +135,7 @@ def test_shipped_assemblies_survive_their_text(name: str) -> None:
         ({"load_factors": ()}, r"load_factors is (): give finite numbers such as (0.5, 1.0)"),
         ({"load_factors": (1.0, float("nan"))}, "load_factors is (1.0, nan): give finite numbers"),
         ({"title": ""}, "title is '': give one line of printable text"),
-        ({"bodies": ()}, "bodies is empty: give at least one body"),
+        ({"bodies": ()}, "shape is missing: give the body a shape and a material"),
         ({"bodies": (LOWER, SMALL, LOWER)}, "'lower' is the name of two bodies: give each its own name"),
         ({"contacts": (PAIR, ContactPair(PAIR.sides[::-1]))}, "contact 'upper.bottom / lower.top' is listed twice"),
         (
@@ -163,7 +163,7 @@ def test_shipped_assemblies_survive_their_text(name: str) -> None:
                 "mesh": MeshOptions(accuracy=1e-3, rising_degrees=True),
                 "bodies": (replace(LOWER, discretisation=Galerkin(1)), SMALL),
             },
-            "body 'lower' has a fixed degree, the assembly rising degrees: degrees rise for all bodies or for none",
+            "body 'lower' has a fixed degree, the scene rising degrees: degrees rise for all bodies or for none",
         ),
         (
             {"mesh": MeshOptions(accuracy=1e-3), "bodies": (replace(LOWER, mesh=MeshOptions(elements=8)), SMALL)},
@@ -243,7 +243,7 @@ def test_bad_values_are_named(make: object, message: str) -> None:
             "title = 'a'\n[bodies.one]\nmaterial = { youngs_modulus = 1.0, poisson_ratio = 0.3 }",
             "bodies.one.shape: missing",
         ),
-        ("title = 'a'\n[bodies]", "bodies is empty"),
+        ("title = 'a'\n[bodies]", "or bodies"),
         ("title = 'a'\n[bodies]\n[rigid.one]\nx = 1.0", "rigid.one.obstacle: missing"),
         (
             "title = 'a'\n[bodies]\n[rigid.one]\nname = 'x'",

@@ -55,7 +55,7 @@ def test_the_support_takes_the_resultant(shape, side, where, middle, tolerance) 
 
 def test_a_force_without_moment_is_a_uniform_traction() -> None:
     points = np.array([[0.1, 1.0], [1.9, 1.0]])
-    (load,) = (part.condition for part in scene_of(bk.Force(3.0, -4.0)).parts if part.name == "load")
+    (load,) = (part.condition for part in scene_of(bk.Force(3.0, -4.0)).only.parts if part.name == "load")
     assert np.allclose(load.at(points, points), [[1.5, -2.0]], rtol=1e-14)
 
 
@@ -69,7 +69,7 @@ def test_a_placed_body_is_loaded_in_the_coordinates_of_the_scene() -> None:
         placement=place,
         mesh=bk.MeshOptions(elements=32),
     )
-    assembly = bk.Assembly(title="Forces", bodies=(body,), discretisation=bk.Galerkin(2))
+    assembly = bk.Scene(title="Forces", bodies=(body,), discretisation=bk.Galerkin(2))
     x, y = place.forward(np.array([[1.0, 1.0]]))[0].tolist()
     found = reaction_of(bk.run(assembly).bodies["block"])
     assert found == pytest.approx(expected(FORCE, (x, y)), rel=1e-11)  # round-off of moments
@@ -107,8 +107,3 @@ def test_the_file_keeps_the_force_and_takes_units_and_steps() -> None:
 def test_what_is_not_a_number_is_refused(value) -> None:
     with pytest.raises(bk.InputError, match="give a finite number, the resultant on the whole part"):
         bk.Force(moment=value)
-
-
-def test_a_force_on_no_part_has_no_traction() -> None:
-    with pytest.raises(bk.InputError, match=r"Force\(x=3.0, y=-4.0, moment=0.7\) acts on no part"):
-        FORCE.at(np.zeros((1, 2)), np.zeros((1, 2)))

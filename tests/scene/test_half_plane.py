@@ -205,7 +205,7 @@ def test_an_elastic_disk_on_an_elastic_half_plane() -> None:
     )
     ground = bk.Body(name="ground", shape=bk.ElasticHalfPlane(-0.4, 0.4), material=bk.Material(1.0, 0.3))
     pairs = tuple(bk.ContactPair(("ground.surface", f"disk.arc-{quarter}")) for quarter in (3, 4))
-    assembly = bk.Assembly(title="disk", bodies=(disk, ground), contacts=pairs, mesh=bk.MeshOptions(elements=320))
+    assembly = bk.Scene(title="disk", bodies=(disk, ground), contacts=pairs, mesh=bk.MeshOptions(elements=320))
     solution = bk.run(assembly)
     assert solution.is_converged, solution.message
     force = sum(contact.force_normal for contact in solution.contacts)

@@ -53,9 +53,9 @@ PAIR = bk.ContactPair(("upper.bottom", "lower.top"))
             lambda: bk.Coulomb("0.1 * x"),
             r"^friction_coefficient = '0.1 \* x' is not a number; give a number, Expression",
         ),
-        (lambda: bk.run("paper-1"), r"^scene is 'paper-1': give a Scene or an Assembly; load_scene\('paper-1'\) reads"),
-        (lambda: bk.run(None), r"^scene is None: give a Scene or an Assembly; load_scene\(path\) reads one"),
-        (lambda: bk.critical_friction("wedged-leg"), "^scene is 'wedged-leg': give a Scene or an Assembly"),
+        (lambda: bk.run("paper-1"), r"^scene is 'paper-1': give a Scene; load_scene\('paper-1'\) reads"),
+        (lambda: bk.run(None), r"^scene is None: give a Scene; load_scene\(path\) reads one"),
+        (lambda: bk.critical_friction("wedged-leg"), "^scene is 'wedged-leg': give a Scene"),
         (lambda: bk.sweep("paper-1", {"law.friction_coefficient": (0.1,)}), "^scene is 'paper-1': give a Scene"),
     ],
 )

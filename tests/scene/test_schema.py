@@ -102,7 +102,7 @@ def test_keys_have_the_descriptions_and_defaults_of_the_classes() -> None:
     assert top["load_factors"]["default"] == [1.0]
     assert top["law"]["default"] == "frictionless"
     assert "default" not in top["title"]
-    assert "all tractions, pressures" in top["load_factors"]["description"]
+    assert "all loads, given displacements" in top["load_factors"]["description"]
     assert material["youngs_modulus"]["description"].startswith("[Pa]")
     assert SCHEMA["definitions"]["Material"]["required"] == ["youngs_modulus", "poisson_ratio"]
 

@@ -94,7 +94,7 @@ condition = "clamped"
     solution = bk.run(load_scene(folder / "two.toml"))
     assert solution.is_certified
     (folder / "part.msh").unlink()
-    assert isinstance(scene_from_toml(scene_to_toml(solution.assembly)), bk.Assembly)
+    assert isinstance(scene_from_toml(scene_to_toml(solution.scene)), bk.Scene)
     with pytest.raises(SceneError, match=r"bodies.upper.shape.file: 'part.msh': a text without a folder"):
         scene_from_toml(text)
 

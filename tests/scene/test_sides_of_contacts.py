@@ -13,7 +13,7 @@ STEEL = bk.Material(1.0, 0.3)
 BASE = bk.Part("base", bk.Clamped(), ("bottom",))
 PLATE = bk.Body(name="plate", shape=bk.PlateWithHole(6.0, 6.0, 1.01, (-3.0, -3.0)), material=STEEL, parts=(BASE,))
 PIN = bk.Body(name="pin", shape=bk.Disk(1.0), material=STEEL, body_forces=(bk.Gravity(0.001, (0.1, -1.0)),))
-PRESSED = bk.Assembly(
+PRESSED = bk.Scene(
     title="Pin",
     bodies=(PLATE, PIN),
     contacts=(bk.ContactPair(("pin.arc", "plate.hole")),),
@@ -40,7 +40,7 @@ def test_sides_of_a_list_are_not_found_again() -> None:
         bk.Body(name=name, shape=bk.Rectangle(1.0, 1.0), material=STEEL, placement=bk.Placement((x, 0.0)))
         for name, x in (("left", 0.0), ("right", 1.0))
     ]
-    assembly = bk.Assembly(title="Blocks", bodies=tuple(blocks), touching=bk.Touching(0.01))
+    assembly = bk.Scene(title="Blocks", bodies=tuple(blocks), touching=bk.Touching(0.01))
     listed = replace(assembly, contacts=(bk.ContactPair(("left.right, top", "right.*")),))
     left, right = listed.placed_bodies
     assert listed.touching_parts(left) == ("right, top", "bottom", "left")

@@ -11,6 +11,7 @@ import bemkit as bk
 from bemkit.errors import InputError
 from bemkit.testing import CheckFailed, check_solution
 from tests.scenes import FLOOR, block
+from tests.solutions import changed
 
 
 @pytest.fixture(scope="module")
@@ -31,14 +32,14 @@ def with_table(solution: bk.Solution, **changes: np.ndarray) -> bk.Solution:
 def test_each_planted_fault_is_named(solution) -> None:
     table, fields = solution.contact, solution.boundary
     faults = {
-        "negative_energy": replace(solution, energy=-solution.energy),
-        "energy": replace(solution, energy=2.0 * solution.energy),
+        "negative_energy": changed(solution, energy=-solution.energy),
+        "energy": changed(solution, energy=2.0 * solution.energy),
         "tension": with_table(solution, sigma_n=-table.sigma_n),
         "cone_excess": with_table(solution, sigma_t=table.sigma_t + np.abs(table.sigma_n)),
         "status": with_table(solution, status=np.zeros_like(table.status)),
         "obstacle": with_table(solution, gap=table.gap + 1e-3),
-        "tractions": replace(solution, boundary=replace(fields, traction=1.1 * fields.traction)),
-        "penetration": replace(solution, boundary=replace(fields, displacement=fields.displacement - [0.0, 1e-3])),
+        "tractions": changed(solution, boundary=replace(fields, traction=1.1 * fields.traction)),
+        "penetration": changed(solution, boundary=replace(fields, displacement=fields.displacement - [0.0, 1e-3])),
     }
     for name, wrong in faults.items():
         with pytest.raises(CheckFailed, match=rf"the solution violates .*\b{name} "):
@@ -46,7 +47,7 @@ def test_each_planted_fault_is_named(solution) -> None:
 
 
 def test_fields_of_another_material_need_a_warning(solution) -> None:
-    other = replace(
+    other = changed(
         solution, scene=replace(solution.scene, material=bk.Material(3.0, 0.3)), energy=solution.energy, warnings=()
     )
     with pytest.raises(CheckFailed, match="the solution lacks a warning of reciprocity"):

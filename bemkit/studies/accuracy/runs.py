@@ -16,7 +16,6 @@ import numpy as np
 from bemkit.errors import InputError
 from bemkit.geometry.meshing.discretise import Algebraic, Grading, Uniform
 from bemkit.reference.compare import MEASURES, Reference, answer_of, errors_of
-from bemkit.results.solution import Solution
 from bemkit.runs.run import run as solve
 from bemkit.scene.discretisation import Discretisation, Galerkin
 from bemkit.scene.mesh_options import MeshOptions
@@ -211,7 +210,7 @@ def measure(run: Run, reference: Reference, repeat: int | None) -> ErrorRecord:
     return _record(run, first, reference, {**seconds, "peak_memory": _peak_memory(run)})
 
 
-def _attempt(run: Run) -> Attempt[Solution]:
+def _attempt(run: Run) -> Attempt:
     # the scene is made inside: what it does not allow is an answer too
     return attempt(lambda: solve(run.scene))
 
@@ -226,7 +225,7 @@ def _peak_memory(run: Run) -> float:
         tracemalloc.stop()
 
 
-def _record(run: Run, found: Attempt[Solution], reference: Reference, measured: Mapping[str, float]) -> ErrorRecord:
+def _record(run: Run, found: Attempt, reference: Reference, measured: Mapping[str, float]) -> ErrorRecord:
     solution = found.solution
     errors: dict[str, Any] = dict.fromkeys(MEASURES, _NAN)
     if solution is not None and solution.is_certified:

@@ -6,21 +6,21 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from bemkit.errors import InputError
-from bemkit.results.assembly_solution import AssemblySolution
-from bemkit.scene.assembly import Assembly
+from bemkit.results.solution import Solution
 from bemkit.scene.body import Body
 from bemkit.scene.mesh_options import MeshOptions
+from bemkit.scene.scene import Scene
 from bemkit.studies.stability.axes import Axis, changed, friction, moved, read_axes, similar
 from bemkit.studies.stability.case import PRECISION, Case
 from bemkit.studies.stability.similar_assembly import AssemblySimilarity
 
 
-def _against(similarity: AssemblySimilarity) -> Callable[[Assembly], str]:
-    """Return what says why an assembly has no similar one."""
+def _against(similarity: AssemblySimilarity) -> Callable[[Scene], str]:
+    """Return what says why a scene has no similar one."""
 
-    def reason(assembly: Assembly) -> str:
+    def reason(scene: Scene) -> str:
         try:
-            similarity.apply(assembly)
+            similarity.apply(scene)
         except InputError as error:
             return str(error)
         return ""
@@ -28,19 +28,19 @@ def _against(similarity: AssemblySimilarity) -> Callable[[Assembly], str]:
     return reason
 
 
-def _stiffened(baseline: AssemblySolution, value: float) -> Case:
-    def stiffened(assembly: Assembly) -> Assembly:
-        first, *others = assembly.bodies
+def _stiffened(baseline: Solution, value: float) -> Case:
+    def stiffened(scene: Scene) -> Scene:
+        first, *others = scene.bodies
         material = replace(first.material, youngs_modulus=value * first.material.youngs_modulus)
-        return replace(assembly, bodies=(replace(first, material=material), *others))
+        return replace(scene, bodies=(replace(first, material=material), *others))
 
     # displacements of the soft bodies hold eps of themselves, forces of stiff pairs as much times the ratio
     precision = PRECISION * max(1.0, value, 1.0 / value) ** 0.5
     return Case(value, changed(baseline, stiffened), precision=precision)
 
 
-def _elements(baseline: AssemblySolution, value: float) -> Case:
-    common = baseline.assembly.mesh
+def _elements(baseline: Solution, value: float) -> Case:
+    common = baseline.scene.mesh
 
     def divided(body: Body) -> Body:
         options = common if body.mesh is None else body.mesh
@@ -49,13 +49,13 @@ def _elements(baseline: AssemblySolution, value: float) -> Case:
 
     mesh = replace(common, accuracy=None)
 
-    def of_step(assembly: Assembly) -> Assembly:
-        return replace(assembly, mesh=mesh, bodies=tuple(divided(body) for body in assembly.bodies))
+    def of_step(scene: Scene) -> Scene:
+        return replace(scene, mesh=mesh, bodies=tuple(divided(body) for body in scene.bodies))
 
     return Case(value, changed(baseline, of_step))
 
 
-ASSEMBLY_AXES: tuple[Axis[AssemblySolution], ...] = read_axes(
+ASSEMBLY_AXES: tuple[Axis, ...] = read_axes(
     "several-bodies",
     {
         "stress": similar(AssemblySimilarity, "stress"),

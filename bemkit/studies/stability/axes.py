@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 from importlib import resources
 from math import radians
-from typing import Any, Generic, TypeVar
+from typing import Any
 
 import numpy as np
 
@@ -22,9 +22,7 @@ from bemkit.geometry.shapes import Rectangle
 from bemkit.geometry.spaces import ConstantSpace
 from bemkit.operators.boundary import single_layer
 from bemkit.operators.material import Material
-from bemkit.results.assembly_solution import AssemblySolution
 from bemkit.results.solution import Solution
-from bemkit.scene.assembly import Assembly
 from bemkit.scene.conditions import Contact, Part, Pressure, Traction
 from bemkit.scene.load_history import with_changed_steps
 from bemkit.scene.mesh_options import MeshOptions
@@ -37,11 +35,9 @@ from bemkit.solvers.ssn import SemismoothNewton
 from bemkit.studies.stability.case import PRECISION, Case, Similarity, precision_elsewhere, with_friction
 from bemkit.studies.stability.similar_assembly import AssemblySimilarity
 
-Baseline = TypeVar("Baseline", Solution, AssemblySolution)
-
 
 @dataclass(frozen=True)
-class Axis(Generic[Baseline]):
+class Axis:
     """A direction in which a scene is driven to its extremes.
 
     Parameters
@@ -55,7 +51,7 @@ class Axis(Generic[Baseline]):
     make : callable (baseline solution, value) -> Case
     reference : float, optional
         Value whose row the others are compared with; by default the given scene.
-    reason_against : callable (scene or assembly) -> str
+    reason_against : callable (scene) -> str
         Why the axis says nothing of it; empty if it does.
     """
 
@@ -63,7 +59,7 @@ class Axis(Generic[Baseline]):
     label: str
     promise: str
     values: tuple[float, ...]
-    make: Callable[[Baseline, float], Case]
+    make: Callable[[Solution, float], Case]
     reference: float | None = None
     reason_against: Callable[[Any], str] = lambda scene: ""
 
@@ -74,7 +70,7 @@ class Axis(Generic[Baseline]):
         return min(self.values) >= 0.0 and max(size) / min(size) > 100.0
 
 
-def find_axes(names: Sequence[str], axes: Sequence[Axis[Any]]) -> tuple[Axis[Any], ...]:
+def find_axes(names: Sequence[str], axes: Sequence[Axis]) -> tuple[Axis, ...]:
     """Return those of some axes that have the given names; all if there are no names.
 
     Raises
@@ -97,58 +93,58 @@ _BLOCK_FRICTION = 0.5
 _REFERENCE_GRADING = 1e6  # as in axes.toml
 
 
-def changed(baseline: Baseline, change: Callable[[Any], Any]) -> Scene | Assembly:
-    """Return what was asked after a change of the scene, or of each step of an assembly with the contacts found."""
-    if isinstance(baseline, Solution):
+def changed(baseline: Solution, change: Callable[[Any], Any]) -> Scene:
+    """Return what was asked after a change of the scene, or of each step of several bodies with the contacts found."""
+    if not baseline.scene.bodies:
         result: Scene = change(baseline.scene)
         return result
-    contacts = baseline.assembly.contacts
+    contacts = baseline.scene.contacts
     return with_changed_steps(
         baseline.stated, lambda step: change(step.with_contacts(contacts) if step.touching else step)
     )
 
 
 def _similar_case(
-    baseline: Baseline, value: float, similarity: Similarity | AssemblySimilarity, precision: float = PRECISION
+    baseline: Solution, value: float, similarity: Similarity | AssemblySimilarity, precision: float = PRECISION
 ) -> Case:
-    keeps_steps = isinstance(baseline, Solution) and precision == PRECISION
+    keeps_steps = not baseline.scene.bodies and precision == PRECISION
     scene = changed(baseline, similarity.apply)
     return Case(value, scene, similarity, precision=precision, drift_limit=precision, keeps_steps=keeps_steps)
 
 
-def similar(kind: type[Similarity | AssemblySimilarity], factor: str) -> Callable[[Baseline, float], Case]:
+def similar(kind: type[Similarity | AssemblySimilarity], factor: str) -> Callable[[Solution, float], Case]:
     """Return what makes a case in which one factor is the value."""
 
-    def make(baseline: Baseline, value: float) -> Case:
+    def make(baseline: Solution, value: float) -> Case:
         number: dict[str, Any] = {factor: value}
         return _similar_case(baseline, value, kind(**number))
 
     return make
 
 
-def moved(kind: type[Similarity | AssemblySimilarity]) -> Callable[[Baseline, float], Case]:
+def moved(kind: type[Similarity | AssemblySimilarity]) -> Callable[[Solution, float], Case]:
     """Return what makes a case as far from the origin as the value says, in diameters."""
 
-    def make(baseline: Baseline, value: float) -> Case:
-        distance = value * max(body.mesh.diameter for body in baseline.solved_bodies)
+    def make(baseline: Solution, value: float) -> Case:
+        distance = value * max(body.mesh.diameter for body in baseline.bodies.values())
         similarity = kind(shift=(0.8 * distance, -0.6 * distance))
         return _similar_case(baseline, value, similarity, precision_elsewhere(baseline, distance))
 
     return make
 
 
-def friction(baseline: Baseline, value: float) -> Case:
+def friction(baseline: Solution, value: float) -> Case:
     """Return the case in which all contacts have one friction coefficient."""
     return Case(value, changed(baseline, partial(with_friction, coefficient=value)))
 
 
 def _degenerate(baseline: Solution, value: float) -> Case:
-    critical = degenerate_diameters(baseline.mesh, baseline.scene.material)[0]
+    critical = degenerate_diameters(baseline.mesh, baseline.body.scene.material)[0]
     return _similar_case(baseline, value, Similarity(length=value * float(critical) / baseline.mesh.diameter))
 
 
 def _poisson(baseline: Solution, value: float) -> Case:
-    material = replace(baseline.scene.material, poisson_ratio=value)
+    material = replace(baseline.body.scene.material, poisson_ratio=value)
     # short of 1/2 the bulk modulus, 1 / (1 - 2 nu) times the shear modulus, multiplies round-off
     precision = PRECISION + (8.0 * np.finfo(float).eps / (0.5 - value) if value < 0.5 else 0.0)
     return Case(value, replace(baseline.scene, material=material), precision=precision)
@@ -261,7 +257,7 @@ def _of_half_planes(reason: str, *, only_periodic: bool = False) -> Callable[[Sc
     """Return what gives a reason against half-planes, or against periodic ones."""
 
     def given(scene: Scene) -> str:
-        surface = scene.shape.outline().surface
+        surface = scene.only.shape.outline().surface
         return reason if surface is not None and (surface.is_periodic or not only_periodic) else ""
 
     return given
@@ -271,7 +267,7 @@ def read_axes(
     group: str,
     makes: Mapping[str, Callable[[Any, float], Case]],
     reasons: Mapping[str, Callable[[Any], str]],
-) -> tuple[Axis[Any], ...]:
+) -> tuple[Axis, ...]:
     """Return the axes of a group in ``axes.toml``, with what makes their cases and the reasons to skip them."""
     text = (resources.files("bemkit") / "studies" / "stability" / "axes.toml").read_text("utf-8")
     return tuple(
@@ -288,7 +284,7 @@ def read_axes(
     )
 
 
-AXES: tuple[Axis[Solution], ...] = read_axes(
+AXES: tuple[Axis, ...] = read_axes(
     "one-body",
     {
         "youngs-modulus": similar(Similarity, "modulus"),

@@ -4,15 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
 from bemkit.contact.laws import Coulomb
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.neighbours import break_nodes
-from bemkit.results.solved_problem import SolvedProblem
-from bemkit.scene.assembly import Assembly
+from bemkit.results.solution import Solution
 from bemkit.scene.conditions import Contact, Part
 from bemkit.scene.scene import Scene
 from bemkit.scene.transform import AffineMap, transformed_scene
@@ -22,13 +20,13 @@ PRECISION = 1e-9
 """Agreement, relative to the largest entry, that similar problems owe each other after scaling."""
 
 
-def precision_elsewhere(solution: SolvedProblem, distance: float) -> float:
+def precision_elsewhere(solution: Solution, distance: float) -> float:
     """Return the agreement that a scene owes when it is moved by a distance [m].
 
     Gaps are differences of coordinates, known to eps of the distance; displacements are a small part of the size, and
     rough gaps make tractions as rough as E' times the roughness over the length of an element.
     """
-    bodies = solution.solved_bodies
+    bodies = solution.bodies.values()
     longest = max(float(np.abs(body.boundary.displacement).max()) for body in bodies)
     pressure = float(np.abs(solution.contact.sigma_n).max(initial=0.0))
     stiffest = max(body.scene.material.plane_modulus / float(body.mesh.lengths.min()) for body in bodies)
@@ -36,8 +34,8 @@ def precision_elsewhere(solution: SolvedProblem, distance: float) -> float:
     return PRECISION + 4.0 * np.finfo(float).eps * distance * loss
 
 
-def with_friction(scene: Any, coefficient: float) -> Any:
-    """Return a scene or an assembly with one friction coefficient, and no laws of single contacts."""
+def with_friction(scene: Scene, coefficient: float) -> Scene:
+    """Return a scene with one friction coefficient, and no laws of single contacts."""
 
     def parts(own: Sequence[Part]) -> tuple[Part, ...]:
         return tuple(
@@ -45,12 +43,9 @@ def with_friction(scene: Any, coefficient: float) -> Any:
             for part in own
         )
 
-    law = Coulomb(coefficient)
-    if isinstance(scene, Assembly):
-        bodies = tuple(replace(body, parts=parts(body.parts)) for body in scene.bodies)
-        contacts = tuple(replace(pair, law=None) for pair in scene.contacts)
-        return replace(scene, bodies=bodies, contacts=contacts, law=law)
-    return replace(scene, parts=parts(scene.parts), law=law)
+    bodies = tuple(replace(body, parts=parts(body.parts)) for body in scene.bodies)
+    contacts = tuple(replace(pair, law=None) for pair in scene.contacts)
+    return replace(scene, parts=parts(scene.parts), bodies=bodies, contacts=contacts, law=Coulomb(coefficient))
 
 
 @dataclass(frozen=True)
@@ -91,7 +86,7 @@ class Case:
     ----------
     value : float
         Place on the axis.
-    scene : Scene or Assembly
+    scene : Scene
     similarity : Similarity or AssemblySimilarity
         Factors that lead from the reference of the axis to this scene, by which results are scaled back.
     levels : int
@@ -107,7 +102,7 @@ class Case:
     """
 
     value: float
-    scene: Scene | Assembly
+    scene: Scene
     similarity: Similarity | AssemblySimilarity = Similarity()
     levels: int = 0
     precision: float = PRECISION

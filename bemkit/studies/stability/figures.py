@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
@@ -20,17 +19,17 @@ _SERIES = (
 _FLOOR = 1e-18
 
 
-def draw_axes(axes: Sequence[Axis[Any]], records: Sequence[StabilityRecord]) -> dict[str, Figure]:
+def draw_axes(axes: Sequence[Axis], records: Sequence[StabilityRecord]) -> dict[str, Figure]:
     """Draw one figure for each axis, by file names."""
     return {figure_name(axis): draw_axis(axis, [one for one in records if one.axis == axis.name]) for axis in axes}
 
 
-def figure_name(axis: Axis[Any]) -> str:
+def figure_name(axis: Axis) -> str:
     """Return the name of the file, without ``.png``."""
     return f"stability-{axis.name}"
 
 
-def draw_axis(axis: Axis[Any], records: Sequence[StabilityRecord]) -> Figure:
+def draw_axis(axis: Axis, records: Sequence[StabilityRecord]) -> Figure:
     """Draw one axis."""
     figure = new_figure(6.4, 4.0)
     plot = figure.add_subplot()

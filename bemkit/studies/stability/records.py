@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
-from typing import Any
 
 from bemkit.studies.row_file import RowFile
 from bemkit.studies.stability.axes import Axis
@@ -60,7 +59,7 @@ def table_of(records: Sequence[StabilityRecord]) -> Table:
     return Table.from_records(StabilityRecord, records)
 
 
-def to_markdown(axes: Sequence[Axis[Any]], records: Sequence[StabilityRecord]) -> str:
+def to_markdown(axes: Sequence[Axis], records: Sequence[StabilityRecord]) -> str:
     """Return one Markdown table for each axis, without run times, so that equal results make equal text."""
     texts = []
     for axis in axes:

@@ -1,4 +1,4 @@
-"""Assemblies in other units, turned and elsewhere: every result follows from that of the original."""
+"""Scenes in other units, turned and elsewhere: every result follows from that of the original."""
 
 from __future__ import annotations
 
@@ -15,13 +15,14 @@ from bemkit.contact.spline import RigidSpline
 from bemkit.errors import InputError
 from bemkit.geometry.placement import Placement
 from bemkit.geometry.shapes import Disk, ExteriorOf, PlateWithHole, Polygon, Rectangle, Ring, Sector, Shape
-from bemkit.scene.assembly import Assembly, ContactPair
 from bemkit.scene.body import Body
 from bemkit.scene.body_forces import BodyForce, Gravity, Rotation
 from bemkit.scene.conditions import Condition, Contact, Force, Part, PrescribedDisplacement, Pressure, Traction
+from bemkit.scene.contacts import ContactPair
 from bemkit.scene.copies import CircleCopies, Copies, GridCopies, ListedCopies
 from bemkit.scene.load_history import with_changed_steps
 from bemkit.scene.plane_motion import RigidBody
+from bemkit.scene.scene import Scene
 from bemkit.scene.transform import AffineMap, TransformedRegion
 
 
@@ -29,7 +30,7 @@ from bemkit.scene.transform import AffineMap, TransformedRegion
 class AssemblySimilarity:
     """The map x -> length * (turned x) + shift, with stresses and moduli times the same factor.
 
-    Assemblies are changed number by number, so that the result can be written to a file (but for several load steps,
+    Scenes are changed number by number, so that the result can be written to a file (but for several load steps,
     and parts chosen by a region, if the length changes): fields have to be numbers, and copies in a grid stay as they
     are turned only by way of a list of places.
 
@@ -69,32 +70,32 @@ class AssemblySimilarity:
         """Turn vectors (..., 2)."""
         return self._motion.turned(vectors)
 
-    def apply(self, assembly: Assembly) -> Assembly:
-        """Return the similar assembly.
+    def apply(self, scene: Scene) -> Scene:
+        """Return the similar scene.
 
         Raises
         ------
         InputError
             If something of it has no similar one; the message names it.
         """
-        if assembly.symmetry is not None and not (self.turn == 0.0 and self.shift == (0.0, 0.0)):
-            raise InputError("the assembly has a symmetry, whose bodies stay where they are drawn: remove it")
-        return with_changed_steps(assembly, self._applied)
+        if scene.symmetry is not None and not (self.turn == 0.0 and self.shift == (0.0, 0.0)):
+            raise InputError("the scene has a symmetry, whose bodies stay where they are drawn: remove it")
+        return with_changed_steps(scene, self._applied)
 
-    def _applied(self, assembly: Assembly) -> Assembly:
-        touching = assembly.touching
+    def _applied(self, scene: Scene) -> Scene:
+        touching = scene.touching
         if touching is not None:
             law = None if touching.law is None else self._law(touching.law)
             reach = self._length(touching.reach)
             touching = replace(touching, within=self.length * touching.within, law=law, reach=reach)
         return replace(
-            assembly,
-            bodies=tuple(self._body(body) for body in assembly.bodies),
-            rigid=tuple(self._rigid(body) for body in assembly.rigid),
-            contacts=tuple(self._pair(pair) for pair in assembly.contacts),
+            scene,
+            bodies=tuple(self._body(body) for body in scene.bodies),
+            rigid=tuple(self._rigid(body) for body in scene.rigid),
+            contacts=tuple(self._pair(pair) for pair in scene.contacts),
             touching=touching,
-            law=self._law(assembly.law),
-            symmetry=None if assembly.symmetry is None else self._scaling.transformed(assembly.symmetry),
+            law=self._law(scene.law),
+            symmetry=None if scene.symmetry is None else self._scaling.transformed(scene.symmetry),
         )
 
     def _pair(self, pair: ContactPair) -> ContactPair:
@@ -193,7 +194,7 @@ class AssemblySimilarity:
                 return PlateWithHole(factor * width, factor * height, factor * radius, scaled(corner))
             case ExteriorOf(inner_shape):
                 return ExteriorOf(self._shape(inner_shape))
-        raise InputError(f"shape is {type(shape).__name__}: give one of those that random assemblies are made of")
+        raise InputError(f"shape is {type(shape).__name__}: give one of those that random bodies are made of")
 
     def _part(self, part: Part) -> Part:
         where = part.where

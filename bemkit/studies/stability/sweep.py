@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import cache, partial
-from typing import Any, TypeAlias
+from typing import Any
 
 import numpy as np
 
@@ -13,20 +13,16 @@ from bemkit.errors import BemkitError, InputError
 from bemkit.model.model import build_model
 from bemkit.model.prepared import prepare
 from bemkit.operators.linear.threads import blas_threads_for
-from bemkit.results.assembly_solution import AssemblySolution
 from bemkit.results.solution import Solution
 from bemkit.runs.run import run
-from bemkit.scene.assembly import Assembly
 from bemkit.scene.scene import Scene
 from bemkit.studies.engine import REFUSED, Attempt, Task, attempt, compute
-from bemkit.studies.stability.axes import Axis, Baseline
+from bemkit.studies.stability.axes import Axis
 from bemkit.studies.stability.case import Case, Similarity
 from bemkit.studies.stability.records import StabilityRecord, Verdict
 from bemkit.studies.stability.similar_assembly import AssemblySimilarity
 from bemkit.testing.independent_check import violations_of
 from bemkit.testing.independent_check.verdict import Violations
-
-AnySolution: TypeAlias = Solution | AssemblySolution
 
 TWIN = Similarity(length=3.7e-3, modulus=7.3e5, stress=1.9e-2)
 """Every case is solved a second time in these units. No factor is a power of two, so all round-off differs."""
@@ -39,8 +35,8 @@ class StabilityError(InputError):
 
 
 def sweep(
-    scene: Scene | Assembly,
-    axes: Sequence[Axis[Any]],
+    scene: Scene,
+    axes: Sequence[Axis],
     run_tasks: Callable[[Sequence[Task[StabilityRecord]]], Iterable[StabilityRecord]] = compute,
 ) -> Iterator[StabilityRecord]:
     """Compute the records of some axes from a baseline scene, of one body or of several, one axis after the other.
@@ -53,9 +49,9 @@ def sweep(
         If the scene itself has no converged solution, or no contact, or of one body several load steps, or an axis says
         nothing of it.
     """
-    if isinstance(scene, Scene) and scene.n_steps > 1:
+    if not scene.bodies and scene.n_steps > 1:
         raise StabilityError(f"the scene has {scene.n_steps} load steps, but a sweep solves one: give it a single load")
-    if isinstance(scene, Scene) and not scene.contact_parts:
+    if not scene.has_contact:
         raise StabilityError("the scene has no contact, which this suite is about: give one that has")
     for axis in axes:
         if reason := axis.reason_against(scene):
@@ -67,7 +63,7 @@ def sweep(
         yield from run_tasks(_tasks(axis, baseline.solution))
 
 
-def _tasks(axis: Axis[Baseline], baseline: Baseline) -> list[Task[StabilityRecord]]:
+def _tasks(axis: Axis, baseline: Solution) -> list[Task[StabilityRecord]]:
     # the reference is solved when the first record needs it
     reference = cache(lambda: _reference(axis, baseline))
 
@@ -83,7 +79,7 @@ def _tasks(axis: Axis[Baseline], baseline: Baseline) -> list[Task[StabilityRecor
 
 
 def solve_and_judge(
-    axis: str, case: Case, reference: AnySolution | None, solve: Callable[..., Any] = run
+    axis: str, case: Case, reference: Solution | None, solve: Callable[..., Any] = run
 ) -> StabilityRecord:
     """Solve a case of an axis and its twin, and judge them.
 
@@ -118,28 +114,28 @@ def solve_and_judge(
     )
 
 
-def _twin(scene: Scene | Assembly) -> tuple[Similarity | AssemblySimilarity, Scene | Assembly]:
+def _twin(scene: Scene) -> tuple[Similarity | AssemblySimilarity, Scene]:
     """Return the similar scene, and how it is similar."""
-    if isinstance(scene, Assembly):
+    if scene.bodies:
         return ASSEMBLY_TWIN, ASSEMBLY_TWIN.apply(scene)
     return TWIN, TWIN.apply(scene)
 
 
-def _checked(solution: AnySolution) -> Violations:
+def _checked(solution: Solution) -> Violations:
     n_steps = 0 if solution.loading is None else len(solution.loading.steps)
     return violations_of(solution, solution.at_step(n_steps - 1) if n_steps > 1 else None)
 
 
-def _attempt(scene: Scene | Assembly, case: Case, solve: Callable[..., Any] = run) -> Attempt[Any]:
-    if isinstance(scene, Assembly):
+def _attempt(scene: Scene, case: Case, solve: Callable[..., Any] = run) -> Attempt:
+    if scene.bodies:
         return attempt(lambda: solve(scene))
     # the mesh is made inside: an error there is an answer too
     return attempt(lambda: solve(scene, mesh=case.mesh(scene)))
 
 
 def difference(
-    reference: AnySolution,
-    solution: AnySolution,
+    reference: Solution,
+    solution: Solution,
     similarity: Similarity | AssemblySimilarity,
     *,
     in_mean: bool = False,
@@ -148,7 +144,7 @@ def difference(
 
     Parameters
     ----------
-    reference, solution : Solution or AssemblySolution
+    reference, solution : Solution
     similarity : Similarity or AssemblySimilarity
         Leads from the reference to the solution.
     in_mean : bool
@@ -163,8 +159,8 @@ def difference(
     """
     one, other = reference.contact, solution.contact
     moved = [one.u_n, one.u_t]
-    if isinstance(reference, AssemblySolution):  # relative displacements are round-off where all sticks
-        moved += [body.boundary.displacement for body in reference.solved_bodies]
+    if reference.scene.bodies:  # relative displacements are round-off where all sticks
+        moved += [body.boundary.displacement for body in reference.bodies.values()]
     unit = max(float(np.abs(each).max()) for each in moved) or 1.0
     stress = max(float(np.abs(one.sigma_n).max()), float(np.abs(one.sigma_t).max())) or 1.0
     is_same_mesh = one.n_contact == other.n_contact
@@ -191,9 +187,9 @@ def difference(
     return worst
 
 
-def condition_number(scene: Scene | Assembly, case: Case) -> float:
+def condition_number(scene: Scene, case: Case) -> float:
     """Return the condition number of the contact stiffness of one body, NaN where none is formed and of several."""
-    if isinstance(scene, Assembly):
+    if scene.bodies:
         return math.nan
     mesh = case.mesh(scene)
     with blas_threads_for(2 * mesh.n_elements):
@@ -209,7 +205,7 @@ def condition_number(scene: Scene | Assembly, case: Case) -> float:
     return float(singular[0]) / smallest if smallest > 0.0 else math.inf
 
 
-def _reference(axis: Axis[Baseline], baseline: Baseline) -> Baseline | None:
+def _reference(axis: Axis, baseline: Solution) -> Solution | None:
     if axis.reference is None:
         return baseline
     case = axis.make(baseline, axis.reference)
@@ -219,9 +215,9 @@ def _reference(axis: Axis[Baseline], baseline: Baseline) -> Baseline | None:
 
 def _judge(
     case: Case,
-    reference: AnySolution | None,
-    first: Attempt[Any],
-    second: Attempt[Any],
+    reference: Solution | None,
+    first: Attempt,
+    second: Attempt,
     check: Violations | None,
     drift: float,
     twin: float,

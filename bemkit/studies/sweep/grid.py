@@ -10,7 +10,6 @@ from itertools import product
 
 import numpy as np
 
-from bemkit.scene.assembly import Assembly
 from bemkit.scene.places import Place, PlaceError, value_at, with_value
 from bemkit.scene.scene import Scene
 from bemkit.studies.engine import StudyError
@@ -124,7 +123,7 @@ def _number(text: str, whole: str) -> float:
         raise StudyError(f"vary is {whole!r}: {text.strip()!r} is not a number: give numbers such as 0.5") from None
 
 
-def with_values(scene: Scene | Assembly, values: Mapping[Key, float]) -> Scene | Assembly:
+def with_values(scene: Scene, values: Mapping[Key, float]) -> Scene:
     """Return a scene with other numbers at some places.
 
     Raises
@@ -139,7 +138,7 @@ def with_values(scene: Scene | Assembly, values: Mapping[Key, float]) -> Scene |
     return scene
 
 
-def check_number(scene: Scene | Assembly, key: Key) -> None:
+def check_number(scene: Scene, key: Key) -> None:
     """Refuse a key that leads neither to a number nor to a formula that a number can replace; see `with_values`."""
     value = value_at(scene, key)
     if isinstance(value, tuple | list | np.ndarray):

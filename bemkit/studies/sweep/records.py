@@ -7,7 +7,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 
-from bemkit.results.assembly_solution import AssemblySolution
 from bemkit.results.part_forces import contact_sizes
 from bemkit.results.solution import Solution
 from bemkit.scene.unit_names import UnitNames, unit_of
@@ -79,7 +78,7 @@ RESULTS = tuple(head.name for head in columns_of(SweepRow))
 """The names of all results of a row."""
 
 
-def row_of(values: tuple[float, ...], found: Attempt[Solution | AssemblySolution]) -> SweepRow:
+def row_of(values: tuple[float, ...], found: Attempt) -> SweepRow:
     """Return the row of a scene that was solved, or was not."""
     solution = found.solution
     certified = solution if solution is not None and solution.is_certified else None
@@ -97,7 +96,7 @@ def row_of(values: tuple[float, ...], found: Attempt[Solution | AssemblySolution
     )
 
 
-def _numbers(solution: Solution | AssemblySolution) -> dict[str, float]:
+def _numbers(solution: Solution) -> dict[str, float]:
     table, error = solution.contact, solution.estimated_error
     contacts = [contact_sizes(table, part, solution.transitions) for part in table.parts]
     return {
@@ -111,7 +110,7 @@ def _numbers(solution: Solution | AssemblySolution) -> dict[str, float]:
     }
 
 
-def _places(solution: Solution | AssemblySolution) -> str:
+def _places(solution: Solution) -> str:
     return "; ".join(
         f"{place.part}: {place.from_status}-{place.to_status} at {place.s:.9g} ({place.x:.9g}, {place.y:.9g})"
         for place in solution.transitions

@@ -12,13 +12,10 @@ from typing import Protocol
 
 from bemkit.atomic_files import reserved
 from bemkit.errors import BemkitError
-from bemkit.results.assembly_solution import AssemblySolution
 from bemkit.results.solution import Solution
 from bemkit.runs.run import run
 from bemkit.runs.shared_body import SharedBody
-from bemkit.scene.assembly import Assembly
-from bemkit.scene.scene import Scene
-from bemkit.scene.steps import check_stated
+from bemkit.scene.scene import Scene, check_scene
 from bemkit.scene.toml import scene_to_toml
 from bemkit.studies.engine import Attempt, StudyError, Task, attempt, compute
 from bemkit.studies.sweep.grid import Key, all_rows, check_number, with_values
@@ -36,7 +33,7 @@ class Compute(Protocol):
 
 
 def sweep(
-    scene: Scene | Assembly,
+    scene: Scene,
     vary: Mapping[str, Sequence[float]],
     *,
     file: str | Path | None = None,
@@ -49,7 +46,7 @@ def sweep(
 
     Parameters
     ----------
-    scene : Scene or Assembly
+    scene : Scene
         Without Python functions: formulas are `Expression`.
     vary : mapping of str to sequence of float
         Places in scene files, such as ``"law.friction_coefficient"`` or ``"bodies.punch.placement.shift[0]"``, and the
@@ -75,13 +72,13 @@ def sweep(
     RowFileError, OutputFileError
         If the file cannot be written, or holds another sweep.
     """
-    check_stated(scene)
+    check_scene(scene)
     n_workers = cpu_count() or 1
     return run_sweep(scene, vary, partial(compute, executor=executor, n_workers=n_workers), file=file, cold=cold)
 
 
 def run_sweep(
-    scene: Scene | Assembly,
+    scene: Scene,
     vary: Mapping[str, Sequence[float]],
     compute: Compute,
     *,
@@ -103,7 +100,7 @@ def run_sweep(
 
 
 def sweep_tasks(
-    scene: Scene | Assembly,
+    scene: Scene,
     keys: Sequence[Key],
     grid: Sequence[Values],
     *,
@@ -117,7 +114,7 @@ def sweep_tasks(
     BemkitError
         Of the first row, if every row is refused.
     """
-    scenes: dict[Values, Scene | Assembly] = {}
+    scenes: dict[Values, Scene] = {}
     refused: dict[Values, BemkitError] = {}
     for values in grid:
         try:
@@ -148,9 +145,7 @@ def sweep_tasks(
     return tuple(tasks)
 
 
-def _solved_row(
-    values: Values, solve: Callable[[], Solution | AssemblySolution], done: Callable[[], None] | None
-) -> SweepRow:
+def _solved_row(values: Values, solve: Callable[[], Solution], done: Callable[[], None] | None) -> SweepRow:
     row = row_of(values, attempt(solve))
     if done is not None:
         done()

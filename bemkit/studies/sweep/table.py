@@ -13,7 +13,6 @@ import numpy as np
 from bemkit.arrays import FloatArray
 from bemkit.errors import InputError
 from bemkit.formulas import closest
-from bemkit.scene.assembly import Assembly
 from bemkit.scene.scene import Scene
 from bemkit.scene.toml import scene_from_toml
 from bemkit.studies.sweep.records import FILE, QUANTITIES, RESULTS, SweepRow, unit_of_column
@@ -26,7 +25,7 @@ class Sweep:
 
     Parameters
     ----------
-    scene : Scene or Assembly
+    scene : Scene
         What is the same in all rows.
     keys : tuple of str
         What is varied.
@@ -34,7 +33,7 @@ class Sweep:
         All combinations of values, that of the first key changing last.
     """
 
-    scene: Scene | Assembly = field(repr=False)
+    scene: Scene = field(repr=False)
     keys: tuple[str, ...]
     rows: tuple[SweepRow, ...]
 

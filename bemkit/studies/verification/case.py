@@ -66,7 +66,7 @@ class Case:
         Key of ``docs/references.md``.
     validity : str
         Under which assumptions the answer holds, and what they cost where the scene meets them only nearly.
-    solve : callable (resolution) -> Solution or AssemblySolution
+    solve : callable (resolution) -> Solution
     resolutions : tuple of float
         Two or three, from coarse to fine: numbers of elements, or accuracies (less than one).
     quantities : tuple of Quantity

@@ -45,7 +45,6 @@ from bemkit.reference import (
     westergaard_half_width,
     westergaard_pressure,
 )
-from bemkit.results.assembly_solution import AssemblySolution
 from bemkit.results.interior import interior_fields
 from bemkit.results.solution import Solution
 from bemkit.scene.toml import load_single_body
@@ -149,7 +148,7 @@ def _columns() -> Rows:
     exact = GravityColumn((1.5, 1.0), (2.0, 1.0), (Material(2.0, 0.2), Material(1.0, 0.3)))
     on_floor, between = exact.base_pressures()
 
-    def settlement(solution: AssemblySolution) -> float:
+    def settlement(solution: Solution) -> float:
         boundary = solution.bodies["upper"].boundary
         return -float(boundary.displacement[boundary.points[:, 1] > 2.5 - 1e-9, 1].mean())
 
@@ -173,7 +172,7 @@ def _hertz_cylinders() -> Rows:
 
 
 def _cattaneo_mindlin() -> Rows:
-    def sheared(solution: AssemblySolution) -> PartialSlip:
+    def sheared(solution: Solution) -> PartialSlip:
         return PartialSlip(_hertz(solution), abs(solution.contacts[0].force_tangential), 0.5)
 
     return {
@@ -182,9 +181,9 @@ def _cattaneo_mindlin() -> Rows:
     }
 
 
-def _hertz(solution: AssemblySolution) -> HertzLine:
+def _hertz(solution: Solution) -> HertzLine:
     """Return Hertz's solution of the two cylinders of radius 1 under the force that came out."""
-    upper, lower = (body.material for body in solution.assembly.bodies)
+    upper, lower = (body.material for body in solution.scene.bodies)
     return HertzLine(solution.contacts[0].force_normal, 0.5, pair_modulus(upper, lower))
 
 
@@ -196,7 +195,7 @@ def _pin(sheet: Material) -> Rows:
 def _snug_disc() -> Rows:
     mean, difference = 1.5e-3, 1e-3
 
-    def error(solution: AssemblySolution) -> float:
+    def error(solution: Solution) -> float:
         angle = np.arctan2(solution.contact.y, solution.contact.x)
         return _largest_error(-solution.contact.sigma_n, mean + 0.75 * difference * np.cos(2.0 * angle))
 
@@ -204,8 +203,8 @@ def _snug_disc() -> Rows:
 
 
 def _least_friction() -> Rows:
-    def friction(solution: AssemblySolution) -> float:
-        law = solution.assembly.law
+    def friction(solution: Solution) -> float:
+        law = solution.scene.law
         return cast("float", law.friction_coefficient) if isinstance(law, Coulomb) else np.nan
 
     return {"friction coefficient": (friction, arch_friction_limit(21))}
@@ -299,7 +298,7 @@ def _closed_cracks(length_share: float) -> Rows:
 def _lost(expected: float) -> Rows:
     """Compare the energy that friction takes up in the steps of the last cycle, all but the first half of them."""
 
-    def lost(solution: Solution | AssemblySolution) -> float:
+    def lost(solution: Solution) -> float:
         loading = solution.loading
         if loading is None:
             raise InputError("the solution has no load history: give steps")
@@ -308,25 +307,25 @@ def _lost(expected: float) -> Rows:
     return {"energy lost in a cycle": (lost, expected)}
 
 
-def _ends(solution: Solution | AssemblySolution, status: str = "separated") -> list[float]:
+def _ends(solution: Solution, status: str = "separated") -> list[float]:
     """Return the places [m] along x where a status begins or ends, from left to right."""
     return sorted(place.x for place in solution.transitions if status in (place.from_status, place.to_status))
 
 
-def _half_stuck(solution: Solution | AssemblySolution) -> float:
+def _half_stuck(solution: Solution) -> float:
     ends = _ends(solution, "stick")
     return 0.5 * (ends[-1] - ends[0])
 
 
-def _length(solution: Solution | AssemblySolution) -> float:
+def _length(solution: Solution) -> float:
     return float(solution.contacts[0].contact_length)
 
 
-def _half_length(solution: AssemblySolution) -> float:
+def _half_length(solution: Solution) -> float:
     return 0.5 * _length(solution)
 
 
-def _peak(solution: Solution | AssemblySolution) -> float:
+def _peak(solution: Solution) -> float:
     return float(solution.contacts[0].peak_pressure)
 
 
@@ -339,15 +338,15 @@ def _largest_error(values: FloatArray, expected: FloatArray) -> float:
     return float(np.abs(values - expected).max() / np.abs(expected).max())
 
 
-def _pressure_error(solution: Solution | AssemblySolution, exact: Callable[[FloatArray], FloatArray]) -> float:
+def _pressure_error(solution: Solution, exact: Callable[[FloatArray], FloatArray]) -> float:
     return _mean_error(solution, -solution.contact.sigma_n, exact(solution.contact.x))
 
 
-def _shear_error(solution: Solution | AssemblySolution, exact: PartialSlip) -> float:
+def _shear_error(solution: Solution, exact: PartialSlip) -> float:
     return _mean_error(solution, np.abs(solution.contact.sigma_t), exact.traction(solution.contact.x))
 
 
-def _mean_error(solution: Solution | AssemblySolution, values: FloatArray, expected: FloatArray) -> float:
+def _mean_error(solution: Solution, values: FloatArray, expected: FloatArray) -> float:
     """Return the error of values at the contact nodes in the L2 norm."""
     weight = solution.contact.weight
     return float(np.sqrt(weight @ (values - expected) ** 2 / (weight @ expected**2)))

@@ -10,21 +10,19 @@ from typing import Any, Literal, TypeAlias
 import numpy as np
 
 from bemkit.contact.laws import Coulomb
-from bemkit.results.assembly_solution import AssemblySolution
 from bemkit.results.solution import Solution
 from bemkit.runs.run import run
 from bemkit.runs.steps import UnsolvableSceneError
-from bemkit.scene.assembly import Assembly
 from bemkit.scene.conditions import PrescribedDisplacement
 from bemkit.scene.mesh_options import MeshOptions
 from bemkit.scene.scene import Scene
 from bemkit.scene.steps import Step
 from bemkit.scene.toml import with_overrides
 
-Solve: TypeAlias = Callable[[float], Solution | AssemblySolution]
+Solve: TypeAlias = Callable[[float], Solution]
 
 
-def at_resolution(scene: Scene | Assembly, degree: Literal["hp"] | None = None) -> Solve:
+def at_resolution(scene: Scene, degree: Literal["hp"] | None = None) -> Solve:
     """Return what solves a scene with a number of elements, or to an accuracy, which is less than one."""
 
     def solve(resolution: float) -> Any:
@@ -35,7 +33,7 @@ def at_resolution(scene: Scene | Assembly, degree: Literal["hp"] | None = None) 
     return solve
 
 
-def _unmatched(scene: Assembly) -> Solve:
+def _unmatched(scene: Scene) -> Solve:
     """Divide the second body into 1.7 times as many elements as the first."""
 
     def solve(n: float) -> Any:
@@ -46,11 +44,11 @@ def _unmatched(scene: Assembly) -> Solve:
     return solve
 
 
-def _pressed_then_sheared(scene: Assembly) -> Solve:
+def _pressed_then_sheared(scene: Scene) -> Solve:
     """Push the upper one of two cylinders down, then to the side, on the meshes that suit the end."""
     scene = replace(scene, law=Coulomb(0.5))
 
-    def under(shift: float) -> Assembly:
+    def under(shift: float) -> Scene:
         upper, lower = scene.bodies
         pushed = replace(upper.parts[0], condition=PrescribedDisplacement(shift, -0.0022))
         return replace(scene, bodies=(replace(upper, parts=(pushed, *upper.parts[1:])), lower))
@@ -69,7 +67,7 @@ def _growing(scene: Scene) -> Solve:
     return lambda n: run(replace(scene, load_factors=tuple((np.arange(1.0, n + 1.0) / n) ** 2)))
 
 
-def _to_and_fro(scene: Scene | Assembly, loads: Mapping[str, float], n_quarter: int) -> Scene | Assembly:
+def _to_and_fro(scene: Scene, loads: Mapping[str, float], n_quarter: int) -> Scene:
     """Return a scene whose loads, at their keys, grow and go to and fro once after a first step without them."""
 
     def changes(shape: str) -> dict[str, str]:
@@ -85,16 +83,16 @@ def _sheared_to_and_fro(scene: Scene) -> Solve:
     return lambda n: run(_to_and_fro(scene, {"far.force_x": 0.2}, int(n)))
 
 
-def _bent_to_and_fro(scene: Assembly) -> Solve:
+def _bent_to_and_fro(scene: Scene) -> Solve:
     loads = {f"bodies.{name}.parts.tip.condition.y": 4e-5 for name in ("lower", "upper")}
     return at_resolution(_to_and_fro(scene, loads, 2))
 
 
-def _least_friction(scene: Assembly) -> Solve:
+def _least_friction(scene: Scene) -> Solve:
     """Halve a range of the friction coefficient until the arch is known to fall just below the one that is returned."""
 
-    def solve(n: float) -> AssemblySolution:
-        known: AssemblySolution | None = None
+    def solve(n: float) -> Solution:
+        known: Solution | None = None
         least, most = 0.3, 0.33
         while most - least > 3e-5 or known is None:
             friction = 0.5 * (least + most)

@@ -12,7 +12,6 @@ import numpy as np
 
 from bemkit.errors import InputError
 from bemkit.formulas import closest
-from bemkit.results.assembly_solution import AssemblySolution
 from bemkit.results.solution import Solution
 from bemkit.studies.engine import Attempt, Task, attempt, compute
 from bemkit.studies.verification.case import CASES, Case, Quantity
@@ -93,7 +92,7 @@ def selected(names: Sequence[str], known: tuple[str, ...]) -> tuple[str, ...]:
 
 def compare(name: str, case: Case, resolution: float) -> Comparison:
     """Solve a case at one resolution and compare all its quantities."""
-    found: Attempt[Solution | AssemblySolution] = attempt(lambda: case.solve(resolution))
+    found: Attempt = attempt(lambda: case.solve(resolution))
     solution = found.solution
     is_certified = solution is not None and solution.is_certified
     records = []
@@ -117,7 +116,7 @@ def compare(name: str, case: Case, resolution: float) -> Comparison:
     return Comparison((name, resolution), tuple(records))
 
 
-def _measured(quantity: Quantity, solution: Solution | AssemblySolution | None) -> tuple[float, str]:
+def _measured(quantity: Quantity, solution: Solution | None) -> tuple[float, str]:
     """Return what came out, or nan and a message: a wrong solution may lack the zones that are compared."""
     try:
         return float(quantity.measure(solution)), ""

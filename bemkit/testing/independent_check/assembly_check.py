@@ -1,4 +1,4 @@
-"""The independent check of an assembly: each body by itself, each contact from both its sides, all forces together."""
+"""The independent check of a scene: each body by itself, each contact from both its sides, all forces together."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from bemkit.arrays import FloatArray
-from bemkit.results.assembly_solution import AssemblySolution, SideName
 from bemkit.results.solution import Solution
+from bemkit.results.solved_body import SideName
 from bemkit.testing.independent_check.balance import trusted_work
 from bemkit.testing.independent_check.check import contact_violations, is_finite, violations_of_body
 from bemkit.testing.independent_check.distances import gap_mismatch, hidden_overlaps, mean_mismatch
@@ -18,7 +18,7 @@ from bemkit.testing.independent_check.verdict import COARSE_LIMIT, COARSE_SHARE,
 
 @dataclass(frozen=True, kw_only=True)
 class AssemblyCheck(Violations):
-    """Violations found in the fields of an assembly, dimensionless; zero is perfect.
+    """Violations found in the fields of a scene, dimensionless; zero is perfect.
 
     Of reciprocity, with the moments, coarseness and the like the worst of all bodies is reported; hidden overlap is how
     deep points between nodes are in the partner, over the displacement that strains the body.
@@ -51,8 +51,8 @@ class AssemblyCheck(Violations):
         return "reciprocity" if self.is_coarse else ""
 
 
-def violations_of_assembly(solution: AssemblySolution, before: AssemblySolution | None = None) -> AssemblyCheck:
-    """Check the fields of an assembly; see `AssemblyCheck`.
+def violations_of_assembly(solution: Solution, before: Solution | None = None) -> AssemblyCheck:
+    """Check the fields of a scene; see `AssemblyCheck`.
 
     Slip counts from the end of the load step before. Without that, friction against slip is not checked at the end of a
     load history.
@@ -81,16 +81,16 @@ def violations_of_assembly(solution: AssemblySolution, before: AssemblySolution 
     )
 
 
-def violations_of(step: Solution | AssemblySolution, before: Solution | AssemblySolution | None) -> Violations:
+def violations_of(step: Solution, before: Solution | None) -> Violations:
     """Check a solution of one body or of several, of a load history with the step before it.
 
     Slip counts from the last increment, which is not there to be seen if the step was gone in several.
     """
     if step.loading is not None and step.loading.steps[-1].n_increments > 1:
         before = None
-    if isinstance(step, AssemblySolution):
-        return violations_of_assembly(step, before if isinstance(before, AssemblySolution) else None)
-    return violations_of_body(step, before if isinstance(before, Solution) else None)
+    if len(step.bodies) > 1 or step.scene.contacts:
+        return violations_of_assembly(step, before)
+    return violations_of_body(step, before)
 
 
 def forces(joints: Joints) -> dict[SideName, tuple[FloatArray, float]]:
@@ -120,7 +120,7 @@ def rigid_mismatch(joints: Joints) -> float:
     """
     solution, table, worst = joints.solution, joints.solution.contact, [0.0]
     points, acting = np.column_stack([table.x, table.y]), _nodal(joints)
-    for body in solution.assembly.rigid:
+    for body in solution.scene.rigid:
         total, size, found = np.zeros(3), 0.0, solution.rigid[body.name]
         for name, pair in joints.moving.items():
             if pair.rigid_body != body.name or name not in table.parts:

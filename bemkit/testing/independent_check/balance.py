@@ -19,10 +19,10 @@ import numpy as np
 
 from bemkit.arrays import FloatArray
 from bemkit.operators.material import Material
-from bemkit.results.solution import Solution
 from bemkit.testing.independent_check.boundary import Boundary, beyond, largest, trusted_stress
 from bemkit.testing.independent_check.inside import inner_work, particular_tractions, without_particular
 from bemkit.testing.independent_check.nodes import Fields
+from bemkit.testing.independent_check.views import BodyView
 
 _N_OUTSIDE = 6
 _AWAY = 0.8
@@ -55,7 +55,7 @@ def load_mismatch(fields: Fields) -> float:
     return largest(np.abs(mean - solution.boundary.traction)[~is_contact] / fields.scales.stress)
 
 
-def motions_at(solution: Solution, points: FloatArray) -> FloatArray:
+def motions_at(solution: BodyView, points: FloatArray) -> FloatArray:
     """Return the two translations and the rotation at points (..., 2), (..., 2, 3), lengths by the diameter."""
     mesh = solution.mesh
     x, y = np.moveaxis((points - mesh.centre) / mesh.diameter, -1, 0)
@@ -63,7 +63,7 @@ def motions_at(solution: Solution, points: FloatArray) -> FloatArray:
     return np.stack([np.stack([one, zero, -y], axis=-1), np.stack([zero, one, x], axis=-1)], axis=-2)
 
 
-def admissible_modes_of(solution: Solution) -> list[int]:
+def admissible_modes_of(solution: BodyView) -> list[int]:
     """Return which of the two translations and the rotation the symmetry allows; an exterior is at rest far away."""
     mesh = solution.mesh
     if mesh.is_exterior:
@@ -98,7 +98,7 @@ def imbalance(fields: Fields) -> float:
     return float(np.abs(work @ free.T).max(initial=0.0)) / size if size > 0.0 else 0.0
 
 
-def _loads(solution: Solution, boundary: Boundary) -> FloatArray:
+def _loads(solution: BodyView, boundary: Boundary) -> FloatArray:
     """Return (n_elements, n_places, 2) forces [N/m] of given loads."""
     is_load = np.ones(solution.mesh.n_elements, bool)
     for part in solution.scene.parts:
@@ -109,7 +109,7 @@ def _loads(solution: Solution, boundary: Boundary) -> FloatArray:
     return np.where(is_load[:, None], boundary.shares, 0.0)[:, :, None] * boundary.traction
 
 
-def _free_motions(solution: Solution, boundary: Boundary) -> FloatArray:
+def _free_motions(solution: BodyView, boundary: Boundary) -> FloatArray:
     """Return (n_free, 3) coefficients of the rigid motions that no support resists."""
     admissible = admissible_modes_of(solution)
     rows = [np.eye(3)[[mode for mode in range(3) if mode not in admissible]], np.zeros((1, 3))]
@@ -150,7 +150,7 @@ def energy_mismatch(fields: Fields) -> float:
     return abs(solution.energy - work) / size if size > 0.0 else 0.0
 
 
-def strained_displacement(solution: Solution, displacement: FloatArray | None = None) -> FloatArray:
+def strained_displacement(solution: BodyView, displacement: FloatArray | None = None) -> FloatArray:
     """Return nodal displacements (n_nodes, 2) [m], those of the solution unless given, without their rigid part."""
     fields = solution.boundary
     displacement = fields.displacement if displacement is None else displacement
@@ -211,7 +211,7 @@ def _length(vectors: FloatArray) -> FloatArray:
     return np.asarray(np.hypot(vectors[..., 0], vectors[..., 1]))
 
 
-def _with_images(solution: Solution, field: FloatArray, *, is_point: bool = False) -> FloatArray:
+def _with_images(solution: BodyView, field: FloatArray, *, is_point: bool = False) -> FloatArray:
     """Return a field on the whole body, images included: points are reflected, vectors change signs."""
     symmetry = solution.mesh.symmetry
     if symmetry is None:
@@ -222,7 +222,7 @@ def _with_images(solution: Solution, field: FloatArray, *, is_point: bool = Fals
     return np.concatenate([np.where(signs < 0.0, twice - field, field) for signs in images])
 
 
-def _states(solution: Solution) -> Iterator[State]:
+def _states(solution: BodyView) -> Iterator[State]:
     mesh, material = solution.mesh, solution.scene.material
     holes = list(_inside_of_holes(solution))
     for hole in holes:
@@ -238,7 +238,7 @@ def _states(solution: Solution) -> Iterator[State]:
             yield point_force(source, direction, mesh.diameter, material)
 
 
-def _inside_of_holes(solution: Solution) -> Iterator[FloatArray]:
+def _inside_of_holes(solution: BodyView) -> Iterator[FloatArray]:
     """Yield the centroid of the nodes of each loop that runs clockwise, which lies inside if the hole is convex."""
     whole = solution.mesh.whole
     for loop in whole.loops:

@@ -1,21 +1,13 @@
-"""The bodies of a solved assembly, each measured by itself: boundary, loads, reactions, scales, balances."""
+"""The bodies of a solution, each measured by itself: boundary, loads, reactions, scales, balances."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import cast
 
 import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray, IntArray
-from bemkit.contact.laws import Frictionless
-from bemkit.geometry.mesh import BoundaryMesh
-from bemkit.model.particular import ParticularFields
-from bemkit.results.assembly_solution import BodyResult
-from bemkit.results.contact_table import ContactTable
-from bemkit.results.solution import BoundaryFields, Solution
-from bemkit.scene.conditions import Contact, Free
-from bemkit.scene.scene import Scene
+from bemkit.results.solved_body import SolvedBody
 from bemkit.testing.independent_check.balance import (
     _free_motions,
     admissible_modes_of,
@@ -30,20 +22,7 @@ from bemkit.testing.independent_check.boundary import Boundary, Scales, boundary
 from bemkit.testing.independent_check.half_plane import Surface
 from bemkit.testing.independent_check.inside import inner_work
 from bemkit.testing.independent_check.nodes import Fields, contact_nodes_of, supported_nodes
-
-_NO_TABLE = ContactTable((), *(np.zeros(0),) * 9, status=np.zeros(0, np.intp), weight=np.zeros(0))
-
-
-@dataclass(frozen=True, eq=False)
-class BodyView:
-    """A body of an assembly as the check of one body reads it: what touches it is a load on free parts."""
-
-    scene: Scene
-    mesh: BoundaryMesh
-    boundary: BoundaryFields
-    energy: float
-    particular: ParticularFields | None
-    contact: ContactTable = _NO_TABLE
+from bemkit.testing.independent_check.views import BodyView, freed, obstacles_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,24 +31,24 @@ class MeasuredBody:
 
     Parameters
     ----------
-    result : BodyResult
+    result : SolvedBody
     fields : Fields
         Tractions are given loads, and what elements say of contacts and reactions.
     is_touched : (n_elements,) bool array
         Elements that belong to contacts, be they with bodies or with rigid obstacles.
     """
 
-    result: BodyResult
+    result: SolvedBody
     fields: Fields
     is_touched: BoolArray
 
     @classmethod
-    def of(cls, result: BodyResult, touched: tuple[str, ...], before: BodyResult | None = None) -> MeasuredBody:
+    def of(cls, result: SolvedBody, touched: tuple[str, ...], before: SolvedBody | None = None) -> MeasuredBody:
         """Measure a body with the names of its sides in contact, and what it was after the load step before."""
-        view, earlier = _view(result), None if before is None else _view(before)
+        view, earlier = freed(result), None if before is None else freed(before)
         mesh, boundary = result.mesh, boundary_of(view)
         is_touched = np.zeros(mesh.n_elements, bool)
-        for name in (*touched, *_obstacles(result.scene)):
+        for name in (*touched, *obstacles_of(result.scene)):
             is_touched[mesh.part(name)] = True
         traction = boundary.traction.copy()
         is_known = is_touched.copy()
@@ -172,20 +151,7 @@ class MeasuredBody:
         return abs(float(work[..., 2].sum() + inside[2])) / size if size > 0.0 else 0.0
 
 
-def _obstacles(scene: Scene) -> list[str]:
-    """Return the names of the parts that face rigid obstacles."""
-    return [part.name for part in scene.parts if isinstance(part.condition, Contact)]
-
-
-def _view(result: BodyResult) -> Solution:
-    """Return a body with free parts where rigid obstacles touch it."""
-    obstacles = _obstacles(result.scene)
-    parts = tuple(replace(part, condition=Free()) if part.name in obstacles else part for part in result.scene.parts)
-    freed = replace(result.scene, parts=parts, law=Frictionless())
-    return cast(Solution, BodyView(freed, result.mesh, result.boundary, result.energy, result.particular))
-
-
-def _interpolated(result: BodyResult) -> FloatArray:
+def _interpolated(result: SolvedBody) -> FloatArray:
     """Return the tractions (n_elements, n_places, 2) [Pa] that the traction space makes at the quadrature points."""
     space = result.scene.discretisation.traction_space(result.mesh)
     places = np.polynomial.legendre.leggauss(8)[0]
@@ -193,7 +159,7 @@ def _interpolated(result: BodyResult) -> FloatArray:
     return np.asarray(np.einsum("lq,elc->eqc", space.basis(places), values))
 
 
-def _free_translations(view: Solution, boundary: Boundary) -> FloatArray:
+def _free_translations(view: BodyView, boundary: Boundary) -> FloatArray:
     """Return (k, 2) unit vectors along which no support holds the body."""
     free = _free_motions(view, boundary)
     if not len(free):

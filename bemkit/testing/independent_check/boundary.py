@@ -10,8 +10,8 @@ import numpy as np
 
 from bemkit.arrays import FloatArray, IntArray
 from bemkit.geometry.spaces import element_nodes
-from bemkit.results.solution import Solution
 from bemkit.scene.conditions import Clamped, Contact, Load, PrescribedDisplacement, Roller
+from bemkit.testing.independent_check.views import BodyView
 
 CONTACT_LIMIT = 1e-6
 """Largest violation of contact, friction, supports and equilibrium in a right answer. Solvers stop at 1e-9 of a
@@ -80,7 +80,7 @@ class Boundary:
         return np.asarray(np.einsum("enc,enq->eqc", nodal[self.nodes], self.basis))
 
 
-def boundary_of(solution: Solution) -> Boundary:
+def boundary_of(solution: BodyView) -> Boundary:
     """Return the elements of a solution with quadrature points, normals, loads, supports and interpolation."""
     mesh = solution.mesh
     places, weights = np.polynomial.legendre.leggauss(_N_POINTS)
@@ -129,7 +129,7 @@ def _slopes(values: FloatArray, places: FloatArray, targets: FloatArray) -> Floa
     return np.asarray(slopes.reshape(targets.size, len(values), 2).swapaxes(0, 1))
 
 
-def _tractions(solution: Solution, points: FloatArray, normals: FloatArray) -> FloatArray:
+def _tractions(solution: BodyView, points: FloatArray, normals: FloatArray) -> FloatArray:
     """Return `Boundary.traction`."""
     traction = np.zeros_like(points)
     for part in solution.scene.parts:
@@ -142,7 +142,7 @@ def _tractions(solution: Solution, points: FloatArray, normals: FloatArray) -> F
     return traction
 
 
-def _held(solution: Solution, node_points: FloatArray, node_normals: FloatArray) -> Iterator[Held]:
+def _held(solution: BodyView, node_points: FloatArray, node_normals: FloatArray) -> Iterator[Held]:
     """Yield the directions in which the supports hold the body."""
     for part in solution.scene.parts:
         elements = solution.mesh.part(part.name)
@@ -186,7 +186,7 @@ class Scales(NamedTuple):
     turned: float
 
 
-def scales_of(solution: Solution, before: Solution | None = None) -> Scales:
+def scales_of(solution: BodyView, before: BodyView | None = None) -> Scales:
     """Return the sizes that the violations in a solution are measured by.
 
     What is left of the load step `before` is known no better than its own tractions were.
@@ -212,7 +212,7 @@ def scales_of(solution: Solution, before: Solution | None = None) -> Scales:
     return Scales(stress or 1.0, length or 1.0, coordinates, (error + 1e-12) * displacement)
 
 
-def trusted_stress(solution: Solution, before: Solution | None = None) -> float:
+def trusted_stress(solution: BodyView, before: BodyView | None = None) -> float:
     """Return the stress [Pa] whose `CONTACT_LIMIT`-th part is the round-off of tractions: the least to measure by.
 
     What is left of the load step `before` is known no better than its tractions were.

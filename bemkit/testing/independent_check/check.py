@@ -10,7 +10,6 @@ from bemkit.arrays import BoolArray, FloatArray, IntArray
 from bemkit.contact.laws import FrictionLaw
 from bemkit.results.contact_table import ContactTable
 from bemkit.results.solution import Solution
-from bemkit.results.solved_problem import SolvedProblem
 from bemkit.solvers.active_sets import NodeStatus
 from bemkit.testing.independent_check.balance import (
     energy_mismatch,
@@ -24,6 +23,7 @@ from bemkit.testing.independent_check.boundary import CONTACT_LIMIT, beyond, lar
 from bemkit.testing.independent_check.half_plane import Surface
 from bemkit.testing.independent_check.nodes import Fields, hidden_overlap
 from bemkit.testing.independent_check.verdict import Violations
+from bemkit.testing.independent_check.views import view_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,7 +58,7 @@ def measured_contact(fields: Fields) -> Measured:
     solution, before, _, nodes, scales = fields
     table = solution.contact
     law = solution.scene.law_at(table.part, np.column_stack([table.x, table.y]))
-    law = law if solution.loading is None else law.at_slip(solution.loading.motion)
+    law = law if solution.motion is None else law.at_slip(solution.motion)
     motion = nodes.components(nodes.displacement)
     # of a far motion normals that differ by round-off make more than contact strains the body by; see `table_mismatch`
     approach = np.where(np.abs(motion[:, 0] - table.u_n) <= scales.turned, table.u_n, motion[:, 0])
@@ -173,7 +173,7 @@ def status_mismatch(status: IntArray, measured: Measured) -> float:
     return max(largest(measured.held[is_open]), largest(np.abs(measured.clearance)[~is_open]), largest(friction))
 
 
-def contact_violations(measured: Measured, solution: SolvedProblem, *, knows_slip: bool) -> dict[str, float]:
+def contact_violations(measured: Measured, solution: Solution, *, knows_slip: bool) -> dict[str, float]:
     """Return the violations of the conditions of contact; see `Violations`.
 
     At the end of a load history slip that counts from the step before is not known without that step: `knows_slip`.
@@ -190,12 +190,12 @@ def contact_violations(measured: Measured, solution: SolvedProblem, *, knows_sli
     }
 
 
-def is_finite(solution: SolvedProblem) -> bool:
+def is_finite(solution: Solution) -> bool:
     """Return whether all fields are numbers; distances to obstacles out of reach may be infinite."""
     columns = solution.contact.columns()
     distances = [columns.pop(name) for name in ("gap", "clearance")]
     of_bodies = (
-        field for body in solution.solved_bodies for field in (*vars(body.boundary).values(), np.array(body.energy))
+        field for body in solution.bodies.values() for field in (*vars(body.boundary).values(), np.array(body.energy))
     )
     known = all(bool(np.isfinite(field).all()) for field in (*columns.values(), *of_bodies))
     return known and not any(np.isnan(field).any() for field in distances)
@@ -233,7 +233,7 @@ def violations_of_body(solution: Solution, before: Solution | None = None) -> In
     """
     if not is_finite(solution):
         return IndependentCheck.not_finite()
-    parts = Fields.of(solution, before)
+    parts = Fields.of(view_of(solution), None if before is None else view_of(before))
     return IndependentCheck(
         numbers=0.0,
         obstacle=obstacle_mismatch(parts),

@@ -1,4 +1,4 @@
-"""Gaps, relative displacements and overlaps of a solved assembly, measured again on its fields."""
+"""Gaps, relative displacements and overlaps of a solution, measured again on its fields."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def _from_obstacle(joints: Joints, name: str) -> FloatArray:
         assert isinstance(condition, Contact)
         obstacle = condition.obstacle
     else:
-        added, obstacle = pair.gap, joints.solution.assembly.rigid_body_of(pair).obstacle
+        added, obstacle = pair.gap, joints.solution.scene.rigid_body_of(pair).obstacle
     distance, _ = distance_to(obstacle, points, normals)
     known = np.isfinite(table.gap[rows])
     return np.abs(table.gap[rows][known] - distance[known] - added)

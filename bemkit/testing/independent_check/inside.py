@@ -9,12 +9,12 @@ from __future__ import annotations
 import numpy as np
 
 from bemkit.arrays import FloatArray
-from bemkit.results.solution import Solution
 from bemkit.scene.body_forces import Gravity, Heating, Rotation
 from bemkit.testing.independent_check.boundary import Boundary
+from bemkit.testing.independent_check.views import BodyView
 
 
-def inner_work(solution: Solution, boundary: Boundary) -> FloatArray:
+def inner_work(solution: BodyView, boundary: Boundary) -> FloatArray:
     """Return the work (3,) of forces inside on the translations and on the rotation about the centre by 1 / diameter.
 
     Heat does none.
@@ -38,7 +38,7 @@ def inner_work(solution: Solution, boundary: Boundary) -> FloatArray:
     return work
 
 
-def without_particular(solution: Solution, boundary: Boundary) -> tuple[FloatArray, FloatArray]:
+def without_particular(solution: BodyView, boundary: Boundary) -> tuple[FloatArray, FloatArray]:
     """Return nodal displacements (n_nodes, 2) and tractions at quadrature points (n_elements, n_places, 2) without it.
 
     What is left belongs to a body in which nothing acts, for which Betti's theorem needs only the boundary.
@@ -50,7 +50,7 @@ def without_particular(solution: Solution, boundary: Boundary) -> tuple[FloatArr
     return left, boundary.traction - particular_tractions(solution, boundary)
 
 
-def particular_tractions(solution: Solution, boundary: Boundary) -> FloatArray:
+def particular_tractions(solution: BodyView, boundary: Boundary) -> FloatArray:
     """Return the tractions (n_elements, n_places, 2) of the particular solution at quadrature points."""
     if solution.particular is None:
         return np.zeros_like(boundary.points)

@@ -1,4 +1,4 @@
-"""The contacts of a solved assembly, the bodies that they join, and the units by which both are measured."""
+"""The contacts of a solution, the bodies that they join, and the units by which both are measured."""
 
 from __future__ import annotations
 
@@ -10,25 +10,26 @@ import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray
 from bemkit.contact.laws import FrictionLaw
-from bemkit.results.assembly_solution import AssemblySolution, SideName
 from bemkit.results.contact_table import ContactTable
-from bemkit.scene.assembly import ContactPair
+from bemkit.results.solution import Solution
+from bemkit.results.solved_body import SideName
+from bemkit.scene.contacts import ContactPair
 from bemkit.testing.independent_check.bodies import MeasuredBody
 from bemkit.testing.independent_check.boundary import trusted_stress
 from bemkit.testing.independent_check.check import Measured, measure
 from bemkit.testing.independent_check.sides import Side
 
 LIGHTEST = 1e-3
-"""Bodies that carry less than this share of the largest stress of the assembly are measured by this share."""
+"""Bodies that carry less than this share of the largest stress of the scene are measured by this share."""
 
 
 @dataclass(frozen=True, eq=False)
 class Joints:
-    """The contacts of an assembly and the bodies that they join.
+    """The contacts of a scene and the bodies that they join.
 
     Parameters
     ----------
-    solution : AssemblySolution
+    solution : Solution
     bodies : mapping of str to MeasuredBody
     pairs : mapping of str to ContactPair
         By name, those between elastic bodies.
@@ -36,19 +37,19 @@ class Joints:
         By name, those with rigid bodies that move.
     """
 
-    solution: AssemblySolution
+    solution: Solution
     bodies: Mapping[str, MeasuredBody]
     pairs: Mapping[str, ContactPair]
     moving: Mapping[str, ContactPair]
 
     @classmethod
-    def of(cls, solution: AssemblySolution, before: AssemblySolution | None = None) -> Joints:
+    def of(cls, solution: Solution, before: Solution | None = None) -> Joints:
         """Measure the bodies of a solution, and find whose nodes the rows of its table are.
 
         What is left of the load step `before` is known no better than that was.
         """
-        contacts = solution.assembly.contacts
-        pairs = {pair.name: pair for pair in solution.assembly.elastic_contacts}
+        contacts = solution.scene.contacts
+        pairs = {pair.name: pair for pair in solution.scene.elastic_contacts}
         moving = {pair.name: pair for pair in contacts if pair.name not in pairs}
         touched: dict[str, list[str]] = {name: [] for name in solution.bodies}
         for pair in contacts:
@@ -77,7 +78,7 @@ class Joints:
 
     def _law(self, name: str) -> FrictionLaw:
         if pair := self.pairs.get(name) or self.moving.get(name):
-            return self.solution.assembly.law_of(pair)
+            return self.solution.scene.law_of(pair)
         side = self.owner(name)
         return self.solution.bodies[side.body].scene.laws[side.part]
 
@@ -95,7 +96,7 @@ class Joints:
             stress[rows] = max(min(each.stress for each in scales), trusted)
         return length, stress
 
-    def measured(self, before: AssemblySolution | None) -> Measured:
+    def measured(self, before: Solution | None) -> Measured:
         """Return the contact quantities that the laws speak of."""
         table, units = self.solution.contact, self.units()
         points = np.column_stack([table.x, table.y])
@@ -122,7 +123,7 @@ class Joints:
             others = [
                 side.body.boundary.nodes[side.body.result.mesh.part(part.name)].ravel()
                 for part in side.body.result.scene.contact_parts
-                if f"{side.body.result.name}.{part.name}" != name
+                if side.body.result.contact_name(part.name) != name
             ]
             nodes = np.unique(np.concatenate([nodes, *others]))
         at = side.body.result.boundary.points[nodes]

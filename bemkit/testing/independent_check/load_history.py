@@ -6,7 +6,6 @@ from typing import cast
 
 import numpy as np
 
-from bemkit.results.assembly_solution import AssemblySolution
 from bemkit.results.solution import Solution
 
 LOST = 1e-6
@@ -16,7 +15,7 @@ ROUND_OFF = 1e-12
 forces, each of that size, which a body that is carried along has."""
 
 
-def energy_fault(step: Solution | AssemblySolution) -> str:
+def energy_fault(step: Solution) -> str:
     """Say what is wrong with the work in the last step of a history: friction that gives back, work that is missing."""
     if step.loading is None:
         return ""
@@ -25,20 +24,20 @@ def energy_fault(step: Solution | AssemblySolution) -> str:
     work = last.work
     missing = work.external_work - (last.elastic_energy - energy) - work.dissipation - work.increment_work
     size = max(abs(value) for value in (last.elastic_energy, energy, *vars(work).values()))
-    ends = [cast(Solution | AssemblySolution, each.end) for each in step.loading.steps[-2:]]
+    ends = [cast(Solution, each.end) for each in step.loading.steps[-2:]]
     allowed = LOST * size + ROUND_OFF * max(map(_work_of_motion, ends))
     if work.friction_gain > allowed:
         return f"friction acts along slip, which gives {work.friction_gain / size:.1e} of the work"
     if work.dissipation < 0.0:
         return f"friction gave back {-work.dissipation:.1e}"
     # stiffnesses of collocation are not symmetric: work and energy do not agree to round-off
-    is_balanced = all(body.scene.discretisation.is_symmetric for body in step.solved_bodies)
+    is_balanced = all(body.scene.discretisation.is_symmetric for body in step.bodies.values())
     return f"{missing / size:.1e} of the work is missing" if is_balanced and abs(missing) > allowed else ""
 
 
-def _work_of_motion(step: Solution | AssemblySolution) -> float:
+def _work_of_motion(step: Solution) -> float:
     """Return ``E' |u|^2`` [J/m] of the largest displacement, of bodies that only move, too."""
     return max(
         body.scene.material.plane_modulus * float(np.abs(body.boundary.displacement).max()) ** 2
-        for body in step.solved_bodies
+        for body in step.bodies.values()
     )

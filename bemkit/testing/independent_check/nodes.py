@@ -12,9 +12,9 @@ from bemkit.arrays import BoolArray, FloatArray, IntArray
 from bemkit.contact.obstacle import DirectedObstacle, Gap, Obstacle, RigidCavity, RigidCircle, RigidHalfPlane
 from bemkit.contact.polygon import RigidPolygon
 from bemkit.formulas import evaluate_field
-from bemkit.results.solution import Solution
 from bemkit.scene.conditions import Clamped, Contact, PrescribedDisplacement, Roller
 from bemkit.testing.independent_check.boundary import Boundary, Scales, boundary_of, scales_of
+from bemkit.testing.independent_check.views import BodyView
 
 _GRAZING_COSINE = 2e-3
 """Cosine between the body's normal and the direction of contact up to which a node may count as facing away: it would
@@ -61,7 +61,7 @@ class Nodes:
         return np.asarray(np.einsum("nkc,nc->nk", self.frame, vectors))
 
 
-def contact_nodes_of(solution: Solution, boundary: Boundary) -> Nodes:
+def contact_nodes_of(solution: BodyView, boundary: Boundary) -> Nodes:
     """Find the contact nodes of a solution on its boundary and measure their obstacles."""
     table, fields = solution.contact, solution.boundary
     points = np.column_stack([table.x, table.y])
@@ -93,14 +93,14 @@ def contact_nodes_of(solution: Solution, boundary: Boundary) -> Nodes:
 class Fields(NamedTuple):
     """A solution, the load step before it, and what is measured again of it."""
 
-    solution: Solution
-    before: Solution | None
+    solution: BodyView
+    before: BodyView | None
     boundary: Boundary
     nodes: Nodes
     scales: Scales
 
     @classmethod
-    def of(cls, solution: Solution, before: Solution | None = None) -> Fields:
+    def of(cls, solution: BodyView, before: BodyView | None = None) -> Fields:
         """Measure the fields of a solution."""
         boundary = boundary_of(solution)
         return cls(solution, before, boundary, contact_nodes_of(solution, boundary), scales_of(solution, before))
@@ -126,7 +126,7 @@ def hidden_overlap(fields: Fields) -> float:
     return deepest / motion if motion > 0.0 else deepest
 
 
-def mean_normals(solution: Solution, boundary: Boundary, part: str) -> FloatArray:
+def mean_normals(solution: BodyView, boundary: Boundary, part: str) -> FloatArray:
     """Return (n_nodes, 2) normals: mean by length of a part's elements that meet at a node, zero elsewhere."""
     elements = solution.mesh.part(part)
     total = np.zeros_like(solution.boundary.points)
@@ -136,7 +136,7 @@ def mean_normals(solution: Solution, boundary: Boundary, part: str) -> FloatArra
     return np.asarray(total / np.where(size > 0.0, size, 1.0)[:, None])
 
 
-def supported_nodes(solution: Solution, boundary: Boundary) -> IntArray:
+def supported_nodes(solution: BodyView, boundary: Boundary) -> IntArray:
     """Return the nodes on supports and on symmetry lines, which hold a body like rollers."""
     mesh = solution.mesh
     found = [np.zeros(0, np.intp)]

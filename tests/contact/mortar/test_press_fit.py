@@ -15,7 +15,7 @@ from bemkit.model.placed import place
 DISC, RING = (tuple(f"{side}-{k}" for k in range(1, 5)) for side in ("arc", "inner"))
 
 
-def press_fit(n_elements: int, symmetry: bk.Symmetry | None) -> bk.Assembly:
+def press_fit(n_elements: int, symmetry: bk.Symmetry | None) -> bk.Scene:
     """Return a quarter, or all, of a disc that is 1e-3 larger than the hole of a ring."""
     material = bk.Material(1.0, 0.3)
     disc, ring = (
@@ -23,7 +23,7 @@ def press_fit(n_elements: int, symmetry: bk.Symmetry | None) -> bk.Assembly:
         for name, shape, sides in (("disc", bk.Disk(1.0005), DISC), ("ring", bk.Ring(0.9995, 2.0), RING))
     )
     fit = bk.ContactPair(("disc.fit", "ring.fit"), law=bk.Coulomb(0.3), interference=1.5e-3, reach=0.1)
-    return bk.Assembly(
+    return bk.Scene(
         title="press fit",
         bodies=(disc, ring),
         contacts=(fit,),

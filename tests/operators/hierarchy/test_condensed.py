@@ -107,7 +107,7 @@ def test_where_the_stiffness_may_be_negative_it_is_examined(scene: bk.Scene, slo
 )
 def test_several_bodies_are_those_of_dense_equations(name: str, elements: int) -> None:
     assembly = bk.load_scene(name)
-    assert isinstance(assembly, bk.Assembly)
+    assert isinstance(assembly, bk.Scene)
     mesh = replace(assembly.mesh, elements=elements, accuracy=None)
     assembly = replace(assembly, discretisation=bk.ConstantCollocation(), mesh=mesh)
     compressed, dense = (

@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 
 import bemkit as bk
-from bemkit.results.assembly_solution import AssemblySolution
+from bemkit.results.solution import Solution
 from bemkit.studies.stability.similar_assembly import AssemblySimilarity
 from tests.slow import slow_except
 
 FRICTION = 0.25
 
 
-def assembly(*, reflects: bool = False) -> bk.Assembly:
+def assembly(*, reflects: bool = False) -> bk.Scene:
     """Three blocks of unlike materials and meshes on a rigid floor, one of them on two, under weight and shear.
 
     Sides of a block are whole numbers of elements long, so that reflected blocks are divided alike.
@@ -38,7 +38,7 @@ def assembly(*, reflects: bool = False) -> bk.Assembly:
     floor = (bk.Part("floor", bk.Contact(bk.RigidHalfPlane()), ("bottom",)),)
     load = bk.Part("load", bk.Traction(sign * 1.2e-4, -1e-3), ("top",))
     cohesive = bk.CohesiveCoulomb(FRICTION, cohesion=1e-5)
-    return bk.Assembly(
+    return bk.Scene(
         title="Three blocks",
         bodies=(
             block("one", 0.0, 0.0, 1.0, 1.0, parts=floor, mesh=bk.MeshOptions(elements=28)),
@@ -56,7 +56,7 @@ def assembly(*, reflects: bool = False) -> bk.Assembly:
 
 
 @lru_cache
-def plain() -> AssemblySolution:
+def plain() -> Solution:
     solution = bk.run(assembly())
     assert solution.is_converged
     assert len(set(solution.contact.status.tolist())) >= 3  # open, sticking and slipping nodes
@@ -74,7 +74,7 @@ CHANGES = {
 }
 
 
-def assert_same(solution: AssemblySolution, length: float = 1.0, stress: float = 1.0, atol: float = 1e-11) -> None:
+def assert_same(solution: Solution, length: float = 1.0, stress: float = 1.0, atol: float = 1e-11) -> None:
     """Compare with the plain solution; tractions of about 1e-3, certificates of 1e-9 of them."""
     reference, table, expected = plain(), solution.contact, plain().contact
     assert (solution.linear_solves, solution.outer_steps) == (reference.linear_solves, reference.outer_steps)
@@ -140,7 +140,7 @@ def test_multipliers_on_the_other_side_change_forces_by_the_discretisation_error
 
 
 def test_copies_are_bodies_that_are_listed() -> None:
-    def wall(*, is_copied: bool) -> bk.Assembly:
+    def wall(*, is_copied: bool) -> bk.Scene:
         def brick(name: str, place: bk.Placement, copies: bk.GridCopies | None = None) -> bk.Body:
             return bk.Body(
                 name=name,
@@ -163,7 +163,7 @@ def test_copies_are_bodies_that_are_listed() -> None:
             parts=(bk.Part("base", bk.Clamped(), ("bottom",)),),
             mesh=bk.MeshOptions(elements=30),
         )
-        return bk.Assembly(title="Wall", bodies=(*bricks, floor), touching=bk.Touching(1e-2), law=bk.Coulomb(0.4))
+        return bk.Scene(title="Wall", bodies=(*bricks, floor), touching=bk.Touching(1e-2), law=bk.Coulomb(0.4))
 
     copied, listed = (bk.run(wall(is_copied=flag)) for flag in (True, False))
     np.testing.assert_array_equal(copied.contact.status, listed.contact.status)

@@ -16,7 +16,7 @@ SCENE = bk.load_scene("paper-1")
 BODIES = bk.load_scene("two-cylinders")
 
 
-def changed(scene: bk.Scene | bk.Assembly, key: str, value: float) -> bk.Scene | bk.Assembly:
+def changed(scene: bk.Scene | bk.Scene, key: str, value: float) -> bk.Scene | bk.Scene:
     return with_values(scene, {Key(key): value})
 
 
@@ -60,7 +60,7 @@ def test_numbers_of_several_bodies_are_changed() -> None:
         (BODIES, "contacts[0].law.friction_coefficient", "law is not given in the scene"),
     ],
 )
-def test_keys_that_lead_to_no_number_are_named(scene: bk.Scene | bk.Assembly, key: str, message: str) -> None:
+def test_keys_that_lead_to_no_number_are_named(scene: bk.Scene | bk.Scene, key: str, message: str) -> None:
     with pytest.raises(PlaceError, match=message):
         check_number(scene, Key(key))
 

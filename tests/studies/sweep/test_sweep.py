@@ -24,7 +24,7 @@ CYLINDERS = replace(bk.load_scene("two-cylinders"), mesh=bk.MeshOptions(elements
 RESULTS = ("force_normal", "force_tangential", "energy", "contact_length", "peak_pressure", "largest_slip")
 
 
-def check_rows(scene: bk.Scene | bk.Assembly, table: Sweep) -> None:
+def check_rows(scene: bk.Scene | bk.Scene, table: Sweep) -> None:
     """Compare every row with a run of its scene."""
     assert not table.failed
     for row in table.rows:

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import bemkit as bk
-from bemkit.results.assembly_solution import AssemblySolution
+from bemkit.results.solution import Solution
 from bemkit.testing.independent_check import AssemblyCheck, violations_of_assembly
 from checks.trials import Outcome, judge
 
@@ -19,7 +19,7 @@ SIDE = "upper.bottom / lower.top"
 
 
 @lru_cache
-def solved(degree: int = 2) -> AssemblySolution:
+def solved(degree: int = 2) -> Solution:
     """A block on a wider one whose mesh does not match, pressed and sheared: it sticks in the middle and slips."""
     lower = bk.Body(
         name="lower",
@@ -39,7 +39,7 @@ def solved(degree: int = 2) -> AssemblySolution:
     pair = bk.ContactPair(("upper.bottom", "lower.top"))
     discretisation = bk.Galerkin(degree)
     return bk.run(
-        bk.Assembly(
+        bk.Scene(
             title="x", bodies=(lower, upper), contacts=(pair,), law=bk.Coulomb(0.25), discretisation=discretisation
         )
     )
@@ -53,7 +53,7 @@ def test_a_right_solution_passes_to_round_off() -> None:
     assert check.hidden_overlap < 0.02  # of a corner of pressure, between nodes 1 / 15 apart
 
 
-def changed_table(**columns: Callable[[np.ndarray], np.ndarray]) -> AssemblySolution:
+def changed_table(**columns: Callable[[np.ndarray], np.ndarray]) -> Solution:
     solution = solved()
     table = solution.contact
     return replace(
@@ -61,7 +61,7 @@ def changed_table(**columns: Callable[[np.ndarray], np.ndarray]) -> AssemblySolu
     )
 
 
-def changed_body(name: str, field: str, change: Callable[[np.ndarray], np.ndarray]) -> AssemblySolution:
+def changed_body(name: str, field: str, change: Callable[[np.ndarray], np.ndarray]) -> Solution:
     solution = solved()
     body = solution.bodies[name]
     boundary = replace(body.boundary, **{field: change(getattr(body.boundary, field))})
@@ -72,7 +72,7 @@ def middle(values: np.ndarray) -> np.ndarray:
     return np.arange(values.size) == values.size // 2
 
 
-FAULTS: dict[str, tuple[Callable[[], AssemblySolution], str]] = {
+FAULTS: dict[str, tuple[Callable[[], Solution], str]] = {
     "a pulled node": (lambda: changed_table(sigma_n=lambda s: np.where(middle(s), 0.01, s)), "tension"),
     "friction beyond the cone": (lambda: changed_table(sigma_t=lambda s: np.where(middle(s), -0.5, s)), "cone_excess"),
     "friction along slip": (lambda: changed_table(sigma_t=lambda s: -s), "slip_opposition"),
@@ -128,7 +128,7 @@ def test_points_in_each_other_between_nodes_are_doubted() -> None:
     )
     pair = bk.ContactPair(("disc.low", "plate.top"), multipliers_on="disc.low")
     solution = bk.run(
-        bk.Assembly(
+        bk.Scene(
             title="Disc",
             bodies=(plate, disc),
             contacts=(pair,),
@@ -186,7 +186,7 @@ def test_a_disc_that_turns_in_its_hole_is_not_in_the_rock() -> None:
     )
     pair = bk.ContactPair(("rock.wall", "disc.out"))
     discretisation = bk.Galerkin(3)
-    assembly = bk.Assembly(
+    assembly = bk.Scene(
         title="x", bodies=(rock, disc), contacts=(pair,), law=bk.Coulomb(0.5), discretisation=discretisation
     )
     solution = bk.run(assembly)
@@ -204,9 +204,9 @@ def test_a_disc_that_turns_in_its_hole_is_not_in_the_rock() -> None:
     assert overlap(displacement - np.array([0.0, strained])) > 0.2
 
 
-def beside_one_that_carries_nothing(traction: float) -> AssemblySolution:
+def beside_one_that_carries_nothing(traction: float) -> Solution:
     """A block resting on another without any load, beside those of `solved`, and a traction written between them."""
-    loaded = solved().assembly
+    loaded = solved().scene
     far = bk.Body(name="far", shape=bk.Rectangle(1.0, 1.0), material=MATERIAL, placement=bk.Placement((0.2, 5.0)))
     near = bk.Body(
         name="near",

@@ -14,6 +14,7 @@ from bemkit.testing.independent_check import violations_of_body
 from bemkit.testing.independent_check.boundary import boundary_of
 from bemkit.testing.independent_check.inside import inner_work
 from checks.random_scenes import random_case
+from tests.solutions import changed
 
 FORCES = (
     bk.Gravity(1.0, (0.1, -1.0)),
@@ -56,7 +57,7 @@ def test_right_answers_pass(is_symmetric: bool) -> None:
 def test_forces_that_are_left_out_are_noticed(number: int) -> None:
     solution = solved()
     others = tuple(force for k, force in enumerate(FORCES) if k != number)
-    forgetful = dataclasses.replace(solution, scene=dataclasses.replace(solution.scene, body_forces=others))
+    forgetful = changed(solution, scene=dataclasses.replace(solution.scene, body_forces=others))
     check = violations_of_body(forgetful)
     assert check.reciprocity > 1e-2
     assert ("equilibrium" in check.faults) == (number < 2)  # heat has no resultant

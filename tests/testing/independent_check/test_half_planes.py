@@ -19,6 +19,7 @@ from bemkit.testing.independent_check import IndependentCheck, violations_of_ass
 from bemkit.testing.independent_check.half_plane import Surface
 from bemkit.testing.independent_check.nodes import Fields
 from tests.slow import slow_except
+from tests.solutions import changed as changed_solution
 
 SIMILARITY = Similarity(length=3.0, modulus=70.0, stress=11.0, shift=(5.0, -7.0))
 BUMP = bk.Gap(bk.Expression("0.1 * x**2"))
@@ -108,7 +109,7 @@ def test_mean_logarithms_are_those_of_the_closed_form(place: np.ndarray) -> None
 
 
 def changed(solution: bk.Solution, **changes: object) -> IndependentCheck:
-    return violations_of_body(replace(solution, **changes))
+    return violations_of_body(changed_solution(solution, **changes))
 
 
 def with_boundary(solution: bk.Solution, **fields: np.ndarray) -> IndependentCheck:
@@ -204,7 +205,7 @@ def test_a_half_plane_among_several_bodies_is_checked_too() -> None:
     shape = bk.Rectangle(1.0, 0.5, (-0.4, 0.0))
     block = bk.Body(name="block", shape=shape, material=material, parts=(press,), mesh=bk.MeshOptions(40))
     contacts = (bk.ContactPair(("block.bottom", "base.surface")),)
-    solution = bk.run(bk.Assembly(title="block", bodies=(base, block), contacts=contacts, law=bk.Coulomb(0.5)))
+    solution = bk.run(bk.Scene(title="block", bodies=(base, block), contacts=contacts, law=bk.Coulomb(0.5)))
     assert violations_of_assembly(solution).worst <= 1e-11
     result = solution.bodies["base"]
     displacement = result.boundary.displacement.copy()

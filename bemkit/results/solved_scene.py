@@ -1,0 +1,178 @@
+"""The bodies and contacts of a solved scene."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from bemkit.arrays import FloatArray
+from bemkit.contact.body import SlipHistory
+from bemkit.contact.laws import FrictionLaw
+from bemkit.errors import InputError
+from bemkit.geometry.mesh import BoundaryMesh
+from bemkit.results.contact_table import ContactTable, Transition
+from bemkit.results.load_history import LoadHistory
+from bemkit.results.part_forces import ContactForce, PartForce, RigidResult
+from bemkit.results.solved_body import BoundaryFields, SideName, SolvedBody
+from bemkit.scene.scene import Scene
+from bemkit.scene.unit_names import UnitNames
+
+if TYPE_CHECKING:
+    from bemkit.results.side_stress import LargestStress
+    from bemkit.table import Table
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class SolvedScene:
+    """Fields of bodies, and what contacts transmit.
+
+    The contact table has a row for each contact node; between bodies `part` is the name of the contact, and
+    displacements are those of the body with the node less those of its partner.
+
+    Parameters
+    ----------
+    scene : Scene
+        With all contacts listed, those found by `Touching` among them; of a load history that of its last step.
+    bodies : mapping of str to SolvedBody
+        By name, in the order of the scene; the name of the only body of a scene that names none is empty.
+    contact_sides : mapping of str to tuple of SideName
+        The sides of elastic bodies in each contact of the table and of the scene, first the one with the nodes.
+    contact_directions : (n_contact, 2) array
+        Unit vectors of u_n and sigma_n, out of the body with the node.
+    friction_bound : (n_contact,) array or None [Pa]
+        The largest friction at each contact node; None if there is none anywhere.
+    contacts : tuple of ContactForce
+        What each contact transmits, with contact length, peak pressure and largest slip.
+    rigid : mapping of str to RigidResult
+        How each rigid body moved and what acts on it, by name.
+    contact : ContactTable
+    transitions : tuple of Transition
+    loading : LoadHistory, optional
+        The steps up to this one; None without a load history.
+    """
+
+    scene: Scene
+    bodies: Mapping[str, SolvedBody]
+    contact_sides: Mapping[str, tuple[SideName, ...]]
+    contact_directions: FloatArray
+    friction_bound: FloatArray | None
+    contacts: tuple[ContactForce, ...]
+    rigid: Mapping[str, RigidResult] = field(default_factory=dict)
+    contact: ContactTable
+    transitions: tuple[Transition, ...]
+    loading: LoadHistory | None = None
+
+    @property
+    def body(self) -> SolvedBody:
+        """The only body.
+
+        Raises
+        ------
+        InputError
+            If there are several.
+        """
+        if len(self.bodies) > 1:
+            raise InputError(f"there are {len(self.bodies)} bodies: take one of `bodies`: {', '.join(self.bodies)}")
+        return next(iter(self.bodies.values()))
+
+    @property
+    def mesh(self) -> BoundaryMesh:
+        """The mesh of the only body."""
+        return self.body.mesh
+
+    @property
+    def boundary(self) -> BoundaryFields:
+        """The fields on the boundary of the only body."""
+        return self.body.boundary
+
+    @property
+    def part_forces(self) -> tuple[PartForce, ...]:
+        """The resultants on each part of the only body; see `SolvedBody.part_forces`."""
+        return self.body.part_forces
+
+    def stress(self, points: FloatArray, part: str | None = None) -> FloatArray:
+        """Evaluate the stress (n, 2, 2) [Pa] inside the only body and on its boundary; see `SolvedBody.stress`."""
+        return self.body.stress(points, part)
+
+    def side_stress(self, part: str) -> Table:
+        """Return the stress along a part of the only body; see `SolvedBody.side_stress`."""
+        return self.body.side_stress(part)
+
+    def largest_stress(self, measure: str = "von-mises", part: str | None = None) -> LargestStress:
+        """Return the stress of largest size on the only boundary; see `SolvedBody.largest_stress`."""
+        return self.body.largest_stress(measure, part)
+
+    def stress_concentration(self, nominal: float, measure: str = "hoop", part: str | None = None) -> float:
+        """Return the largest stress on the only boundary over a nominal one [Pa]; see `largest_stress`."""
+        return self.body.stress_concentration(nominal, measure, part)
+
+    @property
+    def stated(self) -> Scene:
+        """The scene that was solved, with all its load steps."""
+        return self.scene if self.loading is None else self.loading.asked
+
+    @property
+    def motion(self) -> SlipHistory | None:
+        """Slip of the contact nodes in a load history; None without one."""
+        return None if self.loading is None else self.loading.motion
+
+    @property
+    def energy(self) -> float:
+        """Elastic energy of all bodies [J/m]."""
+        return sum(body.energy for body in self.bodies.values())
+
+    @property
+    def error_unit(self) -> float:
+        """Energy [J/m] to which squared errors in the energy norm are relative; see `SolvedBody.error_unit`."""
+        return sum(body.error_unit for body in self.bodies.values())
+
+    @property
+    def force_normal(self) -> float:
+        """Sum of the pressing forces of all contacts [N/m], positive."""
+        return sum((contact.force_normal for contact in self.contacts), 0.0)
+
+    @property
+    def force_tangential(self) -> float:
+        """Sum of the friction forces of all contacts along their tangents [N/m]."""
+        return sum((contact.force_tangential for contact in self.contacts), 0.0)
+
+    @property
+    def units(self) -> UnitNames | None:
+        """Names of units, if the scene has them."""
+        return self.scene.units
+
+    @property
+    def title(self) -> str:
+        """The title of the scene."""
+        return self.scene.title
+
+    @property
+    def n_elements(self) -> int:
+        """Number of elements of all bodies."""
+        return sum(body.mesh.n_elements for body in self.bodies.values())
+
+    @property
+    def laws(self) -> dict[str, FrictionLaw]:
+        """The friction law of each contact, by name."""
+        at_obstacles = {
+            body.contact_name(part): law for body in self.bodies.values() for part, law in body.scene.laws.items()
+        }
+        return at_obstacles | {pair.name: self.scene.law_of(pair) for pair in self.scene.contacts}
+
+    def n_sides(self, contact: str) -> int:
+        """Return how many elastic bodies carry the tractions of a contact."""
+        return len(self.contact_sides[contact])
+
+    def part_length(self, contact: str) -> float:
+        """Return the length of boundary that can touch in a contact [m]."""
+        return float(self.contact.weight[self.contact.rows(contact)].sum())
+
+    @property
+    def contact_traction_size(self) -> float:
+        """L2 norm of the contact tractions of all bodies [Pa m^(1/2)]; those between two bodies count for both."""
+        table = self.contact
+        squared = table.weight * (table.sigma_n**2 + table.sigma_t**2)
+        return float(np.sqrt(sum(self.n_sides(name) * squared[table.rows(name)].sum() for name in table.parts)))

@@ -1,0 +1,92 @@
+"""The solutions of load steps: each with the records, times and warnings of those before it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from bemkit.notebook import ShownInNotebooks
+from bemkit.result_warning import without_duplicates
+from bemkit.results.solution import Solution
+from bemkit.solvers.base import StepRecord
+from bemkit.solvers.records import continued
+
+if TYPE_CHECKING:
+    from bemkit.scene.scene import Scene
+
+
+class SolvedSteps(ShownInNotebooks, tuple[Solution, ...]):
+    """The solutions of load steps in their order, never none."""
+
+    __slots__ = ()
+
+    def __repr__(self) -> str:
+        """Return one line."""
+        last = self[-1]
+        return f"SolvedSteps({last.title!r}: {len(self)} steps, the last one {last.status_words})"
+
+
+def with_totals(result: Solution, solutions: Sequence[Solution], names: Sequence[str]) -> Solution:
+    """Return a solution with the steps, linear solves, times and memory of all solutions on the way, in their order.
+
+    `names`, such as "load step 1 of 3", are put before the messages of the steps of each.
+    """
+    records: tuple[StepRecord, ...] = ()
+    for name, solution in zip(names, solutions, strict=True):
+        records = continued(records, solution.history, name)
+    return replace(
+        with_times(result, solutions),
+        warnings=result.unasked_warnings,
+        history=records,
+        linear_solves=sum(solution.linear_solves for solution in solutions),
+        outer_steps=sum(solution.outer_steps for solution in solutions),
+    )
+
+
+def with_times(result: Solution, solutions: Sequence[Solution]) -> Solution:
+    """Return a solution with the total times and the largest memory of all solutions on the way."""
+    return replace(
+        result,
+        warnings=result.unasked_warnings,
+        timings={name: sum(solution.timings[name] for solution in solutions) for name in result.timings},
+        memory={name: max(solution.memory.get(name, 0) for solution in solutions) for name in result.memory},
+    )
+
+
+_EARLIER = "Load step "
+"""How warnings begin that are those of an earlier step."""
+
+
+def following(so_far: Solution | None, solution: Solution, stated: Scene, number: int, n_steps: int) -> Solution:
+    """Return a step of a load history with the records, solves, times, memory and warnings of all before it.
+
+    Of each kind and subject of warnings the last one is kept, and names its step unless that is this one; `at_step` has
+    those of a step.
+
+    Parameters
+    ----------
+    so_far : Solution, optional
+        The result of this function for the step before.
+    solution : Solution
+        Of the step.
+    stated : Scene
+        With all steps.
+    number, n_steps : int
+        Of the step, counted from 1, and of all.
+    """
+    if n_steps == 1:
+        return solution
+    name = f"load step {number} of {n_steps}"
+    before = () if so_far is None else (so_far,)
+    total = with_totals(solution, [*before, solution], [*("" for _ in before), name])
+    earlier = [
+        each
+        if each.text.startswith(_EARLIER)
+        else replace(each, text=f"{_EARLIER}{number - 1} of {n_steps}: {each.text}")
+        for each in (() if so_far is None else so_far.warnings)
+    ]
+    warnings = without_duplicates((*solution.warnings, *earlier))
+    loading = None if solution.loading is None else replace(solution.loading, asked=stated)
+    message = f"{name}: {solution.message}"
+    return replace(total, message=message, warnings=warnings, loading=loading)

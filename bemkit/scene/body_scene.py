@@ -1,0 +1,259 @@
+"""One body of a scene in the coordinates of its shape: all that its mesh and its equations need."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from bemkit.arrays import FloatArray, IntArray
+from bemkit.contact.further_laws import PiecewiseLaw
+from bemkit.contact.laws import FrictionLaw
+from bemkit.contact.problem import LawError
+from bemkit.errors import InputError
+from bemkit.formulas import choices
+from bemkit.geometry.mesh import BoundaryMesh
+from bemkit.geometry.meshing.discretise import discretise
+from bemkit.geometry.meshing.division import divide
+from bemkit.geometry.outline import Outline, Selection
+from bemkit.geometry.shapes import Shape
+from bemkit.geometry.symmetry import Symmetry
+from bemkit.operators.material import Material
+from bemkit.scene.body_forces import BodyForce
+from bemkit.scene.conditions import Clamped, Contact, Part, PrescribedDisplacement, Roller
+from bemkit.scene.discretisation import Discretisation, Galerkin
+from bemkit.scene.mesh_options import MeshOptions
+from bemkit.scene.plane_motion import FarField
+from bemkit.scene.steps import Step, check_laws
+from bemkit.scene.unit_names import UnitNames, check_length_of_file
+
+if TYPE_CHECKING:
+    from bemkit.geometry.meshing.partition import Partition
+
+
+@dataclass(frozen=True, kw_only=True)
+class BodyScene:
+    """One body of a scene, without the others; see `Scene.scene_of`.
+
+    Parameters
+    ----------
+    shape : Shape
+    material : Material
+    parts : tuple of Part
+        Those stated, and as free parts the sides that touch other bodies.
+    law : FrictionLaw
+        On all parts at rigid obstacles that have no law of their own.
+    steps : tuple of Step
+    n_steps : int
+        Number of load steps, increments counted.
+    symmetry : Symmetry or None
+        Lines that cross the body. Only the elements on the side x <= a, y <= b carry unknowns.
+    body_forces : tuple of BodyForce
+    far : FarField or None
+    discretisation : Discretisation
+    mesh : MeshOptions
+    units : UnitNames or None
+
+    Raises
+    ------
+    InputError
+        If a part names an unknown side, a law needs slip or time without steps, body forces act in an exterior, an
+        accuracy is asked of collocation, or a half-plane has what only other bodies have.
+    GeometryError
+        If the outline of the shape is not a valid boundary.
+    """
+
+    shape: Shape
+    material: Material
+    parts: tuple[Part, ...]
+    law: FrictionLaw
+    steps: tuple[Step, ...]
+    n_steps: int
+    symmetry: Symmetry | None
+    body_forces: tuple[BodyForce, ...]
+    far: FarField | None
+    discretisation: Discretisation
+    mesh: MeshOptions
+    units: UnitNames | None
+
+    def __post_init__(self) -> None:
+        check_laws({f"law of part {name!r}": law for name, law in self.laws.items()}, self.steps)
+        if self.mesh.accuracy is not None:
+            self._check_accuracy(self.mesh.accuracy)
+        outline = self.shape.outline()
+        if outline.surface is not None or self.far is not None:
+            _check_half_plane(outline, self.far, self.discretisation, self.mesh, self.parts)
+        if self.units is not None and outline.drawing is not None:
+            check_length_of_file(outline.drawing.unit, self.units)
+        if self.body_forces and outline.is_exterior:
+            raise InputError(
+                f"body_forces is {self.body_forces!r}, but the body has no end: nothing holds its infinite weight, and "
+                "heat expands it without bound: remove the body forces, or give a bounded shape"
+            )
+        names = outline.selectable_names
+        for part in self.parts:
+            for side in part.sides:
+                if side not in names:
+                    raise InputError(f"part {part.name!r}: unknown side {side!r}: the sides are {choices(side, names)}")
+
+    def _check_accuracy(self, accuracy: float) -> None:
+        if self.mesh.rising_degrees and not isinstance(self.discretisation, Galerkin):
+            raise InputError(
+                f"mesh.rising_degrees is True: {self.discretisation} has no degree: choose Galerkin elements"
+            )
+        if not self.discretisation.estimates_error:
+            raise InputError(
+                f"mesh.accuracy is {accuracy}: {self.discretisation.method} has no error estimate: choose the "
+                "discretisation 'quadratic' or 'linear', or give elements"
+            )
+
+    @property
+    def contact_parts(self) -> tuple[Part, ...]:
+        """The parts that may touch an obstacle."""
+        return tuple(part for part in self.parts if isinstance(part.condition, Contact))
+
+    def parts_on(self, mesh: BoundaryMesh) -> list[tuple[Part, IntArray]]:
+        """Return the parts with their elements (k,) on a mesh, without parts beyond a symmetry line."""
+        return [(part, elements) for part in self.parts if (elements := mesh.part(part.name)).size]
+
+    @property
+    def laws(self) -> dict[str, FrictionLaw]:
+        """The friction law of each contact part, by name."""
+        laws = {part.name: part.condition.law for part in self.parts if isinstance(part.condition, Contact)}
+        return {name: self.law if law is None else law for name, law in laws.items()}
+
+    @property
+    def selections(self) -> dict[str, Selection]:
+        """The pieces of the outline that the parts cover, by name."""
+        return {part.name: part.selection for part in self.parts}
+
+    def law_at(self, parts: Sequence[str], points: FloatArray) -> FrictionLaw:
+        """Return the friction law of given contact nodes, every coefficient in numbers.
+
+        Parameters
+        ----------
+        parts : sequence of n_contact str
+            The contact part that each node belongs to.
+        points : (n_contact, 2) array [m]
+
+        Raises
+        ------
+        LawError
+            If a coefficient is not finite or negative somewhere; the message names the part.
+        """
+        laws: list[FrictionLaw] = []
+        nodes: list[IntArray] = []
+        for name, law in self.laws.items():
+            part_nodes = np.flatnonzero(np.array([part == name for part in parts], bool))
+            try:
+                laws.append(law.at(points[part_nodes]))
+            except ValueError as error:
+                raise LawError(f"part {name!r}: friction law: {error}") from error
+            nodes.append(part_nodes)
+        if not laws:  # a scene without contact
+            return self.law
+        if len(laws) == 1 or all(law is laws[0] for law in laws):
+            return laws[0]
+        return PiecewiseLaw(laws, nodes)
+
+    @property
+    def takes_layers(self) -> bool:
+        """Whether meshes that follow an accuracy are few elements of high degree in geometric layers."""
+        degree = self.discretisation.largest_degree if isinstance(self.discretisation, Galerkin) else 0
+        return self.n_steps == 1 and self.mesh.accuracy is not None and (self.mesh.rising_degrees or degree > 2)
+
+    def first_partition(self, contact: Collection[str]) -> Partition:
+        """Divide the boundary for the first time if an accuracy decides.
+
+        Parameters
+        ----------
+        contact : collection of str
+            Names of the parts that may touch something. They are divided evenly; where the next mesh is made anew in
+            layers, this one only looks for places where their status changes.
+        """
+        outline = self.shape.outline()
+        if self.takes_layers and contact:
+            from bemkit.geometry.meshing.layers import looking_partition
+
+            base = divide(outline, self.selections)
+            base = base if self.symmetry is None else base.half(self.symmetry)
+            return looking_partition(base, contact, self.mesh.n_elements)
+        from bemkit.geometry.meshing.partition import first_partition
+
+        return first_partition(outline, self.selections, self.mesh.n_elements, even=contact, symmetry=self.symmetry)
+
+    def divided(self, contact: Collection[str]) -> BoundaryMesh:
+        """Return the mesh by number of elements, or the first mesh for an accuracy; see `first_partition`."""
+        if self.mesh.elements is None:
+            return self.first_partition(contact).mesh
+        return discretise(
+            self.shape.outline(),
+            n_elements=self.mesh.elements,
+            parts=self.selections,
+            grading=self.mesh.grading,
+            density=self.mesh.density,
+            symmetry=self.symmetry,
+        )
+
+    def build_mesh(self) -> BoundaryMesh:
+        """Divide the boundary into elements, with one mesh part for each part of the scene.
+
+        Raises
+        ------
+        GeometryError
+            If parts overlap or are empty, or there are too few elements, or the scene lacks its symmetry.
+        """
+        mesh = self.divided([part.name for part in self.contact_parts])
+        if self.symmetry is not None:
+            from bemkit.scene.symmetry import check_symmetry
+
+            check_symmetry(self, mesh)
+        return mesh
+
+
+def _check_half_plane(
+    outline: Outline, far: FarField | None, discretisation: Discretisation, mesh: MeshOptions, parts: Sequence[Part]
+) -> None:
+    """Check that a half-plane has nothing that only other bodies have, and another body no far field.
+
+    Raises
+    ------
+    InputError
+        Naming the key, its value and the remedy.
+    """
+    if outline.surface is None:
+        if far is not None:
+            raise InputError(
+                f"far is {far}, but the body is not a half-plane: hold or load its parts, or give the shape "
+                "'half-plane' or 'periodic-half-plane'"
+            )
+        return
+    if discretisation != Galerkin(1) or mesh.rising_degrees:
+        raise InputError(
+            f"discretisation is {discretisation}, but tractions on a half-plane are constant on each element: choose "
+            "the discretisation 'linear', or remove it"
+        )
+    if outline.surface.is_periodic:
+        _check_periodic(far, mesh, parts)
+
+
+def _check_periodic(far: FarField | None, mesh: MeshOptions, parts: Sequence[Part]) -> None:
+    if far is not None and far.strain:
+        raise InputError(f"far.strain is {far.strain}: a strained surface does not repeat: remove it")
+    if far is not None and (far.turn or far.moment is not None):
+        name = "turn" if far.turn else "moment"
+        raise InputError(f"far.{name} is {getattr(far, name)}: a periodic half-plane cannot turn: remove it")
+    for part in parts:
+        if isinstance(part.condition, Clamped | PrescribedDisplacement | Roller):
+            raise InputError(
+                f"part {part.name!r} holds the surface of a periodic half-plane: hold it far away, or let the part "
+                "touch an obstacle"
+            )
+    if mesh.accuracy is not None:
+        raise InputError(
+            f"mesh.accuracy is {mesh.accuracy}: the elements of a periodic half-plane are equal: give elements"
+        )
+    if not any(isinstance(part.condition, Contact) for part in parts):
+        raise InputError("no part of the periodic half-plane is in contact: give one an obstacle")

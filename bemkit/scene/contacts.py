@@ -1,0 +1,129 @@
+"""Contacts of elastic bodies with each other and with rigid bodies."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from bemkit.contact.laws import FrictionLaw
+from bemkit.errors import InputError
+from bemkit.scene.objects import check_objects
+
+
+def body_and_part(side: str) -> tuple[str, str]:
+    """Return the names of body and part in the name of a side, ``"body.part"``."""
+    body, part = side.split(".", 1)
+    return body, part
+
+
+@dataclass(frozen=True)
+class ContactPair:
+    """Two sides of bodies that may touch.
+
+    Parameters
+    ----------
+    sides : (str, str)
+        Each ``"body.part"``, ``"body.side"`` by the name of a side or group of its shape, ``"body.side, side"``, or
+        ``"body.*"`` for its whole boundary; one of them may be the name of a `RigidBody`. Two sides of one body may
+        touch, too, as in a split ring.
+    law : FrictionLaw, optional
+        By default that of the scene.
+    gap : float [m]
+        Added to the distance of the shapes; negative presses bodies together that are drawn touching.
+    interference : float [m]
+        Largest overlap of the shapes as they are drawn that is meant; more is an error.
+    multipliers_on : str, optional
+        The side on whose nodes contact is decided; by default see `bemkit.contact.mortar`. Never a rigid body.
+    reach : float [m], optional
+        Largest distance of points that may come to touch; by default half the size of the smaller body. Round bodies
+        with many neighbours need less, so that no point faces two of them.
+
+    Raises
+    ------
+    InputError
+        If neither name has a dot, a side shall touch itself, a length is not finite, the reach is not positive, or the
+        multipliers are on neither side.
+    """
+
+    sides: tuple[str, str]
+    law: FrictionLaw | None = None
+    gap: float = 0.0
+    interference: float = 0.0
+    multipliers_on: str | None = None
+    reach: float | None = None
+
+    def __post_init__(self) -> None:
+        check_objects(self, "contact")
+        object.__setattr__(self, "sides", tuple(self.sides))
+        if len(self.sides) != 2 or not self.elastic_sides:
+            raise InputError(
+                f"contact sides are {self.sides}: give two, each as 'body.side', or one as the name of a rigid body"
+            )
+        if self.sides[0] == self.sides[1]:
+            raise InputError(f"the contact of {self.sides[0]!r} is with itself: give two sides")
+        if not np.isfinite(self.gap):
+            raise InputError(f"contact {self.name!r}: gap is {self.gap}: give a finite length")
+        if not 0.0 <= self.interference < np.inf:
+            raise InputError(f"contact {self.name!r}: interference is {self.interference}: give a length, not negative")
+        _check_reach(self.reach, f"contact {self.name!r}: reach")
+        if self.multipliers_on is not None and self.multipliers_on not in self.elastic_sides:
+            raise InputError(
+                f"contact {self.name!r}: multipliers_on is {self.multipliers_on!r}: give one of the two sides, "
+                "and not a rigid body"
+            )
+
+    @property
+    def name(self) -> str:
+        """Name of the contact in results."""
+        return " / ".join(self.sides)
+
+    @property
+    def elastic_sides(self) -> tuple[str, ...]:
+        """The sides of elastic bodies: two, or the one that faces a rigid body."""
+        return tuple(side for side in self.sides if "." in side)
+
+    @property
+    def elastic_parts(self) -> tuple[tuple[str, str], ...]:
+        """The elastic sides as pairs (body, part or side)."""
+        return tuple(body_and_part(side) for side in self.elastic_sides)
+
+    @property
+    def rigid_body(self) -> str | None:
+        """The name of the rigid body, None between elastic ones."""
+        return next((side for side in self.sides if "." not in side), None)
+
+
+@dataclass(frozen=True)
+class Touching:
+    """Puts every two free sides of different bodies that face each other in contact.
+
+    Parameters
+    ----------
+    within : float [m]
+        Largest distance of sides that face each other.
+    law : FrictionLaw, optional
+        By default that of the scene.
+    reach : float [m], optional
+        Of each contact found; see `ContactPair`.
+
+    Raises
+    ------
+    InputError
+        If the distance is negative or not finite, or the reach not positive.
+    """
+
+    within: float
+    law: FrictionLaw | None = None
+    reach: float | None = None
+
+    def __post_init__(self) -> None:
+        check_objects(self, "touching")
+        _check_reach(self.reach, "touching.reach")
+        if not 0.0 <= self.within < np.inf:
+            raise InputError(f"touching.within is {self.within}: give a length, zero or positive")
+
+
+def _check_reach(reach: float | None, name: str) -> None:
+    if reach is not None and not reach > 0.0:
+        raise InputError(f"{name} is {reach}: give a positive length")
