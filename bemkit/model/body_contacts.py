@@ -128,7 +128,7 @@ def body_rows(
             arc_length=coupling.arc_length,
             frame=coupling.frame,
             weights=coupling.weights,
-            gap=coupling.gap + pairs[k].gap,
+            gap=coupling.gap + pairs[k].gap_at(coupling.points),
             couplings=(sparse.csr_array(coupling.on_non_mortar), sparse.csr_array(coupling.on_mortar)),
             motions=None,
             elements=side.elements,

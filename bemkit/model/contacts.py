@@ -193,7 +193,7 @@ def obstacle_rows(
                 touched = points + np.where(np.isfinite(gap), gap, 0.0)[:, None] * nodes.directions
                 k = rigid[str(pair.rigid_body)]
                 title, part, law, other = name, _part(pair), _law_of(scene, pair), len(bodies) + k
-                gap, motions = gap + pair.gap, scene.rigid[k].motions_at(touched)
+                gap, motions = gap + pair.gap_at(points), scene.rigid[k].motions_at(touched)
             is_held = np.asarray(fixed[nodes.nodes].any(axis=1))
             moves = motions is not None and bool(scene.rigid[other - len(bodies)].is_driven.any())
             yield ContactRows(

@@ -298,7 +298,11 @@ class Prepared:
         ):
             return None
         return tuple(
-            replace(rows, gap=rows.gap + (two.gap - one.gap), law=scene.law if two.law is None else two.law)
+            replace(
+                rows,
+                gap=rows.gap + (two.gap_at(rows.points) - one.gap_at(rows.points)),
+                law=scene.law if two.law is None else two.law,
+            )
             for rows, one, two in zip(self.rows, before, after, strict=False)
         )
 

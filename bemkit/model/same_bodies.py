@@ -58,7 +58,10 @@ def _units_of(scene: Scene, bodies: Sequence[PlacedBody]) -> Units:
     modulus = min(moduli, default=max(body.material.plane_modulus for body in bodies))
     sizes = [largest_sizes(body.scene, body.mesh, length) for body in bodies]
     motions = [motion for _, motion, _ in sizes]
-    motions += [max(-pair.gap, pair.interference) for pair in scene.contacts]
+    for pair in scene.contacts:
+        body, part = pair.elastic_parts[0]
+        mesh = numbers[body].mesh
+        motions.append(max(-float(pair.gap_at(mesh.centres[mesh.part(part)]).min(initial=0.0)), pair.interference))
     motions += [float(np.abs(body.motion / [1.0, 1.0, 1.0 / length]).max()) for body in scene.rigid]
     loads = [load for load, _, _ in sizes]
     loads += [float(np.abs(body.load / [length, length, length**2]).max()) for body in scene.rigid]

@@ -18,6 +18,7 @@ from bemkit.contact.mortar.sides import ContactSide
 from bemkit.geometry.placement import Placement
 from bemkit.model.body_contacts import reach_of
 from bemkit.results.between_nodes import (
+    AddedGap,
     Interpolation,
     MeasuredContact,
     points_between,
@@ -43,7 +44,7 @@ def contacts_between_bodies(solution: SolvedScene) -> Iterator[MeasuredContact]:
         key = (alike, parts)
         if key not in known:
             known[key] = _Facing.of((one, two), parts, placements[names[0]], reach)
-        return known[key].values((one, two), placements[names[0]], pair.gap)
+        return known[key].values((one, two), placements[names[0]], pair.gap_at)
 
     for pair in scene.elastic_contacts:
         (one, part), (two, other) = sides[pair.name]
@@ -118,7 +119,7 @@ class _Facing:
             places.gap.reshape(-1, 2),
         )
 
-    def values(self, bodies: tuple[SolvedBody, SolvedBody], placement: Placement, gap: float) -> PointsBetween:
+    def values(self, bodies: tuple[SolvedBody, SolvedBody], placement: Placement, gap: AddedGap) -> PointsBetween:
         """Return clearance and tractions at points of the sides, first with those of one side, then of the other."""
         n = self.segments.row.size
         one_sided = [
@@ -131,7 +132,7 @@ class _Facing:
         side: int,
         bodies: tuple[SolvedBody, SolvedBody],
         placement: Placement,
-        gap: float,
+        gap: AddedGap,
         pieces: IntArray,
         low: FloatArray,
         high: FloatArray,
@@ -147,7 +148,7 @@ class _Facing:
             fields.displacement(body).reshape(-1, 2) for fields, body in zip(at.fields, bodies, strict=True)
         )
         one, two = displacements
-        clearance = gap + np.sum((gaps - one + two) * directions, axis=1)
+        clearance = gap(points) + np.sum((gaps - one + two) * directions, axis=1)
         traction = (1.0, -1.0)[side] * at.fields[side].traction(bodies[side]).reshape(-1, 2)
         sigma_n, sigma_t = np.einsum("nkc,nc->kn", contact_frame(directions), traction)
         step = sum(fields.step(body).ravel() for fields, body in zip(at.fields, bodies, strict=True))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -21,6 +21,8 @@ from bemkit.results.contact_table import ContactTable, free_contacts
 from bemkit.results.least_clearance import PointsBetween, Sample, deepest
 from bemkit.results.solved_body import SolvedBody
 
+AddedGap: TypeAlias = Callable[[FloatArray], FloatArray]
+"""Points (n, 2) [m] -> what is added to the distance there (n,) [m]."""
 _POINTS_PER_NODE = 4
 """Points on an element for each of its nodes: a polynomial is larger between them by a few per cent at most."""
 _NOWHERE = (float("nan"), float("nan"))
@@ -114,7 +116,7 @@ def sample_at_obstacle(
     body: SolvedBody,
     obstacle: Obstacle,
     elements: IntArray,
-    gap: float = 0.0,
+    gap: AddedGap | None = None,
     shift: Callable[[FloatArray], FloatArray] | None = None,
 ) -> Sample:
     """Return the function that measures clearance and tractions on elements (m,) that face a rigid obstacle.
@@ -124,8 +126,8 @@ def sample_at_obstacle(
     body : SolvedBody
     obstacle : Obstacle
     elements : (m,) int array
-    gap : float [m]
-        Added to the distance.
+    gap : callable, optional
+        Points (n, 2) -> what is added to the distance (n,) [m]; nothing by default.
     shift : callable, optional
         Points (n, 2) -> displacements (n, 2) [m] of the obstacle there; none by default.
     """
@@ -143,7 +145,8 @@ def sample_at_obstacle(
         u_n, _ = np.einsum("nkc,nc->kn", frame, moved)
         sigma_n, sigma_t = np.einsum("nkc,nc->kn", frame, fields.traction(body).reshape(-1, 2))
         s = starts[pieces, None] + 0.5 * lengths[pieces, None] * (at + 1.0)
-        clearance, step = gap + distance - u_n, fields.step(body).ravel()
+        added = 0.0 if gap is None else gap(points)
+        clearance, step = added + distance - u_n, fields.step(body).ravel()
         return PointsBetween(points, s.ravel(), directions, clearance, sigma_n, sigma_t, step)
 
     return sample

@@ -107,7 +107,7 @@ def _at_obstacles(solution: SolvedScene) -> Iterator[MeasuredContact]:
             part_name = pair.elastic_parts[0][1]
             rigid = stated.rigid_body_of(pair)
             shift = partial(_moved, rigid, solution.rigid[str(pair.rigid_body)])
-            sample = sample_at_obstacle(body, rigid.obstacle, mesh.part(part_name), pair.gap, shift)
+            sample = sample_at_obstacle(body, rigid.obstacle, mesh.part(part_name), pair.gap_at, shift)
             facing.setdefault(part_name, []).append((pair.name, stated.law_of(pair), sample))
         xi = points_between(scene.discretisation.displacement_space(mesh).degree)
         for part_name, rivals in facing.items():

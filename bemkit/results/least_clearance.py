@@ -147,7 +147,8 @@ def deepest(values: PointsBetween) -> tuple[float, FloatArray]:
     least = float(clearance[k])
     has_both = 0 < k < clearance.size - 1 and bool(np.isfinite(clearance[k - 1 : k + 2]).all())
     before, after = np.diff(values.s[k - 1 : k + 2]) if has_both else (0.0, 0.0)
-    if min(before, after) > _SAME_POINT * max(before, after):  # within an element
+    apart = max(_SAME_POINT * max(before, after), _SAME * float(values.s.max()))
+    if min(before, after) > apart:  # within an element
         fall, rise = -np.diff(clearance[k - 1 : k + 2]) / (before, after)
         curvature, slope = (rise - fall) / (before + after), (fall * after + rise * before) / (before + after)
         if curvature < 0.0 and -before <= -0.5 * slope / curvature <= after:

@@ -48,7 +48,8 @@ class Body:
     body_forces : tuple of BodyForce
         What acts inside the body, in the coordinates of the scene.
     far : FarField, optional
-        Motion or load of a half-plane far away from its surface. By default it is at rest there.
+        Motion or load of a half-plane far away from its surface, in the coordinates of the scene. By default it is at
+        rest there.
     placement : Placement
         Position of the body: turned, then shifted.
     copies : Copies, optional
@@ -90,8 +91,8 @@ class Body:
 
     @property
     def is_held(self) -> bool:
-        """Whether a support or a rigid obstacle belongs to the body, so that it is not a copy of another."""
-        return any(
+        """Whether a support, a rigid obstacle or a far field belongs to the body, so that it is no copy of another."""
+        return self.far is not None or any(
             isinstance(part.condition, Clamped | Roller | PrescribedDisplacement | Contact) for part in self.parts
         )
 

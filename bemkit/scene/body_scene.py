@@ -22,7 +22,7 @@ from bemkit.geometry.shapes import Shape
 from bemkit.geometry.symmetry import Symmetry
 from bemkit.operators.material import Material
 from bemkit.scene.body_forces import BodyForce
-from bemkit.scene.conditions import Clamped, Contact, Part, PrescribedDisplacement, Roller
+from bemkit.scene.conditions import Clamped, Contact, Free, Part, PrescribedDisplacement, Roller
 from bemkit.scene.discretisation import Discretisation, Galerkin
 from bemkit.scene.mesh_options import MeshOptions
 from bemkit.scene.plane_motion import FarField
@@ -255,5 +255,5 @@ def _check_periodic(far: FarField | None, mesh: MeshOptions, parts: Sequence[Par
         raise InputError(
             f"mesh.accuracy is {mesh.accuracy}: the elements of a periodic half-plane are equal: give elements"
         )
-    if not any(isinstance(part.condition, Contact) for part in parts):
+    if not any(isinstance(part.condition, Contact | Free) for part in parts):
         raise InputError("no part of the periodic half-plane is in contact: give one an obstacle")

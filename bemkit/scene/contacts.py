@@ -6,8 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from bemkit.arrays import FloatArray
 from bemkit.contact.laws import FrictionLaw
 from bemkit.errors import InputError
+from bemkit.formulas import ScalarField, check_field, evaluate_field
 from bemkit.scene.objects import check_objects
 
 
@@ -29,8 +31,9 @@ class ContactPair:
         touch, too, as in a split ring.
     law : FrictionLaw, optional
         By default that of the scene.
-    gap : float [m]
-        Added to the distance of the shapes; negative presses bodies together that are drawn touching.
+    gap : float, Expression or callable (x, y) -> (n,) array [m]
+        Added to the distance of the shapes, at points of the side with the multipliers; negative presses bodies
+        together that are drawn touching.
     interference : float [m]
         Largest overlap of the shapes as they are drawn that is meant; more is an error.
     multipliers_on : str, optional
@@ -42,13 +45,13 @@ class ContactPair:
     Raises
     ------
     InputError
-        If neither name has a dot, a side shall touch itself, a length is not finite, the reach is not positive, or the
-        multipliers are on neither side.
+        If neither name has a dot, a side shall touch itself, a length is not finite, the gap is no number, formula or
+        function, the reach is not positive, or the multipliers are on neither side.
     """
 
     sides: tuple[str, str]
     law: FrictionLaw | None = None
-    gap: float = 0.0
+    gap: ScalarField = 0.0
     interference: float = 0.0
     multipliers_on: str | None = None
     reach: float | None = None
@@ -62,8 +65,7 @@ class ContactPair:
             )
         if self.sides[0] == self.sides[1]:
             raise InputError(f"the contact of {self.sides[0]!r} is with itself: give two sides")
-        if not np.isfinite(self.gap):
-            raise InputError(f"contact {self.name!r}: gap is {self.gap}: give a finite length")
+        check_field(self.gap, f"contact {self.name!r}: gap")
         if not 0.0 <= self.interference < np.inf:
             raise InputError(f"contact {self.name!r}: interference is {self.interference}: give a length, not negative")
         _check_reach(self.reach, f"contact {self.name!r}: reach")
@@ -77,6 +79,10 @@ class ContactPair:
     def name(self) -> str:
         """Name of the contact in results."""
         return " / ".join(self.sides)
+
+    def gap_at(self, points: FloatArray) -> FloatArray:
+        """Return the gap (n,) [m] that is added at points (n, 2) [m]."""
+        return evaluate_field(self.gap, points)
 
     @property
     def elastic_sides(self) -> tuple[str, ...]:

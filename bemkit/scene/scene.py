@@ -321,6 +321,7 @@ class Scene(ShownInNotebooks):
         key = (
             *(id(entry) for entry in stated),
             body.material,
+            body.far,
             self.touching_parts(body),
             self._lines_across(body),
             body.placement

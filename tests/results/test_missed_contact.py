@@ -131,6 +131,15 @@ def test_the_least_clearance_is_found_where_no_point_is_inside(middle: float) ->
     assert deepest(sampled(1e-9, middle))[0] == 0.0
 
 
+def test_a_jump_between_two_elements_is_no_parabola() -> None:
+    """Both end at one point; its coordinates differ by round-off, its clearances by the step of constant elements."""
+    s = np.array([0.0, 1.0 - 1e-16, 1.0, 1.0 + 1e-9, 2.0])
+    clearance = np.array([1e-6, 1e-6, -1e-6, -1e-6, -0.9e-6])
+    points = np.stack([s, 0.0 * s], axis=1)
+    depth, _ = deepest(PointsBetween(points, s, points, clearance, 0.0 * s, 0.0 * s, 0.0 * s))
+    assert depth == pytest.approx(1e-6, rel=1e-6)
+
+
 def test_the_parabola_stays_between_its_points() -> None:
     s = np.array([0.0, 1e-3, 1.0])
     flat = np.array([-1.0, -1.0 - 1e-9, -0.5])

@@ -200,7 +200,7 @@ def test_what_does_not_fit_together_is_named(change: dict[str, object], message:
             "contact sides are ('upper.top',): give two, each as 'body.side', or one",
         ),
         (lambda: ContactPair(("upper.top", "upper.top")), "the contact of 'upper.top' is with itself: give two sides"),
-        (lambda: ContactPair(PAIR.sides, gap=float("inf")), "gap is inf: give a finite length"),
+        (lambda: ContactPair(PAIR.sides, gap=float("inf")), "gap = inf is not finite; give a finite number"),
         (lambda: ContactPair(PAIR.sides, interference=-1.0), "interference is -1.0: give a length, not negative"),
         (lambda: ContactPair(PAIR.sides, multipliers_on="x.y"), "multipliers_on is 'x.y': give one of the two sides"),
         (

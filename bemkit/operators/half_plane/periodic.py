@@ -75,6 +75,15 @@ class PeriodicElasticity(SurfaceElasticity):
 
         return np.asarray(ifft(self.flexibility * fft(traction)))
 
+    @cached_property
+    def full_flexibility(self) -> FloatArray:
+        """(n_dofs, n_dofs) array [1/Pa]; see `SurfaceElasticity`. A force moves elements by their distance from it."""
+        from scipy.fft import ifft
+        from scipy.linalg import circulant
+
+        response = circulant(np.asarray(ifft(self.flexibility)) / self.mesh.lengths)
+        return self.full_from_local(np.array([[response.real, -response.imag], [response.imag, response.real]]))
+
     def held(self, displacement: ComplexArray) -> ComplexArray:
         """Return the tractions (n_elements,) [Pa] that hold displacements (n_elements,) [m]."""
         from scipy.fft import fft, ifft

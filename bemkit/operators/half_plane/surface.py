@@ -13,10 +13,9 @@ from typing import Self
 import numpy as np
 
 from bemkit.arrays import ComplexArray, FloatArray
-from bemkit.errors import InputError
 from bemkit.geometry.mesh import BoundaryMesh
-from bemkit.geometry.spaces import ConstantSpace
-from bemkit.operators.counts import OperationCounts
+from bemkit.geometry.spaces import ConstantSpace, dof_points
+from bemkit.operators.counts import Factorisation, FactorKind, OperationCounts
 from bemkit.operators.half_plane.far_drive import FarDrive
 from bemkit.operators.material import Material
 from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions
@@ -99,9 +98,32 @@ class SurfaceElasticity(ABC):
         """Return the displacements (n_nodes, 2) that nodal forces (n_nodes, 2) cause, without those of the drive."""
         return self.to_vectors(self.displaced(self.to_complex(force / self.mesh.lengths[:, None])))
 
+    @property
+    @abstractmethod
+    def full_flexibility(self) -> FloatArray:
+        """(n_dofs, n_dofs) array [1/Pa] from forces to displacements, index ``2 element + component`` in x and y."""
+
+    def full_from_local(self, local: FloatArray) -> FloatArray:
+        """Return the full flexibility from that (2, 2, n, n) of the components along tangent and normal."""
+        axes = np.stack([self.mesh.tangents[0], self.mesh.normals[0]])
+        full = np.einsum("ka,klij,lb->iajb", axes, local, axes, optimize=True).reshape(2 * local.shape[2], -1)
+        return np.asarray(0.5 * (full + full.T))
+
+    def condensed_work(self, n_acting: int) -> OperationCounts:
+        """Operation counts of the inverse of the flexibility on the directions retained or fixed."""
+        return OperationCounts(
+            factorisations=(Factorisation(FactorKind.CHOLESKY, n_acting),) if n_acting else (),
+            right_hand_sides=n_acting,
+        )
+
     def condense(self, conditions: NodalConditions, force: FloatArray) -> CondensedMap:
-        """Refuse to form a matrix; see `bemkit.contact.half_plane`."""
-        raise InputError("a periodic half-plane cannot be a body of an assembly: give it its own scene")
+        """Solve for the forces on retained and fixed directions; see `SteklovPoincare.condense`."""
+        from bemkit.operators.half_plane.condensed import CondensedHalfPlane  # only where there are other bodies
+
+        points, flexibility = dof_points(self.displacement_space), self.full_flexibility
+        body = CondensedHalfPlane.of(conditions, self.drive, flexibility, points, self.mesh.tangents[0])
+        condensed = body.under(force, conditions.displacement)
+        return replace(condensed, work=self.work + self.condensed_work(body.acting.size))
 
     def element_tractions(self, displacement: FloatArray, force: FloatArray) -> FloatArray:
         """Return the tractions (n_elements, 1, 2) [Pa], which are the forces per length."""

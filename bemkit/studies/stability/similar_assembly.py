@@ -100,6 +100,8 @@ class AssemblySimilarity:
 
     def _pair(self, pair: ContactPair) -> ContactPair:
         law = None if pair.law is None else self._law(pair.law)
+        if not isinstance(pair.gap, int | float):
+            raise InputError(f"contact {pair.name!r}: gap is {pair.gap!r}: give a number")
         gap, interference = self.length * pair.gap, self.length * pair.interference
         return replace(pair, gap=gap, interference=interference, law=law, reach=self._length(pair.reach))
 

@@ -126,7 +126,7 @@ def rigid_mismatch(joints: Joints) -> float:
             if pair.rigid_body != body.name or name not in table.parts:
                 continue
             rows = table.rows(name) & np.isfinite(table.gap)
-            distance = (table.gap[rows] - pair.gap)[:, None] * solution.contact_directions[rows]
+            distance = (table.gap[rows] - pair.gap_at(points[rows]))[:, None] * solution.contact_directions[rows]
             arm, force = points[rows] + distance - body.centre, acting[rows]
             total += [*force.sum(axis=0), float(np.sum(arm[:, 0] * force[:, 1] - arm[:, 1] * force[:, 0]))]
             scales = joints.side(joints.owner(name)).body.scales
@@ -163,12 +163,13 @@ def largest_imbalance(joints: Joints) -> float:
 def energy_mismatch(joints: Joints) -> float:
     """Return the difference [-] of the elastic energy from half the work of loads and contacts.
 
-    As for one body nothing is compared where displacements are given or forces act inside.
+    As for one body nothing is compared where displacements are given or forces act inside, nor where half-planes move
+    or are loaded far away.
     """
     work = size = 0.0
     for body in joints.bodies.values():
         given = any(np.any(held.values != 0.0) for held in body.boundary.held)
-        if body.result.scene.body_forces or given:
+        if body.result.scene.body_forces or body.result.scene.far is not None or given:
             return 0.0
         is_load = ~body.is_touched
         for elements, _, _ in body.boundary.held:

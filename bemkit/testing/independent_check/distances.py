@@ -29,11 +29,13 @@ def gap_mismatch(joints: Joints) -> float:
         scales = joints.side(joints.owner(name)).body.scales
         partner = joints.partner(name)
         if partner is not None:
-            gap = joints.pairs[name].gap
-            flat = measure_flat(joints.side(joints.owner(name)), joints.side(partner), gap)
+            pair = joints.pairs[name]
+            flat = measure_flat(joints.side(joints.owner(name)), joints.side(partner), pair)
             if flat is None:
                 continue
-            differences = np.abs(table.gap[rows] - flat.distance - gap)
+            differences = np.abs(
+                table.gap[rows] - flat.distance - pair.gap_at(np.column_stack([table.x, table.y])[rows])
+            )
         else:
             differences = _from_obstacle(joints, name)
         coordinates = max(scales.coordinates, 64.0 * EPSILON * float(np.abs([table.x, table.y]).max()))
@@ -49,16 +51,16 @@ def _from_obstacle(joints: Joints, name: str) -> FloatArray:
     measured = joints.bodies[body]
     nodes = np.linalg.norm(points[:, None] - measured.result.boundary.points, axis=2).argmin(axis=1)
     normals = mean_normals(measured.fields.solution, measured.boundary, part)[nodes]
-    added, pair = 0.0, joints.moving.get(name)
+    added, pair = np.zeros(len(points)), joints.moving.get(name)
     if pair is None:
         (condition,) = (each.condition for each in measured.result.scene.parts if each.name == part)
         assert isinstance(condition, Contact)
         obstacle = condition.obstacle
     else:
-        added, obstacle = pair.gap, joints.solution.scene.rigid_body_of(pair).obstacle
+        added, obstacle = pair.gap_at(points), joints.solution.scene.rigid_body_of(pair).obstacle
     distance, _ = distance_to(obstacle, points, normals)
     known = np.isfinite(table.gap[rows])
-    return np.abs(table.gap[rows][known] - distance[known] - added)
+    return np.abs(table.gap[rows][known] - distance[known] - added[known])
 
 
 def mean_mismatch(joints: Joints) -> float:
@@ -72,7 +74,7 @@ def mean_mismatch(joints: Joints) -> float:
         rows, partner = table.rows(name), joints.partner(name)
         if partner is None:
             continue
-        flat = measure_flat(joints.side(joints.owner(name)), joints.side(partner), joints.pairs[name].gap)
+        flat = measure_flat(joints.side(joints.owner(name)), joints.side(partner), joints.pairs[name])
         weight = table.weight[rows]
         if flat is None or abs(weight.sum() - flat.length) > 1e-9 * flat.length:
             continue  # slivers beside nodes that others hold carry no multiplier
@@ -95,9 +97,9 @@ def hidden_overlaps(joints: Joints) -> tuple[float, float]:
     deepest, unsaid = [0.0], [0.0]
     for pair in joints.pairs.values():
         one, two = (joints.side(name) for name in joints.solution.contact_sides[pair.name])
-        flat = measure_flat(one, two, pair.gap)
+        flat = measure_flat(one, two, pair)
         reach = 0.25 * min(one.body.result.mesh.diameter, two.body.result.mesh.diameter)
-        overlap = sampled_overlap(one, two, pair.gap, reach) if flat is None else flat.overlap
+        overlap = sampled_overlap(one, two, pair, reach) if flat is None else flat.overlap
         length = max(one.body.scales.length, two.body.scales.length)
         said = joints.solution.contacts_between_nodes[pair.name].penetration_depth
         moved = max(float(np.abs(side.body.result.boundary.displacement).max()) for side in (one, two))

@@ -13,6 +13,7 @@ from scipy.spatial import cKDTree
 
 from bemkit.arrays import FloatArray, IntArray
 from bemkit.geometry.local_values import values_on_elements
+from bemkit.scene.contacts import ContactPair
 from bemkit.testing.independent_check.bodies import MeasuredBody
 
 _PARALLEL = 1e-9
@@ -85,14 +86,14 @@ class Relative:
     overlap: float
 
 
-def measure_flat(one: Side, two: Side, gap: float) -> Relative | None:
+def measure_flat(one: Side, two: Side, pair: ContactPair) -> Relative | None:
     """Measure two flat sides that face each other; None of others.
 
     Parameters
     ----------
     one, two : Side
-    gap : float [m]
-        Added to their distance.
+    pair : ContactPair
+        Its gap is added to their distance.
     """
     if not (one.is_flat and two.is_flat) or one.normal @ two.normal > -1.0 + _PARALLEL:
         return None
@@ -135,11 +136,11 @@ def measure_flat(one: Side, two: Side, gap: float) -> Relative | None:
         values.append(side.displacement(row, np.clip(local, -1.0, 1.0)))
     relative = values[0] - values[1]
     along = np.stack([relative @ normal, relative @ tangent], axis=1)
-    overlap = float(np.max(along[:, 0] - distance - gap, initial=0.0))
+    overlap = float(np.max(along[:, 0] - distance - pair.gap_at(origin + at[:, None] * tangent), initial=0.0))
     return Relative(high - low, distance, shares @ along, overlap)
 
 
-def sampled_overlap(one: Side, two: Side, gap: float, reach: float) -> float:
+def sampled_overlap(one: Side, two: Side, pair: ContactPair, reach: float) -> float:
     """Return the largest depth [m] of points of one side in the other one, measured at their closest points there.
 
     A point x of one side faces the point y of the other side where the sum of both directions, n(x) - n(y), passes
@@ -148,8 +149,8 @@ def sampled_overlap(one: Side, two: Side, gap: float, reach: float) -> float:
     Parameters
     ----------
     one, two : Side
-    gap : float [m]
-        Added to their distance.
+    pair : ContactPair
+        Its gap is added to their distance.
     reach : float [m]
         Points farther apart than this do not face each other.
     """
@@ -187,5 +188,5 @@ def sampled_overlap(one: Side, two: Side, gap: float, reach: float) -> float:
     # exclude points whose closest point lies beyond the end of the element
     offset = mesh.points(element, place[:, None])[:, 0] - points
     faces &= np.abs(beside(place, direction)) < _BESIDE * np.maximum(mesh.lengths[element], distance)
-    overlap = np.sum((motion - two.displacement(row, place) - offset) * direction, axis=1) - gap
+    overlap = np.sum((motion - two.displacement(row, place) - offset) * direction, axis=1) - pair.gap_at(points)
     return float(np.max(overlap[faces], initial=0.0))
