@@ -32,8 +32,13 @@ class _PlotCommand(click.Command):
     "-o", "--output", "place", default="figures", metavar="PLACE", help="Write to a folder, or one picture to a file."
 )
 @click.option("--dpi", "dots_per_inch", type=click.IntRange(20, 1200), default=150, help="Dots per inch (150).")
+@click.option(
+    "--width", type=click.FloatRange(50.0), metavar="MM", help="For print: this width, text of 7 points, no title."
+)
 @options.quiet_option
-def plot(source: str, what: tuple[str, ...] | None, place: str, dots_per_inch: int, quiet: bool) -> int:
+def plot(
+    source: str, what: tuple[str, ...] | None, place: str, dots_per_inch: int, width: float | None, quiet: bool
+) -> int:
     """Draw SOURCE: a result file, or a scene, which is solved first.
 
     Without --what the pictures that suit the result are drawn. The place is a folder, or a file ending in .png, .svg
@@ -48,7 +53,7 @@ def plot(source: str, what: tuple[str, ...] | None, place: str, dots_per_inch: i
         reserve(check_place(place, what))
         moves = what is not None and ANIMATION in what
         steps = solved_steps(source, callback) if moves else [solved(source, callback)]
-        paths = save_pictures(steps, place, what, dots_per_inch=dots_per_inch)
+        paths = save_pictures(steps, place, what, dots_per_inch=dots_per_inch, width=width)
     for path in paths if not quiet else ():
         print(path)
     if not steps[-1].is_converged:

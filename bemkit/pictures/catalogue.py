@@ -25,6 +25,7 @@ from bemkit.pictures.stress import draw_stress
 from bemkit.results.stress_measures import STRESSES
 from bemkit.stopwatch import announce
 
+_FEW = 2048
 MOST_CONTACTS = 6
 """Contacts up to which each has pictures of its own where none is named."""
 
@@ -129,11 +130,6 @@ def _without_history(result: Result) -> str:
     return _without_contact(result) or ("" if result.loading is not None else "it has no load history")
 
 
-def _without_inside(result: Result) -> str:
-    has_surface = any(body.mesh.surface is not None for body in result.bodies.values())
-    return "of a half-plane only the surface is known" if has_surface else ""
-
-
 def _of_several_bodies(result: Result) -> str:
     return "it shows one body, and there are several" if len(result.bodies) > 1 else ""
 
@@ -142,8 +138,18 @@ def _has_few_contacts(result: Result) -> bool:
     return len(result.contact.parts) <= MOST_CONTACTS
 
 
-def _has_friction(result: Result) -> bool:
-    return result.loading is not None and has_friction(result.loading)
+def _has_steps(result: Result) -> bool:
+    return result.loading is not None and len(result.loading.steps) > 1
+
+
+def _is_loop(result: Result) -> bool:
+    """Whether friction is drawn over more than one way there and back."""
+    return result.loading is not None and len(result.loading.steps) > 2 and has_friction(result.loading)
+
+
+def _is_fast(result: Result) -> bool:
+    """Whether stress inside takes seconds: below a surface each point takes all elements."""
+    return all(body.mesh.surface is None or body.mesh.n_elements <= _FEW for body in result.bodies.values())
 
 
 def _never(result: Result) -> bool:
@@ -156,7 +162,9 @@ _contact = partial(Picture, why_not=_without_contact, is_default=_has_few_contac
 def _stress(name: str) -> Picture:
     shows = f"{STRESSES[name].symbol.replace('$', '').replace(chr(92), '')} inside the bodies"
     is_default = name == "von-mises"
-    return Picture(name, shows, partial(draw_stress, measure=name), _without_inside, lambda result: is_default)
+    return Picture(
+        name, shows, partial(draw_stress, measure=name), is_default=lambda result: is_default and _is_fast(result)
+    )
 
 
 _ALL = (
@@ -183,13 +191,14 @@ _ALL = (
     *map(_stress, STRESSES),
     Picture("scene", "bodies, supports, loads and obstacles", draw_scene, is_default=_never),
     Picture("convergence", "violations over the solver's steps", draw_convergence, is_default=_never),
-    Picture("friction-loop", "friction over displacement", draw_friction_loop, _without_history, _has_friction),
-    Picture("work", "work and energy over time", draw_work, _without_history),
+    Picture("friction-loop", "friction over displacement", draw_friction_loop, _without_history, _is_loop),
+    Picture("work", "work and energy over time", draw_work, _without_history, _has_steps),
     _contact(
         "status-over-time",
         "status over the time of a load history along each contact",
         draw_status_over_time,
         why_not=_without_history,
+        is_default=lambda result: _has_steps(result) and _has_few_contacts(result),
     ),
 )
 PICTURES: Mapping[str, Picture] = {picture.name: picture for picture in _ALL}

@@ -9,7 +9,7 @@ import numpy as np
 from bemkit.arrays import FloatArray
 from bemkit.pictures.contact_axes import STATUS_COLOURS
 from bemkit.pictures.contact_nodes import Nodes, contact_nodes, is_closed, node_points
-from bemkit.pictures.crowds import marked
+from bemkit.pictures.crowds import marked, seen_apart
 from bemkit.pictures.drawing import VERMILION, Axes, legend_below
 from bemkit.pictures.magnification import magnification
 from bemkit.pictures.obstacles import draw_obstacles, draw_rigid_bodies
@@ -24,6 +24,8 @@ SHORT = 0.4
 """Size of a zone of contact, relative to the bodies, below which it is worth a picture of its own."""
 _LONGEST, _LEAST = 0.25, 0.01
 """Length of the longest arrow in sizes of the zone, and share of it below which there is none."""
+_ARROWS = 40
+"""Arrows along a straight zone at most."""
 _NODES_AROUND = 3.0
 """Distances of neighbouring nodes that the frame holds around a zone of a single node."""
 
@@ -115,7 +117,7 @@ def _draw_nodes(axes: Axes, nodes: Nodes, words: Any, size: float) -> None:
     sizes = np.hypot(*nodes.tractions.T)
     largest = float(sizes.max(initial=0.0))
     if largest > 0.0:
-        shown = marked(nodes.drawn, sizes, size)
+        shown = seen_apart(nodes.drawn, sizes, size / _ARROWS)
         shown = shown[sizes[shown] > _LEAST * largest]
         arrows = _LONGEST * size * nodes.tractions[shown] / largest
         draw_arrows(axes, nodes.drawn[shown] - arrows, arrows, VERMILION, "traction on the body")

@@ -7,7 +7,7 @@ import numpy as np
 from bemkit.pictures.drawing import Axes, legend_below
 from bemkit.pictures.loads import draw_loads
 from bemkit.pictures.magnification import magnification
-from bemkit.pictures.obstacles import draw_obstacles, draw_rigid_bodies
+from bemkit.pictures.obstacles import draw_obstacles, draw_rigid_bodies, relief_frame
 from bemkit.pictures.plane import draw_bodies, draw_initial, draw_symmetry_lines, joined_frame, plane_axes, set_frame
 from bemkit.pictures.shown import Drawable, Result, Shown, shown
 from bemkit.pictures.supports import draw_supports
@@ -57,7 +57,12 @@ def _complete(axes: Axes, scene: Shown, factor: float, loops: list[np.ndarray]) 
         draw_symmetry_lines(axes, body.scene.symmetry)
     draw_supports(axes, scene, factor)
     ends = draw_loads(axes, scene, factor)
-    set_frame(axes, joined_frame(scene.frame.T, *loops, ends))
+    relief = relief_frame(scene, factor)
+    if relief is None:
+        set_frame(axes, joined_frame(scene.frame.T, *loops, ends))
+    else:
+        axes.set_aspect("auto")
+        set_frame(axes, relief, margin=0.0)
     draw_rigid_bodies(axes, scene, factor)
     draw_obstacles(axes, scene)
     legend_below(axes)

@@ -5,6 +5,8 @@ Drawn with matplotlib's object interface, so that no display and no global state
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Literal
 
 if TYPE_CHECKING:
@@ -16,6 +18,8 @@ else:
 # the colours of Okabe and Ito, which people with colour-vision deficiencies can distinguish
 BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY = "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9"
 GREY = "#9A9A9A"
+CLEAR: Mapping[str, Any] = MappingProxyType({"framealpha": 0.85, "edgecolor": "none", "borderpad": 0.2})
+"""Style of legends over curves, which stay readable where nothing is free."""
 
 _NOISE = 1e-6
 """Variation, relative to the scale of a quantity, that is drawn as none: round-off may grow to 1e-10."""
@@ -40,7 +44,7 @@ def label_values(axes: Axes, name: str, scale: float = 0.0) -> None:
     axes.axhline(0.0, color="black", linewidth=0.6, zorder=0)
     axes.set_ylabel(name)
     ignore_round_off(axes, scale)
-    axes.legend(frameon=False)
+    axes.legend(**CLEAR)
 
 
 def ignore_round_off(axes: Axes, scale: float, axis: Literal["x", "y"] = "y") -> None:
@@ -62,13 +66,18 @@ def ignore_round_off(axes: Axes, scale: float, axis: Literal["x", "y"] = "y") ->
     axes.ticklabel_format(axis=axis, scilimits=(-2, 3), useMathText=True, useOffset=False)
 
 
-def legend_below(axes: Axes) -> None:
-    """Put the legend below the axes, clear of the label of the abscissa."""
+BELOW = "below"
+"""Mark of legends below axes, which take fewer columns where the figure is narrow."""
+
+
+def legend_below(axes: Axes, n_columns: int = 3, size: float = 9.0) -> None:
+    """Put the legend below the axes, clear of the label of the abscissa; the size of its text is in points."""
     from matplotlib.transforms import ScaledTranslation
 
     scale = axes.get_figure(root=True).dpi_scale_trans  # type: ignore[union-attr]
     below = axes.transAxes + ScaledTranslation(0.0, -0.5, scale)
-    axes.legend(loc="upper center", bbox_to_anchor=(0.5, 0.0), bbox_transform=below, ncols=3, frameon=False, fontsize=9)
+    place: dict[str, Any] = {"loc": "upper center", "bbox_to_anchor": (0.5, 0.0), "bbox_transform": below}
+    axes.legend(**place, ncols=n_columns, frameon=False, fontsize=size).set_gid(BELOW)
 
 
 def show_grid(axes: Axes) -> None:

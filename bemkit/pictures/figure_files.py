@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from bemkit.atomic_files import OutputFileError, check_target, replacing
+from bemkit.pictures.publication import fitted
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -16,7 +17,9 @@ FIGURE_FORMATS = {".png": "Software", ".svg": "Date", ".pdf": "CreationDate"}
 """Formats by the ending of the file, with the stamp without which equal pictures are equal files."""
 
 
-def write_figures(figures: Mapping[str, Figure], folder: Path, dots_per_inch: int = 150) -> tuple[Path, ...]:
+def write_figures(
+    figures: Mapping[str, Figure], folder: Path, dots_per_inch: int = 150, width: float | None = None
+) -> tuple[Path, ...]:
     """Write figures, by file names without ``.png``, each all or nothing, into a folder that is made if need be.
 
     Returns the paths.
@@ -29,20 +32,22 @@ def write_figures(figures: Mapping[str, Figure], folder: Path, dots_per_inch: in
     make_folder(folder)
     targets = [check_target(folder / f"{name}.png") for name in figures]
     return tuple(
-        write_figure(target, figure, dots_per_inch) for target, figure in zip(targets, figures.values(), strict=True)
+        write_figure(target, figure, dots_per_inch, width)
+        for target, figure in zip(targets, figures.values(), strict=True)
     )
 
 
-def write_figure(path: Path, figure: Figure, dots_per_inch: int = 150) -> Path:
-    """Write a figure in the format that the ending names, all or nothing; see `FIGURE_FORMATS`."""
+def write_figure(path: Path, figure: Figure, dots_per_inch: int = 150, width: float | None = None) -> Path:
+    """Write a figure in the format that the ending names, all or nothing; see `FIGURE_FORMATS`, of a width `fitted`."""
     target, ending = check_target(path), path.suffix.lower()
+    box = "tight" if width is None else fitted(figure, width)
     with replacing(target) as temporary:
         figure.savefig(
             temporary,
             dpi=dots_per_inch,
             format=ending[1:],
             metadata={FIGURE_FORMATS[ending]: None},
-            bbox_inches="tight",
+            bbox_inches=box,
             pad_inches=0.08,
         )
     return target

@@ -12,12 +12,19 @@ from bemkit.pictures.catalogue import figures, find_picture
 from bemkit.pictures.figure_files import FIGURE_FORMATS, check_figure_folder, write_figure, write_figures
 from bemkit.pictures.shown import Result
 
+LEAST_WIDTH = 50.0
+"""Width [mm] of a picture that has room for its text."""
 ANIMATION = "animation"
 """The one picture that moves; see `bemkit.pictures.animation`."""
 
 
 def save_pictures(
-    result: Result | Sequence[Result], place: str | Path, what: Sequence[str] | None = None, *, dots_per_inch: int = 150
+    result: Result | Sequence[Result],
+    place: str | Path,
+    what: Sequence[str] | None = None,
+    *,
+    dots_per_inch: int = 150,
+    width: float | None = None,
 ) -> tuple[Path, ...]:
     """Draw pictures of a result into a folder, or one picture into a file.
 
@@ -31,6 +38,9 @@ def save_pictures(
     what : sequence of str, optional
         Names from `bemkit.pictures.catalogue.PICTURES`, or ``"animation"``; by default those that suit the result.
     dots_per_inch : int
+    width : float, optional [mm]
+        For print, such as 85 for a column: all text in 7 points and no title, which belongs into the caption. Not of
+        the animation.
 
     Returns
     -------
@@ -39,11 +49,13 @@ def save_pictures(
     Raises
     ------
     InputError
-        If a name is unknown, or there is no such picture of the result.
+        If a name is unknown, there is no such picture of the result, or the width is less than 50 mm.
     OutputFileError
         If the folder or a file cannot be written, or matplotlib is missing.
     """
     place = Path(place)
+    if width is not None and not width >= LEAST_WIDTH:
+        raise InputError(f"width is {width}: give {LEAST_WIDTH:g} mm or more")
     check_place(place, what)
     steps = result if isinstance(result, Sequence) else [result]
     if not steps:
@@ -55,8 +67,8 @@ def save_pictures(
         drawn = figures(steps[-1], still)
         if len(drawn) > 1:
             raise OutputFileError(f"{place}: one file for {len(drawn)} pictures: give a folder, or name one picture")
-        return tuple(write_figure(place, figure, dots_per_inch) for figure in drawn.values())
-    paths = write_figures(figures(steps[-1], still), place, dots_per_inch)
+        return tuple(write_figure(place, figure, dots_per_inch, width) for figure in drawn.values())
+    paths = write_figures(figures(steps[-1], still), place, dots_per_inch, width)
     return (
         paths if what is None or ANIMATION not in what else (*paths, save_animation(place / f"{ANIMATION}{GIF}", steps))
     )

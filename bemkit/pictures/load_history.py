@@ -7,7 +7,18 @@ import numpy as np
 from bemkit.errors import InputError
 from bemkit.pictures.abscissa import Abscissa, common_direction
 from bemkit.pictures.contact_axes import STATUS_COLOURS
-from bemkit.pictures.drawing import BLUE, GREEN, GREY, VERMILION, Axes, axes_or_new, ignore_round_off, show_grid
+from bemkit.pictures.drawing import (
+    BLUE,
+    CLEAR,
+    GREEN,
+    GREY,
+    VERMILION,
+    Axes,
+    axes_or_new,
+    ignore_round_off,
+    legend_below,
+    show_grid,
+)
 from bemkit.pictures.shown import Result
 from bemkit.results.contact_table import STATUS_WORDS
 from bemkit.results.load_history import LoadHistory
@@ -50,7 +61,7 @@ def draw_friction_loop(solution: Result, axes: Axes | None = None, *, units: Uni
     axes.plot(places, forces, color=BLUE, linewidth=1.4, marker="o", markersize=3.0)
     axes.plot(places[:1], forces[:1], color=GREY, marker="o", markersize=6.0, linestyle="", label="begin")
     axes.plot(places[-1:], forces[-1:], color=VERMILION, marker="o", markersize=6.0, linestyle="", label="end")
-    axes.legend(frameon=False)
+    legend_below(axes)
     axes.set_xlabel(with_unit(f"mean tangential displacement{over}", "length", units))
     axes.set_ylabel(with_unit("friction force on the body", "force", units))
     axes.set_title(f"Friction over displacement\n{solution.title}", parse_math=False, fontsize=11)
@@ -88,7 +99,7 @@ def draw_work(solution: Result, axes: Axes | None = None, *, units: UnitNames | 
     axes.set_xlabel("time $t$")
     axes.set_ylabel(with_unit("work and energy", "energy", units))
     axes.set_title(f"Work and energy\n{solution.title}", parse_math=False, fontsize=11)
-    axes.legend(frameon=False)
+    axes.legend(**CLEAR)
     show_grid(axes)
     ignore_round_off(axes, float(np.abs(np.concatenate([external, taken, energy])).max()))
     return axes

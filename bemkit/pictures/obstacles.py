@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -20,12 +20,17 @@ from bemkit.pictures.plane import set_frame
 from bemkit.pictures.shown import Shown
 from bemkit.scene.conditions import Contact
 
+if TYPE_CHECKING:
+    from matplotlib.patches import Patch
+
 _EDGE, _HATCH = "#555555", "#B0B0B0"
-_FILLED: dict[str, Any] = {"facecolor": "#EDEDED", "hatch": "//", "edgecolor": "#A8A8A8", "linewidth": 1.0, "zorder": 0}
+_FILLED: dict[str, Any] = {"facecolor": "#EDEDED", "edgecolor": "#A8A8A8", "linewidth": 1.0, "zorder": 0}
 _BEFORE: dict[str, Any] = {"fill": False, "edgecolor": GREY, "linewidth": 1.0, "linestyle": "--", "zorder": 0}
 _POINTS_OF_CIRCLE, _POINTS_OF_SPAN, _POINTS_OF_GRID, _POINTS_OF_ELEMENT = 181, 12, 301, 5
+_LEVEL, _RELIEF = 1e-9, 0.1
+"""Horizontal part of a normal that is round-off, and height of a relief, by its length, that is flat."""
 _BAND = 0.04
-"""Thickness of the drawn part of an obstacle given by its gap, in sizes of the picture."""
+"""Thickness of the hatched part of an obstacle along its surface, in sizes of the picture."""
 
 
 def draw_obstacles(axes: Axes, shown: Shown) -> None:
@@ -42,10 +47,10 @@ def draw_obstacles(axes: Axes, shown: Shown) -> None:
             obstacle, label = part.condition.obstacle, None if drawn else "obstacle"
             if loops := outline_of(obstacle, frame):
                 if not any(obstacle is other for other in drawn):
-                    _draw(axes, _with_outside(loops, obstacle, frame), _FILLED, label)
+                    _draw_hatched(axes, _with_outside(loops, obstacle, frame), frame, label)
                 drawn.append(obstacle)
             elif bands := facing_bands(obstacle, body.mesh, elements, _BAND * shown.size):
-                _draw(axes, bands, _FILLED | {"edgecolor": _HATCH, "linewidth": 0.0}, label)
+                _draw(axes, bands, _FILLED | {"hatch": "//", "edgecolor": _HATCH, "linewidth": 0.0}, label)
                 for band in bands:
                     axes.plot(*band[: len(band) // 2].T, color=_EDGE, linewidth=1.0, zorder=0.5)
                 drawn.append(obstacle)
@@ -73,6 +78,28 @@ def facing_bands(obstacle: Obstacle, mesh: BoundaryMesh, elements: IntArray, thi
     return bands
 
 
+def relief_frame(shown: Shown, factor: float) -> FloatArray | None:
+    """Return the frame (2, 2) [m] of a horizontal surface whose relief is flat beside its length, None of others.
+
+    It shows the surface, moved by a factor times its displacement, and what it faces, across the whole height: axes
+    with equal scales would show lines.
+    """
+    (body, *others) = shown.bodies
+    if others or shown.rigid or body.mesh.surface is None or abs(body.mesh.normals[0, 0]) > _LEVEL:
+        return None
+    surfaces = body.outlines(factor)
+    for part, elements in body.parts:
+        if isinstance(part.condition, Contact):
+            bands = facing_bands(part.condition.obstacle, body.mesh, elements, 0.0)
+            surfaces += [band[: len(band) // 2] for band in bands]
+    heights = np.concatenate(surfaces)[:, 1]
+    relief, length = float(np.ptp(heights)), float(np.ptp(shown.frame[0]))
+    if not 0.0 < relief < _RELIEF * length:
+        return None
+    below, above = (0.6, 0.3) if body.mesh.normals[0, 1] > 0.0 else (0.3, 0.6)
+    return np.array([shown.frame[0], [heights.min() - below * relief, heights.max() + above * relief]])
+
+
 def draw_rigid_bodies(axes: Axes, shown: Shown, factor: float) -> None:
     """Draw rigid bodies whose shape is known, before they move and after it, their motions times a factor.
 
@@ -90,7 +117,7 @@ def draw_rigid_bodies(axes: Axes, shown: Shown, factor: float) -> None:
         moved = [loop + body.motions_at(loop) @ motion for loop in loops]
         _draw(axes, loops, _BEFORE, None)
         filled = _with_outside(moved, body.obstacle, widest)
-        _draw(axes, filled, _FILLED, None if is_labelled else "rigid body")
+        _draw_hatched(axes, filled, frame, None if is_labelled else "rigid body")
         is_labelled = True
         if not _is_endless(body.obstacle):
             places = np.clip(np.concatenate([*loops, *moved]), widest[:, 0], widest[:, 1])
@@ -181,12 +208,37 @@ def _is_endless(obstacle: object) -> bool:
     return isinstance(obstacle, RigidHalfPlane) or (isinstance(obstacle, RigidSpline) and not obstacle.is_closed)
 
 
-def _draw(axes: Axes, loops: list[FloatArray], style: dict[str, Any], label: str | None) -> None:
+def _draw_hatched(axes: Axes, loops: list[FloatArray], frame: FloatArray, label: str | None) -> None:
+    """Fill loops, and hatch what lies close to them: a zoom shows more of an obstacle than of the body."""
+    from matplotlib.collections import PatchCollection
+    from matplotlib.patches import PathPatch
+    from matplotlib.path import Path
+
+    outline = _draw(axes, loops, _FILLED, label)
+    reach = _BAND * float(np.hypot(*np.ptp(frame, axis=1)))
+    strips = []
+    for loop in loops:
+        ways = np.diff(loop, axis=0, append=loop[:1])
+        lengths = np.hypot(*ways.T)
+        starts, ends, along = (each[lengths > 0.0] for each in (loop, loop + ways, ways))
+        along = reach * along / lengths[lengths > 0.0, None]
+        across = np.stack([-along[:, 1], along[:, 0]], axis=1)
+        low, high = starts - along, ends + along  # longer than the edges, so that no corner stays open
+        strips += [*np.stack([low - across, high - across, high + across, low + across, low - across], axis=1)]
+    band = Path.make_compound_path(*(Path(strip, closed=True) for strip in strips))
+    hatching = PatchCollection(
+        [PathPatch(band)], facecolor="none", hatch="//", edgecolor=_HATCH, linewidths=0.0, zorder=0
+    )
+    axes.add_artist(hatching)
+    hatching.set_clip_path(outline)
+
+
+def _draw(axes: Axes, loops: list[FloatArray], style: dict[str, Any], label: str | None) -> Patch:
     from matplotlib.patches import PathPatch
     from matplotlib.path import Path
 
     outline = Path.make_compound_path(*(Path(np.vstack([loop, loop[:1]]), closed=True) for loop in loops))
-    axes.add_patch(PathPatch(outline, label=label, **style))
+    return axes.add_patch(PathPatch(outline, label=label, **style))
 
 
 def _frame(axes: Axes) -> FloatArray:

@@ -109,10 +109,13 @@ class Shown:
         low = np.min([body.mesh.nodes.min(axis=0) for body in self.bodies], axis=0)
         high = np.max([body.mesh.nodes.max(axis=0) for body in self.bodies], axis=0)
         endless = [body.mesh for body in self.bodies if body.mesh.is_exterior]
-        spare = (0.5 if endless else 0.0) * float((high - low).max()) * np.ones(2)
-        if any(mesh.surface is not None for mesh in endless):
-            spare *= np.abs(endless[0].normals[0])  # a strip of a surface ends where it is cut
-        return np.stack([low - spare, high + spare], axis=1)
+        length = float((high - low).max())
+        if any(mesh.surface is not None for mesh in endless):  # a strip of a surface ends where it is cut
+            inside = -0.5 * length * endless[0].normals[0]
+            low, high = low + np.minimum(inside, -0.2 * inside), high + np.maximum(inside, -0.2 * inside)
+        elif endless:
+            low, high = low - 0.5 * length, high + 0.5 * length
+        return np.stack([low, high], axis=1)
 
     @property
     def size(self) -> float:

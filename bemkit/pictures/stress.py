@@ -61,9 +61,8 @@ def draw_stress(
     values = [chosen.of(each.stress, body.scene.material) for each, body in zip(filled, bodies, strict=True)]
     every = np.concatenate(values)
     extreme = float(every[np.argmax(np.abs(every))])
-    title = f"{chosen.symbol}, up to {amount(extreme, 'stress', units)}\n{scene.title}"
-    axes = plane_axes(axes, scene.frame, "", units)
-    axes.set_title(title[0].upper() + title[1:], parse_math="$" not in scene.title, fontsize=11)
+    title = f"Stress up to {amount(extreme, 'stress', units)}\n{scene.title}"  # its name is beside the colours
+    axes = plane_axes(axes, scene.frame, title, units)
     largest = largest_shown(np.concatenate([each.points for each in filled]), every, spacing)
     levels = _levels(largest, chosen.is_positive)
     for triangles, value in zip(filled, values, strict=True):

@@ -17,13 +17,7 @@ _STEPS = 16
 
 
 def largest_equivalent_stress(body: SolvedBody) -> LargestStress:
-    """Return the largest equivalent stress of von Mises of a body, inside or on the boundary.
-
-    Raises
-    ------
-    InputError
-        If the body is a half-plane, of which only the surface is known.
-    """
+    """Return the largest equivalent stress of von Mises of a body, inside or on the boundary."""
     mesh, material, fields = body.mesh.whole, body.scene.material, interior_fields(body)
     on_boundary = body.largest_stress()
     low, high = mesh.nodes.min(axis=0), mesh.nodes.max(axis=0)

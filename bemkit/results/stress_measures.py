@@ -34,7 +34,7 @@ def _shear(stress: FloatArray, material: Material) -> FloatArray:
 
 STRESSES: Mapping[str, StressMeasure] = MappingProxyType(
     {
-        "von-mises": StressMeasure("equivalent stress of von Mises", True, _von_mises),
+        "von-mises": StressMeasure("von Mises stress", True, _von_mises),
         "stress-xx": StressMeasure(r"stress $\sigma_{xx}$", False, lambda stress, material: stress[..., 0, 0]),
         "stress-yy": StressMeasure(r"stress $\sigma_{yy}$", False, lambda stress, material: stress[..., 1, 1]),
         "stress-xy": StressMeasure(r"stress $\sigma_{xy}$", False, lambda stress, material: stress[..., 0, 1]),

@@ -14,10 +14,11 @@ import numpy as np
 from scipy.spatial import Delaunay, KDTree
 
 from bemkit.arrays import BoolArray, FloatArray, IntArray
-from bemkit.errors import InputError
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.neighbours import corner_nodes
 from bemkit.geometry.vectors import cross, norms
+from bemkit.operators.somigliana.locate import Locator
+from bemkit.operators.somigliana.potentials import PotentialFields
 from bemkit.results.boundary_stress import BoundaryStress
 from bemkit.results.interior import interior_fields
 from bemkit.results.solved_body import SolvedBody
@@ -68,21 +69,16 @@ def stress_mesh(body: SolvedBody, spacing: float, frame: FloatArray) -> StressMe
     Parameters
     ----------
     body : Solution or SolvedBody
-        Bounded, or the exterior of closed curves.
+        Of a half-plane the part of the frame below the strip of its surface that has elements.
     spacing : float [m]
         Distance of points far from the boundary; close to it they are as dense as its elements.
     frame : (2, 2) array [m]
         Least and largest x, least and largest y to which an exterior is cut.
-
-    Raises
-    ------
-    InputError
-        If the body is a half-plane.
     """
     fields, boundary = interior_fields(body), body.boundary_stress
     mesh = boundary.mesh
     if mesh.surface is not None:
-        raise InputError("the body is a half-plane, which has no end to fill with triangles: take a block")
+        return _below_surface(boundary, fields, spacing, frame)
     inner = _inner_points(*_midpoints(boundary, spacing), spacing, frame, mesh.is_exterior)
     inner = inner[fields.is_inside(inner)]
     rings = [_Ring.on(boundary, loop, spacing) for loop in mesh.loops]
@@ -97,6 +93,38 @@ def stress_mesh(body: SolvedBody, spacing: float, frame: FloatArray) -> StressMe
     stress = np.concatenate([*(ring.mean(boundary.at) for ring in rings), fields.stress(inner)])
     displacement = [*(ring.mean(boundary.displacement_at) for ring in rings), fields.displacement(inner)]
     return StressMesh(points, triangles, stress, np.concatenate(displacement))
+
+
+def _below_surface(boundary: BoundaryStress, fields: PotentialFields, spacing: float, frame: FloatArray) -> StressMesh:
+    """Fill the rectangle below the strip of a half-plane that has elements, as deep as the frame."""
+    mesh = boundary.mesh
+    normal, along = mesh.normals[0], mesh.tangents[0]
+    on_surface, normals, lengths = _midpoints(boundary, spacing)
+    inner = _inner_points(on_surface, normals, lengths, spacing, frame, is_exterior=True)
+    corners = np.stack(np.meshgrid(*frame), axis=2).reshape(-1, 2)
+    start, end = mesh.nodes[mesh.elements[0, 0]], mesh.nodes[mesh.elements[-1, 1]]
+    depth, length = -float(((corners - start) @ normal).min()), float(norms(end - start))
+    down = np.linspace(0.0, 1.0, max(2, round(depth / spacing)) + 1)[1:, None] * -depth * normal
+    across = np.linspace(0.0, 1.0, max(2, round(length / spacing)) + 1)[1:-1, None] * length * along
+    s, below = (inner - start) @ along, (start - inner) @ normal
+    edge = 0.5 * spacing
+    inner = inner[(below > 0.0) & (below < depth - edge) & (s > edge) & (s < length - edge)]
+    inner = np.concatenate([inner, start + down, end + down, start + down[-1] + across])
+    few = _apart(on_surface, np.maximum(lengths, _SMALLEST * spacing))
+    element = Locator(mesh).locate(on_surface[few])
+    places = (
+        np.concatenate([[0], element.element, [mesh.n_elements - 1]]),
+        np.concatenate([[-1.0], element.xi, [1.0]])[:, None],
+    )
+    points = np.concatenate([mesh.points(*places)[:, 0], inner])
+    triangles = Delaunay((points - start) / length).simplices.astype(np.intp)
+    first, second, third = np.moveaxis(points[triangles], 1, 0)
+    doubled_area = cross(second - first, third - first)
+    triangles = np.where(doubled_area[:, None] > 0.0, triangles, triangles[:, ::-1])
+    triangles = triangles[np.abs(doubled_area) > _FLAT * length**2]
+    stress = np.concatenate([boundary.at(*places)[:, 0], fields.stress(inner)])
+    moved = np.concatenate([boundary.displacement_at(*places)[:, 0], fields.displacement(inner)])
+    return StressMesh(points, triangles, stress, moved)
 
 
 @dataclass(frozen=True, eq=False)

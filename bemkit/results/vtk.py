@@ -141,7 +141,7 @@ def write_vtk(path: Path, solution: Solution, inside: int = 0) -> None:
     [Pa] everywhere; ``u_n``, ``u_t``, ``slip``, ``sigma_n``, ``sigma_t``, ``gap``, ``clearance``, ``status``
     (`NodeStatus` values) and ``weight`` at contact nodes, where ``slip`` is u_t of nodes that touch. Cell data:
     ``traction`` [Pa] of lines and ``body``, its number. What is not defined somewhere is not a number there. Triangles
-    end at the boundary; an exterior is cut at half its size from it.
+    end at the boundary; an exterior and a half-plane are cut at half their size from it.
     """
     bodies = list(bodies_of(solution).values())
     blocks = [_boundary(body, number) for number, body in enumerate(bodies)]
@@ -206,10 +206,8 @@ def _contact_nodes(solution: Solution, bodies: Sequence[SolvedBody]) -> Block:
 
 
 def _inside(body: SolvedBody, number: int, across: int) -> Block:
-    """Return triangles that fill a body; none of a half-plane."""
+    """Return triangles that fill a body."""
     mesh = body.mesh.whole
-    if mesh.surface is not None:
-        return Block("triangle", np.zeros((0, 2)), np.zeros((0, 3), np.intp), {}, {})
     low, high = mesh.nodes.min(axis=0), mesh.nodes.max(axis=0)
     size = float((high - low).max())
     spare = 0.5 * size if mesh.is_exterior else 0.0

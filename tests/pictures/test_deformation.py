@@ -12,11 +12,13 @@ from matplotlib.quiver import Quiver
 import bemkit as bk
 from bemkit.geometry.shapes import ElasticHalfPlane
 from bemkit.geometry.spaces import dof_points
-from bemkit.pictures import draw_deformation, draw_scene, draw_zoom, figures
+from bemkit.pictures import draw_deformation, draw_scene, draw_stress, draw_zoom
 from bemkit.pictures.contact_map import is_short
 from bemkit.pictures.magnification import LINE, exaggeration, magnification
 from bemkit.pictures.shown import at_mesh_nodes, shown
+from bemkit.results.interior import interior_fields
 from bemkit.results.solution import BoundaryFields, Solution
+from bemkit.results.stress_mesh import stress_mesh
 from bemkit.runs.run import run
 from bemkit.scene.plane_motion import FarField
 from bemkit.scene.toml import load_scene, with_overrides
@@ -197,8 +199,36 @@ def test_a_half_plane_is_filled_below_its_surface() -> None:
     path = draw_deformation(solution).patches[0].get_path()
     assert path.contains_point((0.05, -0.02))
     assert not path.contains_point((0.05, 0.02))
-    with pytest.raises(bk.InputError, match="of a half-plane only the surface is known"):
-        figures(solution, ["von-mises"])
+
+
+def test_the_stress_of_a_half_plane_fills_a_rectangle_below_its_surface() -> None:
+    solution = bk.run(with_overrides(load_scene("cylinder-on-half-plane"), elements=60))
+    frame = shown(solution).frame
+    length, depth = np.ptp(frame[0]), -frame[1, 0]
+    filled = stress_mesh(solution.body, length / 30, frame)
+    first, second, third = np.moveaxis(filled.points[filled.triangles], 1, 0)
+    area = 0.5 * np.sum((second - first)[:, 0] * (third - first)[:, 1] - (second - first)[:, 1] * (third - first)[:, 0])
+    assert area == pytest.approx(length * depth, rel=1e-12)  # without gaps and overlaps
+    below = filled.points[:, 1] < 0.0
+    expected = interior_fields(solution).stress(filled.points[below])
+    np.testing.assert_array_equal(filled.stress[below], expected)
+    pressed = np.abs(filled.points[:, 0]) < 0.02
+    peak = -solution.contact.sigma_n.min()
+    # Hertz: the pressure at the middle of the surface, from elements a fortieth of the contact wide
+    assert -filled.stress[pressed & ~below, 1, 1].min() == pytest.approx(peak, rel=0.02)
+    axes = draw_stress(solution)
+    assert axes.get_ylim()[0] < -0.9 * depth
+
+
+def test_a_flat_relief_is_drawn_across_the_whole_height() -> None:
+    solution = bk.run(with_overrides(load_scene("cylinder-on-half-plane"), elements=60))
+    axes = draw_deformation(solution)
+    height = np.ptp(axes.get_ylim())
+    assert axes.get_aspect() == "auto"
+    assert height < 0.1 * np.ptp(axes.get_xlim())
+    surface = axes.lines[1].get_ydata()
+    assert np.ptp(surface) > 0.2 * height
+    assert draw_deformation(run(SCENES["rounded punch"])).get_aspect() == 1.0
 
 
 def test_a_zoom_shows_a_short_zone_and_says_what_touches() -> None:

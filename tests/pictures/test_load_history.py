@@ -50,6 +50,8 @@ def test_a_history_without_friction_has_no_loop_unless_it_is_asked_for_and_no_ro
     names = [picture.name for picture in default_pictures(result)]
     assert "friction-loop" not in names
     assert "work" in names
+    once = bk.run(replace(LOOP, steps=(replace(LOOP.steps[0], increments=1),)))
+    assert not {"friction-loop", "work", "status-over-time"} & {each.name for each in default_pictures(once)}
     axes = draw_friction_loop(result, Figure().add_subplot())
     assert np.ptp(axes.get_xlim()) > 1e-3 * np.abs(result.contact.u_t).max()
     assert np.ptp(axes.get_ylim()) > 1e-3 * result.force_normal

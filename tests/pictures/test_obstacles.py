@@ -103,6 +103,18 @@ def is_filled(patch: Patch, points: np.ndarray) -> np.ndarray:
     return turns != 0
 
 
+def test_hatching_stays_close_to_the_surface() -> None:
+    axes = Figure().add_subplot()
+    axes.set_xlim(*FRAME[0])
+    axes.set_ylim(*FRAME[1])
+    draw_obstacles(axes, shown(block(bk.RigidHalfPlane((0.0, -0.5)))))
+    (hatching,) = (each for each in axes.collections if each.get_hatch())
+    (path,) = hatching.get_paths()
+    assert path.contains_point((0.3, -0.6))
+    assert not path.contains_point((0.3, -1.5))
+    assert hatching.get_clip_path() is not None  # and off the body
+
+
 def test_a_clockwise_spline_fills_its_outside() -> None:
     axes = Figure().add_subplot()
     draw_obstacles(axes, shown(block(bk.RigidSpline(ROUND[::-1]))))
