@@ -9,9 +9,9 @@ import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray, IntArray
 
-_LEVELS = 4
-"""Times that the points about a least clearance are taken closer together: by a factor of four each time. A parabola
-through the last ones finds the least clearance of a smooth gap to round-off."""
+_SHORTEST = 4.0**-4
+"""Length of the last interval about a least clearance, relative to its element. A parabola through the points there
+finds the least clearance of a smooth gap to round-off."""
 _SAME = 1e-13
 """Distance along a side, relative to its length, up to which two points of an element are the same."""
 _SAME_POINT = 1e-9
@@ -93,7 +93,7 @@ def with_least_clearances(sample: Sample, n_pieces: int, xi: FloatArray) -> Poin
         Of the points at `xi` of each interval.
     n_pieces : int
     xi : (q,) array
-        Ascending, from -1 to 1, at least three.
+        Ascending, from -1 to 1, at least four.
 
     Returns
     -------
@@ -110,15 +110,13 @@ def with_least_clearances(sample: Sample, n_pieces: int, xi: FloatArray) -> Poin
     values = sample(pieces, low, high)
     found, owners = [values], [np.repeat(pieces, xi.size)]
     is_free = np.all(values.is_free.reshape(n_pieces, xi.size), axis=1)
-    for _ in range(_LEVELS):
-        if not pieces.size:
-            break
+    while pieces.size:
         clearance = values.clearance.reshape(pieces.size, xi.size)
         least = clearance.min(axis=1)
         first = np.clip(np.argmin(clearance, axis=1) - 1, 0, xi.size - 3)
         about = np.take_along_axis(clearance, first[:, None] + np.arange(3), axis=1)
         bound = 2.0 * least - about.max(axis=1)
-        chosen = bound < np.minimum(0.0, np.where(is_free, 0.0, least.min()))
+        chosen = (bound < np.minimum(0.0, np.where(is_free, 0.0, least.min()))) & (high - low > 2.0 * _SHORTEST)
         half, middle = 0.5 * (high - low), 0.5 * (high + low)
         low, high = ((middle + half * xi[end])[chosen] for end in (first, first + 2))
         pieces, is_free = pieces[chosen], is_free[chosen]
