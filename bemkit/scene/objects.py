@@ -57,6 +57,12 @@ def check_objects(owner: Any, name: str = "") -> None:
             f"{begin}obstacle is {obstacle!r}, which has no method gap(points, normals): give one as "
             "bemkit.contact.obstacle.Obstacle describes it"
         )
+    shape = getattr(owner, "shape", None)
+    if shape is not None and not callable(getattr(shape, "outline", None)):
+        raise InputError(
+            f"{begin}shape is {shape!r}, which has no method outline(): give one as bemkit.geometry.shapes.Shape "
+            "describes it"
+        )
     for attribute in _SEVERAL:
         value = getattr(owner, attribute, ())
         if isinstance(value, str) or not isinstance(value, Iterable):

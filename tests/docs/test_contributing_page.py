@@ -41,8 +41,8 @@ def test_data_takes_nine_forms_in_this_order() -> None:
 
 def test_every_kind_of_addition_has_its_row() -> None:
     names = (
-        "law, solver, space, discretisation, obstacle, file of a body, operator, body, body force, rule for copies, "
-        "sequence of meshes, kind, picture, known solution, study"
+        "law, solver, space, discretisation, obstacle, shape, file of a body, operator, body, body force, "
+        "rule for copies, sequence of meshes, kind, picture, known solution, study"
     )
     assert [row[0] for row in PLACES] == names.split(", ")
 
