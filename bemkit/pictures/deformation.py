@@ -34,7 +34,8 @@ def draw_deformation(
     Axes
     """
     scene = shown(solution)
-    factor = magnification(scene) if factor is None else factor
+    if factor is None:  # of a relief that fills the height nothing needs to be enlarged
+        factor = magnification(scene) if relief_frame(scene, 1.0) is None else 1.0
     axes = plane_axes(axes, scene.frame, scene.title, units or scene.units)
     draw_bodies(axes, scene, factor)
     loops = [loop for body in scene.bodies for loop in body.outlines(factor)]

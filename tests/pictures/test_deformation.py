@@ -229,6 +229,18 @@ def test_a_flat_relief_is_drawn_across_the_whole_height() -> None:
     surface = axes.lines[1].get_ydata()
     assert np.ptp(surface) > 0.2 * height
     assert draw_deformation(run(SCENES["rounded punch"])).get_aspect() == 1.0
+    gentle = bk.Scene(
+        title="half-plane",
+        shape=ElasticHalfPlane(-0.08, 0.08),
+        material=STEEL,
+        parts=(bk.Part("zone", bk.Contact(bk.Gap(bk.Expression("x**2 / 40")))),),
+        far=FarField(force_y=1e-5, x=0.0, turn=0.0),
+        mesh=bk.MeshOptions(elements=60),
+    )
+    solution = run(gentle)
+    assert magnification(shown(solution)) > 1.0
+    (label,) = (text.get_text() for text in draw_deformation(solution).get_legend().get_texts()[1:2])
+    assert label == "deformed, displacements \u00d7 1"
 
 
 def test_a_zoom_shows_a_short_zone_and_says_what_touches() -> None:
