@@ -33,7 +33,7 @@ LARGEST_MISSED = 0.05
 """Overlap at points without traction, relative to the displacement that contact forces cause, up to which it belongs to
 the end of a contact zone inside an element."""
 _FREE_ROUND_OFF = 1e-12
-"""Overlap of a contact without any force, relative to how far its bodies move, that may be round-off."""
+"""Overlap of bodies without any contact force, relative to how far they move, that may be round-off."""
 
 
 @dataclass(frozen=True)
@@ -64,6 +64,9 @@ class BetweenNodes:
         The point of the boundary where that is.
     apart : float
         The least distance of the sides, relative to the same displacement, where they touch nowhere.
+    has_forces : bool
+        Whether contact forces act on the bodies, here or elsewhere; without any the relative displacement is the
+        largest one.
     """
 
     penetration: float
@@ -75,6 +78,7 @@ class BetweenNodes:
     missed: float = 0.0
     missed_place: tuple[float, float] = _NOWHERE
     apart: float = 0.0
+    has_forces: bool = True
 
     @property
     def violations(self) -> dict[str, float]:
@@ -248,12 +252,12 @@ def violations_at(values: PointsBetween, law: FrictionLaw, stress: float, length
 def missed_contacts(table: ContactTable, measured: Mapping[str, BetweenNodes]) -> dict[str, tuple[float, float]]:
     """Return the points where sides overlap without any traction, by contact.
 
-    In a contact without force every overlap above round-off counts; in others, overlaps above a share of the
-    displacement that contact forces cause.
+    Of bodies that no contact force acts on every overlap above round-off counts; of others overlaps above a share of
+    the displacement that contact forces cause, in a contact without force at any point.
     """
     free, missed = free_contacts(table), {}
     for name, each in measured.items():
-        if name in free and each.penetration > _FREE_ROUND_OFF:
+        if name in free and each.penetration > (LARGEST_MISSED if each.has_forces else _FREE_ROUND_OFF):
             missed[name] = each.place
         elif name not in free and each.missed > LARGEST_MISSED:
             missed[name] = each.missed_place
@@ -261,8 +265,11 @@ def missed_contacts(table: ContactTable, measured: Mapping[str, BetweenNodes]) -
 
 
 def points_between(degree: int) -> FloatArray:
-    """Return Chebyshev points of [-1, 1], dense at the ends like the nodes; ends and middle are among them."""
-    n = _POINTS_PER_NODE * (degree + 1) + 1
+    """Return Chebyshev points of [-1, 1], dense at the ends like the nodes; ends and middle are among them.
+
+    Constant elements may be curved: they have as many as linear ones.
+    """
+    n = _POINTS_PER_NODE * (max(degree, 1) + 1) + 1
     return -np.cos(np.pi * np.arange(n) / (n - 1))
 
 

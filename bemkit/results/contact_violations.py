@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator
+from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -79,12 +80,13 @@ def violations_between_nodes(solution: SolvedScene, names: Collection[str] | Non
         )
         with np.errstate(all="ignore"):  # results that are not finite are measured by nan
             values = measure()
-            violations[name] = violations_at(
+            found = violations_at(
                 values,
                 law_between(law, values, contact, name, solution.motion),
                 stress or 1.0,
                 force / modulus or max(moved[body] for body in partners) or max(moved.values()) or 1.0,
             )
+        violations[name] = replace(found, has_forces=force > 0.0)
     return violations
 
 

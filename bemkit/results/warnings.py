@@ -16,7 +16,7 @@ from bemkit.geometry.vectors import norms
 from bemkit.operators.rigid_modes import without_motion
 from bemkit.result_warning import ResultWarning, first_of_each_kind
 from bemkit.results.between_nodes import BetweenNodes
-from bemkit.results.contact_table import ContactTable
+from bemkit.results.contact_table import ContactTable, free_contacts
 from bemkit.results.law_jumps import law_jumps
 from bemkit.results.solution import Solution
 from bemkit.results.solved_body import SolvedBody
@@ -39,6 +39,8 @@ STRAINED_SHARE = 0.05
 LARGEST_PENETRATION = 0.2
 """Penetration between the nodes, as `BetweenNodes` measures it, above which nodes do not feel the contact: a cylinder
 pressed by constant elements on a zone of six of them comes to that."""
+LARGEST_FREE_PENETRATION = 5e-3
+"""The same of a contact without any force, which would be about as large a share of the forces on its bodies."""
 LARGEST_DISTANCE_OFF = 0.2
 """Difference between distances from an obstacle after the displacement and the clearances that were solved, relative to
 the displacement that the contact force causes, above which contact is no longer where it was solved."""
@@ -305,10 +307,11 @@ def _hidden_overlaps(
     length = (
         "the displacement that contact forces cause" if is_pressed else "how far bodies move, without contact forces"
     )
+    free = free_contacts(table)
     for name, between in contacts.items():
-        if between.penetration > LARGEST_PENETRATION:
+        if between.penetration > (LARGEST_FREE_PENETRATION if name in free else LARGEST_PENETRATION):
             depth = amount(between.penetration_depth, "length", units, 2)
-            share = f"{100.0 * between.penetration:.0f} % of" if between.penetration < 1.0 else "more than"
+            share = f"{100.0 * between.penetration:.2g} % of" if between.penetration < 1.0 else "more than"
             yield ResultWarning(
                 "overlap between nodes",
                 name,

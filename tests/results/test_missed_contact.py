@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import bemkit as bk
+from bemkit.results.between_nodes import BetweenNodes, missed_contacts
 from bemkit.results.least_clearance import PointsBetween, deepest, with_least_clearances
 from bemkit.runs.adaptive import run_adaptive
 from tests.slow import slow_except
@@ -221,3 +222,22 @@ def test_the_next_mesh_keeps_a_node_in_a_zone_whose_ends_are_zones_of_single_nod
     solutions = run_adaptive(replace(scene, parts=(scene.parts[0], arc)))
     assert solutions[-1].is_converged, solutions[-1].message
     assert [each.status for each in solutions].count(bk.Status.MISSED_CONTACT) == 1
+
+
+@pytest.mark.parametrize(
+    ("penetration", "has_forces", "is_missed"),
+    [
+        (1e-9, False, True),
+        (1e-9, True, False),
+        (0.04, True, False),
+        (0.06, True, True),
+    ],
+)
+def test_a_free_contact_of_loaded_bodies_is_missed_by_a_share_of_their_displacement(
+    penetration: float, has_forces: bool, is_missed: bool
+) -> None:
+    """A head joint whose end node belongs to the bed joint overlaps there a little, and carries next to nothing."""
+    table = bk.run(roll(-1e-9, 3.0, bk.Galerkin(1), bk.MeshOptions(elements=29))).contact
+    free = replace(table, sigma_n=0.0 * table.sigma_n, sigma_t=0.0 * table.sigma_t)
+    found = BetweenNodes(penetration, 0.0, 0.0, 0.0, penetration, place=(1.0, 2.0), has_forces=has_forces)
+    assert missed_contacts(free, {"tip": found}) == ({"tip": (1.0, 2.0)} if is_missed else {})
