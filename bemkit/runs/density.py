@@ -78,20 +78,24 @@ class DensityMeshes:
         errors = StepErrors.of(solutions[-1])
         densities = self._densities(level, errors)
         own = [float(densities[key].sum()) for key in level.keys.values()]
+        total = sum(own)  # zero where bodies only move as wholes, and miss their contact
+        shares = [float(density.sum()) / total if total > 0.0 else 1.0 / len(own) for density in densities]
         spread = (SPREAD if errors.surface is None else HALF_PLANE_SPREAD) if any(level.touching) else 0.0
         is_accurate = self.error(solutions[-1]) <= self.accuracy
-        n_elements = next_size(errors.worst.n_elements, sum(own) / (1.0 - spread), is_accurate=is_accurate)
+        n_elements = next_size(errors.worst.n_elements, total / (1.0 - spread), is_accurate=is_accurate)
         partitions = [
             better_partition(
                 member.partition,
                 density,
-                int(np.ceil(n_elements * ((1.0 - spread) * float(density.sum()) / sum(own) + spread / len(own)))),
+                int(np.ceil(n_elements * ((1.0 - spread) * share + spread / len(own)))),
                 cuts=zone_cuts(member.partition, member.ends),
                 spread_over=touching,
                 spread=spread,
                 idle=None if errors.surface is None else _idle_elements(member.bodies[0]),
             )
-            for member, density, touching in zip(level.members(errors.worst), densities, level.touching, strict=True)
+            for member, density, share, touching in zip(
+                level.members(errors.worst), densities, shares, level.touching, strict=True
+            )
         ]
         return replace(level, partitions=tuple(partitions))
 

@@ -46,8 +46,9 @@ class PeriodicBody(SurfaceBody):
         return self.accuracy
 
     def missing(self, misfit: ComplexArray, traction: ComplexArray, size: float) -> float:
-        """Return the largest tractions that are missing, relative to the largest one."""
-        return float(np.abs(self.stiffened(misfit)).max()) / float(np.abs(traction).max())
+        """Return the largest tractions that are missing, relative to the largest one, of contact or given."""
+        given = float(np.abs(self.force / self.elastic.mesh.lengths[:, None]).max(initial=0.0))
+        return float(np.abs(self.stiffened(misfit)).max()) / max(float(np.abs(traction).max()), given)
 
     def stiffened(self, displacement: ComplexArray) -> ComplexArray:
         """Return the tractions (n_contact,) that hold displacements (n_contact,), those of other elements zero."""

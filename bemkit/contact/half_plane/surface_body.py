@@ -236,7 +236,8 @@ class SurfaceBody(LinearBody):
         work = float(np.abs((self.works @ traction).real + self.load).max(initial=0.0))
         strained = self._displacement_at_rest + self.elastic.displaced(self.on_surface(traction))
         missing = float(np.abs(misfit).max(initial=0.0))
-        size, moved = float(np.abs(strained).max()), float(np.abs(state.displacement).max(initial=0.0))
+        moved = float(np.abs(state.displacement).max(initial=0.0))
+        size = float(np.abs(strained).max()) or moved or 1.0  # forces that are next to nothing strain nothing
         if total == 0.0:
             return Imbalance(float(work > 0.0 or missing > _NOISE * moved), float(work > 0.0))
         return Imbalance(
