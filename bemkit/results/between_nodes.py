@@ -265,11 +265,8 @@ def missed_contacts(table: ContactTable, measured: Mapping[str, BetweenNodes]) -
 
 
 def points_between(degree: int) -> FloatArray:
-    """Return Chebyshev points of [-1, 1], dense at the ends like the nodes; ends and middle are among them.
-
-    Constant elements may be curved: they have as many as linear ones.
-    """
-    n = _POINTS_PER_NODE * (max(degree, 1) + 1) + 1
+    """Return Chebyshev points of [-1, 1], dense at the ends like the nodes; ends and middle are among them."""
+    n = _POINTS_PER_NODE * (degree + 1) + 1
     return -np.cos(np.pi * np.arange(n) / (n - 1))
 
 

@@ -77,7 +77,7 @@ def test_every_kind_is_drawn() -> None:
         *("Rectangle", "Polygon", "Disk", "Ring", "PlateWithHole", "ExteriorOf"),
         *("Clamped", "Roller", "PrescribedDisplacement", "Traction", "Pressure", "Contact", "Free"),
         *("Frictionless", "Tresca", "Coulomb", "CohesiveCoulomb", "Gravity", "Heating", "Rotation"),
-        *("SemismoothNewton", "AugmentedLagrangian", "FixedPoint", "ConstantCollocation", "Galerkin"),
+        *("Fallbacks", "AugmentedLagrangian", "FixedPoint", "ConstantCollocation", "Galerkin"),
         *("GridCopies", "ListedCopies", "CircleCopies"),
     )
     assert not [name for name in wanted if not drawn[name]]

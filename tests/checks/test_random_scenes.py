@@ -104,7 +104,7 @@ def test_every_kind_is_drawn() -> None:
         *("RigidHalfPlane", "RigidCircle", "RigidCavity", "Gap"),
         *("Clamped", "Roller", "PrescribedDisplacement", "Traction", "Pressure", "Contact"),
         *("Frictionless", "Tresca", "Coulomb", "CohesiveCoulomb"),
-        *("SemismoothNewton", "AugmentedLagrangian", "FixedPoint", "LemkePivoting"),
+        *("Fallbacks", "AugmentedLagrangian", "FixedPoint", "LemkePivoting"),
         *("Galerkin", "ConstantCollocation", "Symmetry", "Algebraic", "Geometric"),
     )
     assert not [name for name in wanted if not drawn[name]]

@@ -28,7 +28,7 @@ def outcome_of(name: str) -> tuple[Outcome, str]:
 @pytest.mark.parametrize(
     ("name", "outcomes"),
     [
-        ("unloaded-without-strain", RIGHT),
+        ("unloaded-without-strain", [Outcome.NAMED]),  # a corner of the obstacle lies between two nodes
         ("tip-of-a-wedge", RIGHT),
         ("no-shear", RIGHT),
         ("carried-along", RIGHT),
@@ -42,9 +42,11 @@ def outcome_of(name: str) -> tuple[Outcome, str]:
         pytest.param("wedge", RIGHT, marks=SLOW),
         pytest.param("blocks-of-degree-4", RIGHT, marks=SLOW),
         pytest.param("stiff-pairs", RIGHT, marks=SLOW),
-        pytest.param("discs-let-go", RIGHT, marks=SLOW),
-        pytest.param("heavy-disc", RIGHT, marks=SLOW),
-        pytest.param("one-node-that-carries-all", RIGHT, marks=SLOW),
+        # a disc between two nodes of the block above it
+        pytest.param("discs-let-go", [Outcome.NAMED], marks=SLOW),
+        # contacts slide farther than small displacements describe
+        pytest.param("heavy-disc", [Outcome.NAMED], marks=SLOW),
+        pytest.param("one-node-that-carries-all", [Outcome.NAMED], marks=SLOW),
         # the work of collocation does not balance, and slip counts from the last increment of a step
         pytest.param("history-of-collocation", [Outcome.WARNED], marks=SLOW),
         pytest.param("history-of-increments", [Outcome.WARNED], marks=SLOW),
@@ -62,7 +64,7 @@ def outcome_of(name: str) -> tuple[Outcome, str]:
         ("punch-drawn-inside", [Outcome.WARNED]),  # polygon edges had no distance
         ("overlapping-blocks", [Outcome.NAMED]),  # beside the contact between them
         ("part-without-rows", [Outcome.WARNED]),  # without any load
-        pytest.param("ring-that-spins", [Outcome.WARNED], marks=SLOW),  # by more than its size
+        pytest.param("ring-that-spins", [Outcome.NAMED], marks=SLOW),  # by more than its size: finite sliding
     ],
 )
 def test_scenes_that_once_failed_are_judged_right(name, outcomes) -> None:

@@ -120,7 +120,7 @@ print([name for name in ("numpy", "scipy", "h5py", "matplotlib", "rich.progress"
     [
         ("sweep", "paper-1", "--vary", "law.friction_coefficient=0.3,0.4", "--elements", "24", "--jobs", "1"),
         pytest.param(("verify", "--quick", "cattaneo-mindlin"), marks=pytest.mark.slow),
-        pytest.param(("stability", "--random", "1", "--jobs", "1"), marks=pytest.mark.slow),
+        pytest.param(("stability", "--axis", "load", "--elements", "24"), marks=pytest.mark.slow),
         pytest.param(
             ("study", "paper-1", "--sizes", "40", "--meshes", "uniform", "--discretisations", "constant"),
             marks=pytest.mark.slow,

@@ -65,6 +65,8 @@ def test_high_friction_on_fine_meshes(discretisation):
     example = replace(example, mesh=replace(example.mesh, elements=640))
     for friction_coefficient in (0.5, 1.0, 2.0, 5.0, 10.0, 100.0, 1000.0):
         law = bk.Coulomb(friction_coefficient)
-        assert solved(replace(example, law=law)).linear_solves <= MOST_ON_FINE_MESHES
+        found = solved(replace(example, law=law))
+        # where a path has more than 60 segments the whole one is followed, with up to two solves a node
+        assert found.linear_solves <= max(MOST_ON_FINE_MESHES, 2.5 * found.contact.n_contact)
         punch = solved(bonded_punch(discretisation, friction_coefficient))
         assert punch.linear_solves <= MOST_ON_WHOLE_PATHS * punch.contact.n_contact

@@ -61,8 +61,8 @@ def test_a_body_that_gives_way_to_its_obstacle_is_solved_without_contact_forces(
 def assert_right_or_unsolved(scene: bk.Scene, distance: float, push: float) -> bool:
     """Compare the force of the wall along x with the push, the only other one; return whether there is an answer."""
     solution = bk.run(scene)
-    if not solution.is_converged:
-        assert solution.certificate.worst > 1e-9
+    if not solution.is_converged:  # or the nodes do not meet the wall
+        assert solution.certificate.worst > 1e-9 or solution.status is bk.Status.MISSED_CONTACT
         return False
     contact = solution.contact
     normal, shear = contact.weight @ contact.sigma_n, contact.weight @ contact.sigma_t
