@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 
 import bemkit as bk
-from bemkit.cli.outputs import write_figures
 from bemkit.pictures import (
     draw_contact_displacement,
     draw_contact_map,
@@ -17,6 +16,7 @@ from bemkit.pictures import (
     draw_stress,
     draw_zoom,
 )
+from bemkit.pictures.figure_files import write_figures
 from bemkit.scene.toml import with_overrides
 
 IMAGES = Path(__file__).parent / "images"

@@ -69,7 +69,8 @@ class SignedDistance:
     def _measure(self, points: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return distances (n,) and normals (n, 2) out of the obstacle, at the nearest points of its surface."""
         value = evaluate_field(self.distance, points)
-        size = float(max(np.ptp(points, axis=0).max(initial=0.0), np.abs(points).max(initial=0.0) * 1e-3)) or 1.0
+        spread, largest = float(np.ptp(points, axis=0).max(initial=0.0)), float(np.abs(points).max(initial=0.0))
+        size = max(spread or largest, 1e-3 * largest) or 1.0  # a single point has no spread
         slope = self._slope(points, size)
         foot = points - (value / _squares(slope, points))[:, None] * slope
         is_distance = np.abs(np.hypot(*slope.T) - 1.0) <= _IS_DISTANCE

@@ -7,6 +7,8 @@ from types import MappingProxyType
 from typing import Any
 
 from bemkit.errors import InputError
+from bemkit.geometry.outline import Outline
+from bemkit.geometry.shapes import Shape
 
 _EXAMPLES: Mapping[str, str] = MappingProxyType(
     {
@@ -26,6 +28,17 @@ _EXAMPLES: Mapping[str, str] = MappingProxyType(
     }
 )
 _SEVERAL = ("parts", "steps", "load_factors", "body_forces", "bodies", "rigid", "contacts", "sides")
+
+
+def outline_of(shape: Shape) -> Outline:
+    """Return the outline of a shape; InputError if a shape of one's own returns anything else."""
+    outline: object = shape.outline()
+    if not isinstance(outline, Outline):
+        raise InputError(
+            f"{type(shape).__name__}.outline returned a {type(outline).__name__}: "
+            "return a bemkit.geometry.outline.Outline"
+        )
+    return outline
 
 
 def check_objects(owner: Any, name: str = "") -> None:

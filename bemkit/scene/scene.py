@@ -30,7 +30,7 @@ from bemkit.scene.contact_checks import check_contacts
 from bemkit.scene.contacts import ContactPair, Touching
 from bemkit.scene.discretisation import Discretisation, Galerkin
 from bemkit.scene.mesh_options import MeshOptions
-from bemkit.scene.objects import check_objects
+from bemkit.scene.objects import check_objects, outline_of
 from bemkit.scene.plane_motion import FarField, RigidBody
 from bemkit.scene.steps import Step, check_laws, check_names
 from bemkit.scene.unit_names import UnitNames
@@ -339,7 +339,8 @@ class Scene(ShownInNotebooks):
     def _new_scene(self, body: Body) -> BodyScene:
         named = {part.name for part in body.parts}
         try:
-            own = tuple(part.on(body.shape.outline(), body.placement) for part in body.parts)
+            outline = outline_of(body.shape)
+            own = tuple(part.on(outline, body.placement) for part in body.parts)
             facing = [body.contact_part(name) for name in self.touching_parts(body)]
             return BodyScene(
                 shape=body.shape,

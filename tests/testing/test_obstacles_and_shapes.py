@@ -214,3 +214,15 @@ def test_clockwise_boundaries_are_refused_before_the_check() -> None:
 def test_a_shape_without_outline_is_refused_before_the_run() -> None:
     with pytest.raises(bk.InputError, match=r"shape is .*, which has no method outline\(\): give one as"):
         replace(bk.load_scene("paper-1"), shape=object())
+
+
+def test_a_shape_that_returns_no_outline_is_refused_before_the_run() -> None:
+    with pytest.raises(bk.InputError, match=r"Own.outline returned a int: return a bemkit.geometry.outline.Outline"):
+        _ = replace(bk.load_scene("paper-1"), shape=Own(lambda: 3)).only
+
+
+def test_a_single_point_has_a_distance() -> None:
+    """Newton's steps are limited by the spread of points, which a single one does not have."""
+    distance = bk.SignedDistance(bk.Expression("sqrt(x**2 + (y + 1)**2) - 0.5"))
+    gap = distance.gap(np.array([[0.0, 0.6]]), np.array([[0.0, -1.0]]))
+    np.testing.assert_allclose(gap, 1.1, rtol=1e-7)  # slopes by differences
