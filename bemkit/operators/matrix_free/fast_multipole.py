@@ -22,9 +22,9 @@ from bemkit.operators.collocation.layers import displaced
 from bemkit.operators.hierarchy.clusters import Clusters, Discs
 from bemkit.operators.hierarchy.tree import ClusterTree
 from bemkit.operators.linear.threads import for_each_chunk
-from bemkit.operators.matrix_free.expansions import Expansions, Sources
-from bemkit.operators.matrix_free.source_series import SEPARATION, SourceSeries, order_for
 from bemkit.operators.matrix_free.straight_elements import StraightElements
+from bemkit.operators.somigliana.expansions import Expansions, Sources
+from bemkit.operators.somigliana.source_series import SEPARATION, SourceSeries, order_for
 
 if TYPE_CHECKING:
     _LinearOperator: TypeAlias = LinearOperator[np.float64]

@@ -19,9 +19,9 @@ from bemkit.operators.hierarchy.clusters import Clusters, Pairs
 from bemkit.operators.integrals.panels import Panels
 from bemkit.operators.kernels import legendre_values
 from bemkit.operators.material import Material
-from bemkit.operators.matrix_free.expansions import Expansions, Sources
-from bemkit.operators.matrix_free.source_series import SEPARATION, SourceSeries
+from bemkit.operators.somigliana.expansions import Expansions, Sources
 from bemkit.operators.somigliana.moments import N_POINTS, ArcQuadrature
+from bemkit.operators.somigliana.source_series import SEPARATION, SourceSeries
 
 ORDER = 34
 """Largest power of the series: stresses of single clusters err by 1e-13, each power is worth a factor of three."""

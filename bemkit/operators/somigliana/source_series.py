@@ -12,7 +12,7 @@ import numpy as np
 from bemkit.arrays import ComplexArray, FloatArray, IntArray
 from bemkit.operators.hierarchy.clusters import Clusters
 from bemkit.operators.linear.threads import for_each_chunk
-from bemkit.operators.matrix_free.expansions import Expansions, Sources
+from bemkit.operators.somigliana.expansions import Expansions, Sources
 
 SourcesOf: TypeAlias = Callable[[IntArray, int], Sources]
 """From (n,) places and a number of Gauss points: the sources of the elements there, arrays (n, n_sources)."""
