@@ -14,11 +14,11 @@ from bemkit.errors import InputError
 from bemkit.results.result_file import read_result, write_result
 from bemkit.results.solution import Solution
 from bemkit.scene.symmetry import AsymmetricSceneError
-from bemkit.studies.stability.assembly_axes import ASSEMBLY_AXES
 from bemkit.studies.stability.axes import find_axes
+from bemkit.studies.stability.axes_of_bodies import AXES_OF_BODIES
 from bemkit.studies.stability.records import Verdict
 from bemkit.studies.stability.sweep import sweep
-from bemkit.testing.independent_check import violations_of_assembly
+from bemkit.testing.independent_check import violations_of_bodies
 
 STEEL, SOFT = bk.Material(1.0, 0.3), bk.Material(0.5, 0.2)
 ABOUT_X = bk.Symmetry(x=0.0)
@@ -95,17 +95,17 @@ def test_half_of_the_bodies_answer_as_the_whole_ones() -> None:
     inside = np.array([[-0.3, -0.2], [0.3, -0.2]])
     fields = [bk.interior_fields(each.bodies["lower"]).stress(inside) for each in (half, whole)]
     np.testing.assert_allclose(fields[0], fields[1], atol=1e-10)
-    check = violations_of_assembly(half)
+    check = violations_of_bodies(half)
     assert check.is_good, check
 
 
 @pytest.mark.slow
 def test_similar_halves_answer_alike_where_all_sticks() -> None:
     """Relative displacements are round-off, and differ: those of the bodies are what differences are measured by."""
-    (row,) = sweep(blocks(), [replace(find_axes(["size"], ASSEMBLY_AXES)[0], values=(1e-3,))])
+    (row,) = sweep(blocks(), [replace(find_axes(["size"], AXES_OF_BODIES)[0], values=(1e-3,))])
     assert Verdict(row.verdict) is Verdict.RIGHT, row
     for name in ("turn", "position"):
-        (axis,) = find_axes([name], ASSEMBLY_AXES)
+        (axis,) = find_axes([name], AXES_OF_BODIES)
         assert "has a symmetry, whose bodies stay where they are drawn" in axis.reason_against(blocks())
 
 

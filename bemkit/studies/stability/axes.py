@@ -33,7 +33,7 @@ from bemkit.solvers.alm import AugmentedLagrangian
 from bemkit.solvers.base import ContactSolver
 from bemkit.solvers.ssn import SemismoothNewton
 from bemkit.studies.stability.case import PRECISION, Case, Similarity, precision_elsewhere, with_friction
-from bemkit.studies.stability.similar_assembly import AssemblySimilarity
+from bemkit.studies.stability.similar_bodies import BodiesSimilarity
 
 
 @dataclass(frozen=True)
@@ -105,14 +105,14 @@ def changed(baseline: Solution, change: Callable[[Any], Any]) -> Scene:
 
 
 def _similar_case(
-    baseline: Solution, value: float, similarity: Similarity | AssemblySimilarity, precision: float = PRECISION
+    baseline: Solution, value: float, similarity: Similarity | BodiesSimilarity, precision: float = PRECISION
 ) -> Case:
     keeps_steps = not baseline.scene.bodies and precision == PRECISION
     scene = changed(baseline, similarity.apply)
     return Case(value, scene, similarity, precision=precision, drift_limit=precision, keeps_steps=keeps_steps)
 
 
-def similar(kind: type[Similarity | AssemblySimilarity], factor: str) -> Callable[[Solution, float], Case]:
+def similar(kind: type[Similarity | BodiesSimilarity], factor: str) -> Callable[[Solution, float], Case]:
     """Return what makes a case in which one factor is the value."""
 
     def make(baseline: Solution, value: float) -> Case:
@@ -122,7 +122,7 @@ def similar(kind: type[Similarity | AssemblySimilarity], factor: str) -> Callabl
     return make
 
 
-def moved(kind: type[Similarity | AssemblySimilarity]) -> Callable[[Solution, float], Case]:
+def moved(kind: type[Similarity | BodiesSimilarity]) -> Callable[[Solution, float], Case]:
     """Return what makes a case as far from the origin as the value says, in diameters."""
 
     def make(baseline: Solution, value: float) -> Case:

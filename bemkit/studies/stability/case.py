@@ -14,7 +14,7 @@ from bemkit.results.solution import Solution
 from bemkit.scene.conditions import Contact, Part
 from bemkit.scene.scene import Scene
 from bemkit.scene.transform import AffineMap, transformed_scene
-from bemkit.studies.stability.similar_assembly import AssemblySimilarity
+from bemkit.studies.stability.similar_bodies import BodiesSimilarity
 
 PRECISION = 1e-9
 """Agreement, relative to the largest entry, that similar problems owe each other after scaling."""
@@ -87,7 +87,7 @@ class Case:
     value : float
         Place on the axis.
     scene : Scene
-    similarity : Similarity or AssemblySimilarity
+    similarity : Similarity or BodiesSimilarity
         Factors that lead from the reference of the axis to this scene, by which results are scaled back.
     levels : int
         How often the elements at corners and ends of parts are halved, after the scene's own mesh is made.
@@ -103,7 +103,7 @@ class Case:
 
     value: float
     scene: Scene
-    similarity: Similarity | AssemblySimilarity = Similarity()
+    similarity: Similarity | BodiesSimilarity = Similarity()
     levels: int = 0
     precision: float = PRECISION
     drift_limit: float = float("inf")

@@ -20,13 +20,13 @@ from bemkit.studies.engine import REFUSED, Attempt, Task, attempt, compute
 from bemkit.studies.stability.axes import Axis
 from bemkit.studies.stability.case import Case, Similarity
 from bemkit.studies.stability.records import StabilityRecord, Verdict
-from bemkit.studies.stability.similar_assembly import AssemblySimilarity
+from bemkit.studies.stability.similar_bodies import BodiesSimilarity
 from bemkit.testing.independent_check import violations_of
 from bemkit.testing.independent_check.verdict import Violations
 
 TWIN = Similarity(length=3.7e-3, modulus=7.3e5, stress=1.9e-2)
 """Every case is solved a second time in these units. No factor is a power of two, so all round-off differs."""
-ASSEMBLY_TWIN = AssemblySimilarity(length=3.7e-3, stress=7.3e5)
+TWIN_OF_BODIES = BodiesSimilarity(length=3.7e-3, stress=7.3e5)
 """The same for several bodies."""
 
 
@@ -114,10 +114,10 @@ def solve_and_judge(
     )
 
 
-def _twin(scene: Scene) -> tuple[Similarity | AssemblySimilarity, Scene]:
+def _twin(scene: Scene) -> tuple[Similarity | BodiesSimilarity, Scene]:
     """Return the similar scene, and how it is similar."""
     if scene.bodies:
-        return ASSEMBLY_TWIN, ASSEMBLY_TWIN.apply(scene)
+        return TWIN_OF_BODIES, TWIN_OF_BODIES.apply(scene)
     return TWIN, TWIN.apply(scene)
 
 
@@ -136,7 +136,7 @@ def _attempt(scene: Scene, case: Case, solve: Callable[..., Any] = run) -> Attem
 def difference(
     reference: Solution,
     solution: Solution,
-    similarity: Similarity | AssemblySimilarity,
+    similarity: Similarity | BodiesSimilarity,
     *,
     in_mean: bool = False,
 ) -> float:
@@ -145,7 +145,7 @@ def difference(
     Parameters
     ----------
     reference, solution : Solution
-    similarity : Similarity or AssemblySimilarity
+    similarity : Similarity or BodiesSimilarity
         Leads from the reference to the solution.
     in_mean : bool
         Take the mean along each contact part instead of the largest entry; always on other meshes, because single nodes

@@ -8,9 +8,9 @@ supports, contact and friction, whether forces and energy balance, and whether t
 elastic body.
 """
 
-from bemkit.testing.independent_check.assembly_check import AssemblyCheck as AssemblyCheck
-from bemkit.testing.independent_check.assembly_check import violations_of as violations_of
-from bemkit.testing.independent_check.assembly_check import violations_of_assembly as violations_of_assembly
+from bemkit.testing.independent_check.bodies_check import BodiesCheck as BodiesCheck
+from bemkit.testing.independent_check.bodies_check import violations_of as violations_of
+from bemkit.testing.independent_check.bodies_check import violations_of_bodies as violations_of_bodies
 from bemkit.testing.independent_check.boundary import CONTACT_LIMIT as CONTACT_LIMIT
 from bemkit.testing.independent_check.check import IndependentCheck as IndependentCheck
 from bemkit.testing.independent_check.check import violations_of_body as violations_of_body

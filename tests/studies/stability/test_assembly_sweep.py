@@ -13,10 +13,10 @@ from bemkit.runs.run import run
 from bemkit.scene.load_history import load_steps
 from bemkit.scene.scene import Scene
 from bemkit.scene.toml import load_scene, with_overrides
-from bemkit.studies.stability.assembly_axes import ASSEMBLY_AXES
 from bemkit.studies.stability.axes import UnknownAxisError, find_axes
+from bemkit.studies.stability.axes_of_bodies import AXES_OF_BODIES
 from bemkit.studies.stability.records import Verdict
-from bemkit.studies.stability.sweep import ASSEMBLY_TWIN, difference, sweep
+from bemkit.studies.stability.sweep import TWIN_OF_BODIES, difference, sweep
 from tests.slow import slow_except
 
 EXTREMES = {
@@ -39,14 +39,14 @@ def pin():
 
 
 def test_every_axis_is_tested_here():
-    assert {axis.name for axis in ASSEMBLY_AXES} == set(EXTREMES)
+    assert {axis.name for axis in AXES_OF_BODIES} == set(EXTREMES)
     with pytest.raises(UnknownAxisError, match="'gap': the axes are stress, size, turn"):
-        find_axes(["gap"], ASSEMBLY_AXES)
+        find_axes(["gap"], AXES_OF_BODIES)
 
 
 @pytest.mark.parametrize("name", slow_except(EXTREMES, "turn", "elements"))
 def test_the_ends_of_every_axis_are_right_or_named(pin, name):
-    (axis,) = find_axes([name], ASSEMBLY_AXES)
+    (axis,) = find_axes([name], AXES_OF_BODIES)
     for row in sweep(pin, [dataclasses.replace(axis, values=EXTREMES[name])]):
         verdict = Verdict(row.verdict)
         assert verdict in (Verdict.RIGHT, Verdict.NAMED), row
@@ -60,7 +60,7 @@ def test_parts_chosen_by_a_region_follow_the_body(name):
     cylinders = with_overrides(load_scene("two-cylinders"), elements=40)
     assert isinstance(cylinders, Scene)
     assert any(part.where for body in cylinders.bodies for part in body.parts)
-    (axis,) = find_axes([name], ASSEMBLY_AXES)
+    (axis,) = find_axes([name], AXES_OF_BODIES)
     (row,) = sweep(cylinders, [dataclasses.replace(axis, values=EXTREMES[name][-1:])])
     assert Verdict(row.verdict) is Verdict.RIGHT
     assert row.drift < 1e-10
@@ -68,7 +68,7 @@ def test_parts_chosen_by_a_region_follow_the_body(name):
 
 def test_curved_bodies_far_away_are_what_they_are_at_home():
     cylinders = with_overrides(load_scene("two-cylinders"), elements=40)
-    (axis,) = find_axes(["position"], ASSEMBLY_AXES)
+    (axis,) = find_axes(["position"], AXES_OF_BODIES)
     rows = list(sweep(cylinders, [dataclasses.replace(axis, values=(1e6, 1e8))]))
     assert [row.verdict for row in rows] == ["right", "named"]
     assert "body 'upper' lies" in rows[-1].message
@@ -80,9 +80,9 @@ def test_curved_bodies_far_away_are_what_they_are_at_home():
 
 
 def test_a_twin_that_is_not_similar_is_seen(pin):
-    one, other = run(pin), run(dataclasses.replace(ASSEMBLY_TWIN, stress=1.0).apply(pin))
-    assert difference(one, other, ASSEMBLY_TWIN) > 0.1
-    assert difference(one, other, dataclasses.replace(ASSEMBLY_TWIN, stress=1.0)) < 1e-9
+    one, other = run(pin), run(dataclasses.replace(TWIN_OF_BODIES, stress=1.0).apply(pin))
+    assert difference(one, other, TWIN_OF_BODIES) > 0.1
+    assert difference(one, other, dataclasses.replace(TWIN_OF_BODIES, stress=1.0)) < 1e-9
 
 
 @pytest.fixture(scope="module")
@@ -112,7 +112,7 @@ def sheared():
 
 @pytest.mark.parametrize("name", slow_except(("stress", "size", "turn", "stiffness", "elements"), "turn"))
 def test_rigid_bodies_and_load_steps_have_similar_ones(sheared, name):
-    (axis,) = find_axes([name], ASSEMBLY_AXES)
+    (axis,) = find_axes([name], AXES_OF_BODIES)
     values = {"stiffness": (2.0,), "elements": (1.5,)}.get(name, EXTREMES[name][-1:])
     (row,) = sweep(sheared, [dataclasses.replace(axis, values=values)])
     assert Verdict(row.verdict) is Verdict.RIGHT, row
@@ -124,17 +124,17 @@ def test_steps_count_in_similar_assemblies(sheared):
     """The last step alone, without what slipped before, is another problem."""
     whole = run(sheared)
     assert "slip" in whole.at_step(2).contact.status_words()
-    again = run(ASSEMBLY_TWIN.apply(sheared))
+    again = run(TWIN_OF_BODIES.apply(sheared))
     assert again.loading is not None
     assert len(again.loading.steps) == 3
-    assert difference(whole, again, ASSEMBLY_TWIN) < 1e-8
-    alone = run(ASSEMBLY_TWIN.apply(load_steps(sheared)[-1]))
-    assert difference(whole, alone, ASSEMBLY_TWIN) > 1e-4
+    assert difference(whole, again, TWIN_OF_BODIES) < 1e-8
+    alone = run(TWIN_OF_BODIES.apply(load_steps(sheared)[-1]))
+    assert difference(whole, alone, TWIN_OF_BODIES) > 1e-4
 
 
 def test_what_has_no_similar_assembly_is_refused(sheared):
     (punch,) = sheared.rigid
-    (turn,) = find_axes(["turn"], ASSEMBLY_AXES)
+    (turn,) = find_axes(["turn"], AXES_OF_BODIES)
     pressed = load_scene("tilted-punch")
     assert "rigid body 'punch' is driven by a force along only one axis" in turn.reason_against(pressed)
     assert turn.reason_against(sheared) == ""
@@ -146,4 +146,4 @@ def test_what_has_no_similar_assembly_is_refused(sheared):
         ({"law": bk.SlipWeakening(bk.Expression("0.3 + 0 * x"), 0.2, 1e-3)}, "is not a number: give one"),
     ):
         with pytest.raises(InputError, match=words):
-            ASSEMBLY_TWIN.apply(dataclasses.replace(sheared, **changes))
+            TWIN_OF_BODIES.apply(dataclasses.replace(sheared, **changes))

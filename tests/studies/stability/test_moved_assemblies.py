@@ -10,7 +10,7 @@ import pytest
 
 import bemkit as bk
 from bemkit.results.solution import Solution
-from bemkit.studies.stability.similar_assembly import AssemblySimilarity
+from bemkit.studies.stability.similar_bodies import BodiesSimilarity
 from tests.slow import slow_except
 
 FRICTION = 0.25
@@ -64,13 +64,13 @@ def plain() -> Solution:
 
 
 CHANGES = {
-    "millimetres, MPa": AssemblySimilarity(length=1e3, stress=1e-6),
-    "nanometres": AssemblySimilarity(length=1e-9),
-    "stresses 1e12": AssemblySimilarity(stress=1e12),
-    "shifted": AssemblySimilarity(shift=(3.0, -7.0)),
-    "turned by 90 degrees": AssemblySimilarity(turn=90.0),
-    "turned by 37 degrees": AssemblySimilarity(turn=37.0),
-    "everything": AssemblySimilarity(length=1e-3, stress=1e6, turn=-130.0, shift=(0.02, 0.001)),
+    "millimetres, MPa": BodiesSimilarity(length=1e3, stress=1e-6),
+    "nanometres": BodiesSimilarity(length=1e-9),
+    "stresses 1e12": BodiesSimilarity(stress=1e12),
+    "shifted": BodiesSimilarity(shift=(3.0, -7.0)),
+    "turned by 90 degrees": BodiesSimilarity(turn=90.0),
+    "turned by 37 degrees": BodiesSimilarity(turn=37.0),
+    "everything": BodiesSimilarity(length=1e-3, stress=1e6, turn=-130.0, shift=(0.02, 0.001)),
 }
 
 

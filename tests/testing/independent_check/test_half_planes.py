@@ -15,7 +15,7 @@ from bemkit.scene.transform import with_turned_loads
 from bemkit.studies.stability.axes import AXES, find_axes
 from bemkit.studies.stability.case import Similarity
 from bemkit.studies.stability.sweep import TWIN, StabilityError, difference, solve_and_judge, sweep
-from bemkit.testing.independent_check import IndependentCheck, violations_of_assembly, violations_of_body
+from bemkit.testing.independent_check import IndependentCheck, violations_of_bodies, violations_of_body
 from bemkit.testing.independent_check.half_plane import Surface
 from bemkit.testing.independent_check.nodes import Fields
 from tests.slow import slow_except
@@ -206,10 +206,10 @@ def test_a_half_plane_among_several_bodies_is_checked_too() -> None:
     block = bk.Body(name="block", shape=shape, material=material, parts=(press,), mesh=bk.MeshOptions(40))
     contacts = (bk.ContactPair(("block.bottom", "base.surface")),)
     solution = bk.run(bk.Scene(title="block", bodies=(base, block), contacts=contacts, law=bk.Coulomb(0.5)))
-    assert violations_of_assembly(solution).worst <= 1e-11
+    assert violations_of_bodies(solution).worst <= 1e-11
     result = solution.bodies["base"]
     displacement = result.boundary.displacement.copy()
     displacement[3, 1] *= 1.001  # away from contact, where nothing else looks
     moved = replace(result, boundary=replace(result.boundary, displacement=displacement))
-    seen = violations_of_assembly(replace(solution, bodies={**solution.bodies, "base": moved}))
+    seen = violations_of_bodies(replace(solution, bodies={**solution.bodies, "base": moved}))
     assert seen.faults == ("elasticity",)

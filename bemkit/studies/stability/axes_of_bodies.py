@@ -12,10 +12,10 @@ from bemkit.scene.mesh_options import MeshOptions
 from bemkit.scene.scene import Scene
 from bemkit.studies.stability.axes import Axis, changed, friction, moved, read_axes, similar
 from bemkit.studies.stability.case import PRECISION, Case
-from bemkit.studies.stability.similar_assembly import AssemblySimilarity
+from bemkit.studies.stability.similar_bodies import BodiesSimilarity
 
 
-def _against(similarity: AssemblySimilarity) -> Callable[[Scene], str]:
+def _against(similarity: BodiesSimilarity) -> Callable[[Scene], str]:
     """Return what says why a scene has no similar one."""
 
     def reason(scene: Scene) -> str:
@@ -55,20 +55,20 @@ def _elements(baseline: Solution, value: float) -> Case:
     return Case(value, changed(baseline, of_step))
 
 
-ASSEMBLY_AXES: tuple[Axis, ...] = read_axes(
+AXES_OF_BODIES: tuple[Axis, ...] = read_axes(
     "several-bodies",
     {
-        "stress": similar(AssemblySimilarity, "stress"),
-        "size": similar(AssemblySimilarity, "length"),
-        "turn": similar(AssemblySimilarity, "turn"),
-        "position": moved(AssemblySimilarity),
+        "stress": similar(BodiesSimilarity, "stress"),
+        "size": similar(BodiesSimilarity, "length"),
+        "turn": similar(BodiesSimilarity, "turn"),
+        "position": moved(BodiesSimilarity),
         "stiffness": _stiffened,
         "friction": friction,
         "elements": _elements,
     },
     {
-        "turn": _against(AssemblySimilarity(turn=30.0)),
-        "position": _against(AssemblySimilarity(shift=(1.0, 0.0))),
+        "turn": _against(BodiesSimilarity(turn=30.0)),
+        "position": _against(BodiesSimilarity(shift=(1.0, 0.0))),
     },
 )
 """Every axis of several bodies, in the order of the report."""

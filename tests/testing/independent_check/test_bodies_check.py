@@ -11,7 +11,7 @@ import pytest
 
 import bemkit as bk
 from bemkit.results.solution import Solution
-from bemkit.testing.independent_check import AssemblyCheck, violations_of_assembly
+from bemkit.testing.independent_check import BodiesCheck, violations_of_bodies
 from checks.trials import Outcome, judge
 
 MATERIAL = bk.Material(1.0, 0.3)
@@ -46,7 +46,7 @@ def solved(degree: int = 2) -> Solution:
 
 
 def test_a_right_solution_passes_to_round_off() -> None:
-    check = violations_of_assembly(solved())
+    check = violations_of_bodies(solved())
     assert check.faults == ()
     assert check.worst < 1e-9  # the certificate; gaps, means, reactions and equilibrium are round-off
     assert check.reciprocity < 0.02
@@ -96,7 +96,7 @@ FAULTS: dict[str, tuple[Callable[[], Solution], str]] = {
 def test_faults_are_named(fault: str) -> None:
     make, name = FAULTS[fault]
     solution = make()
-    assert name in violations_of_assembly(solution).faults
+    assert name in violations_of_bodies(solution).faults
     assert judge([solution])[0] is Outcome.WRONG
 
 
@@ -104,8 +104,8 @@ def test_energy_and_elasticity_are_compared() -> None:
     solution = solved()
     upper = solution.bodies["upper"]
 
-    def with_upper(**changes: object) -> AssemblyCheck:
-        return violations_of_assembly(replace(solution, bodies={**solution.bodies, "upper": replace(upper, **changes)}))
+    def with_upper(**changes: object) -> BodiesCheck:
+        return violations_of_bodies(replace(solution, bodies={**solution.bodies, "upper": replace(upper, **changes)}))
 
     assert "energy" in with_upper(energy=1.01 * upper.energy).faults
     assert "negative_energy" in with_upper(energy=-upper.energy).faults
@@ -136,7 +136,7 @@ def test_points_in_each_other_between_nodes_are_doubted() -> None:
             discretisation=bk.ConstantCollocation(),
         )
     )
-    check = violations_of_assembly(solution)
+    check = violations_of_bodies(solution)
     assert check.is_good
     assert check.needs_warning == "hidden_overlap"
     assert any("contact zone of part 'disc.low / plate.top'" in warning for warning in map(str, solution.warnings))
@@ -147,24 +147,24 @@ def test_points_in_each_other_between_nodes_are_doubted() -> None:
     belittled.__dict__["contacts_between_nodes"] = {
         pair.name: replace(said, penetration_depth=said.penetration_depth / 2)
     }
-    assert violations_of_assembly(belittled).faults == ("between_nodes",)
+    assert violations_of_bodies(belittled).faults == ("between_nodes",)
 
 
 def test_rigid_bodies_move_and_are_loaded_as_they_are_told() -> None:
     solution = bk.run(bk.load_scene("tilted-punch"))
-    check = violations_of_assembly(solution)
+    check = violations_of_bodies(solution)
     assert check.is_good, check
     assert check.rigid < 1e-12  # sums of forces on a hundred nodes
     (punch,) = solution.rigid.values()
     for name in ("x", "force_x", "force_y", "moment"):
         changed = replace(punch, **{name: getattr(punch, name) + 1e-4})  # type: ignore[arg-type]
-        wrong = violations_of_assembly(replace(solution, rigid={"punch": changed}))
+        wrong = violations_of_bodies(replace(solution, rigid={"punch": changed}))
         assert "rigid" in wrong.faults, name
     gap = np.where(solution.contact.gap < 0.1, solution.contact.gap + 1e-3, solution.contact.gap)
     moved = replace(solution.contact, gap=gap, clearance=gap - solution.contact.u_n)
-    assert "gaps" in violations_of_assembly(replace(solution, contact=moved)).faults
+    assert "gaps" in violations_of_bodies(replace(solution, contact=moved)).faults
     sunk = replace(punch, y=2.0 * punch.y)
-    assert "energy" in violations_of_assembly(replace(solution, rigid={"punch": sunk})).faults
+    assert "energy" in violations_of_bodies(replace(solution, rigid={"punch": sunk})).faults
 
 
 def test_a_disc_that_turns_in_its_hole_is_not_in_the_rock() -> None:
@@ -197,7 +197,7 @@ def test_a_disc_that_turns_in_its_hole_is_not_in_the_rock() -> None:
 
     def overlap(displacement: np.ndarray) -> float:
         moved = replace(placed, boundary=replace(placed.boundary, displacement=displacement))
-        return violations_of_assembly(replace(solution, bodies={**solution.bodies, "disc": moved})).hidden_overlap
+        return violations_of_bodies(replace(solution, bodies={**solution.bodies, "disc": moved})).hidden_overlap
 
     assert overlap(displacement) < 0.02
     assert overlap(turned) < 0.02  # a thousand times the displacements, all along the wall
@@ -225,5 +225,5 @@ def beside_one_that_carries_nothing(traction: float) -> Solution:
 
 def test_bodies_that_carry_nothing_are_not_judged_by_their_round_off() -> None:
     """A pull of 1e-15 of the load is round-off of the others, beside nothing at all; 1e-6 of it is a fault."""
-    assert violations_of_assembly(beside_one_that_carries_nothing(1e-15)).faults == ()
-    assert "tension" in violations_of_assembly(beside_one_that_carries_nothing(1e-6)).faults
+    assert violations_of_bodies(beside_one_that_carries_nothing(1e-15)).faults == ()
+    assert "tension" in violations_of_bodies(beside_one_that_carries_nothing(1e-6)).faults

@@ -27,7 +27,7 @@ from bemkit.scene.transform import AffineMap, TransformedRegion
 
 
 @dataclass(frozen=True)
-class AssemblySimilarity:
+class BodiesSimilarity:
     """The map x -> length * (turned x) + shift, with stresses and moduli times the same factor.
 
     Scenes are changed number by number, so that the result can be written to a file (but for several load steps,

@@ -17,7 +17,7 @@ from bemkit.testing.independent_check.verdict import COARSE_LIMIT, COARSE_SHARE,
 
 
 @dataclass(frozen=True, kw_only=True)
-class AssemblyCheck(Violations):
+class BodiesCheck(Violations):
     """Violations found in the fields of a scene, dimensionless; zero is perfect.
 
     Of reciprocity, with the moments, coarseness and the like the worst of all bodies is reported; hidden overlap is how
@@ -51,18 +51,18 @@ class AssemblyCheck(Violations):
         return "reciprocity" if self.is_coarse else ""
 
 
-def violations_of_assembly(solution: Solution, before: Solution | None = None) -> AssemblyCheck:
-    """Check the fields of a scene; see `AssemblyCheck`.
+def violations_of_bodies(solution: Solution, before: Solution | None = None) -> BodiesCheck:
+    """Check the fields of a scene; see `BodiesCheck`.
 
     Slip counts from the end of the load step before. Without that, friction against slip is not checked at the end of a
     load history.
     """
     if not is_finite(solution):
-        return AssemblyCheck.not_finite()
+        return BodiesCheck.not_finite()
     joints = Joints.of(solution, before)
     bodies = joints.bodies.values()
     deepest, unsaid = hidden_overlaps(joints)
-    return AssemblyCheck(
+    return BodiesCheck(
         numbers=0.0,
         gaps=gap_mismatch(joints),
         means=mean_mismatch(joints),
@@ -89,7 +89,7 @@ def violations_of(step: Solution, before: Solution | None) -> Violations:
     if step.loading is not None and step.loading.steps[-1].n_increments > 1:
         before = None
     if len(step.bodies) > 1 or step.scene.contacts:
-        return violations_of_assembly(step, before)
+        return violations_of_bodies(step, before)
     return violations_of_body(step, before)
 
 
