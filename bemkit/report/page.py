@@ -25,22 +25,29 @@ from bemkit.results.summary_rows import summary_rows
 _START = "<!DOCTYPE html>"
 
 
-def report(result: Result) -> str:
+def report(result: Result, *, interactive: bool = False) -> str:
     """Return a page of HTML on a result: summary, pictures, tables, certificate, plan, scene and versions.
 
     Parameters
     ----------
     result : Solution
+    interactive : bool
+        Whether a drawing to explore takes the place of the pictures; needs plotly and matplotlib.
 
     Returns
     -------
     str
         The page loads nothing from elsewhere: pictures are inside, if matplotlib is installed.
+
+    Raises
+    ------
+    InputError
+        If an interactive page is asked for and plotly or matplotlib is not installed.
     """
     sections: dict[str, list[Element]] = {
         "Summary": [facts(summary_rows(result), "The result in numbers")],
         "Warnings": warnings_section(result),
-        "Pictures": _pictures(result),
+        "Pictures": _pictures(result, interactive),
         "Forces": forces_section(result),
         "Certificate": certificate_section(result),
         "Convergence": convergence_section(result),
@@ -70,7 +77,7 @@ def report(result: Result) -> str:
     return f"{_START}\n{render(element('html', head, body, lang='en'))}\n"
 
 
-def save_report(path: str | Path, result: Result) -> Path:
+def save_report(path: str | Path, result: Result, *, interactive: bool = False) -> Path:
     """Write the report of a result to a file, replacing an older report at once or not at all; see `report`.
 
     Raises
@@ -78,13 +85,24 @@ def save_report(path: str | Path, result: Result) -> Path:
     OutputFileError
         If the file cannot be written, or a file that is no page has its name.
     """
-    target = check_report(path)
-    write_text(target, report(result))
+    target = check_report(path, interactive=interactive)
+    write_text(target, report(result, interactive=interactive))
     return target
 
 
-def check_report(path: str | Path) -> Path:
-    """Find out whether a report can be written, and return its path; OutputFileError if not."""
+def check_report(path: str | Path, *, interactive: bool = False) -> Path:
+    """Find out whether a report can be written, and return its path.
+
+    Raises
+    ------
+    OutputFileError
+    InputError
+        If an interactive page is asked for and plotly or matplotlib is not installed.
+    """
+    if interactive:
+        from bemkit.report.interactive import check_interactive
+
+        check_interactive()
     if Path(path).suffix.lower() not in (".html", ".htm"):
         raise OutputFileError(f"{path}: a report is a page of HTML: give a name that ends in .html")
     return check_target(Path(path))
@@ -94,7 +112,11 @@ def _style() -> str:
     return (resources.files("bemkit") / "report" / "page.css").read_text("utf-8")
 
 
-def _pictures(result: Result) -> list[Element]:
+def _pictures(result: Result, interactive: bool) -> list[Element]:
+    if interactive:
+        from bemkit.report.interactive import interactive_elements
+
+        return interactive_elements(result)
     if not has_pictures():
         return [element("p", 'Pictures need matplotlib: pip install "bemkit[plot]".')]
     return [element("div", *picture_elements(result), class_="pictures")]
