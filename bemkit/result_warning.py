@@ -23,12 +23,15 @@ class ResultWarning:
         A sentence with the value and the remedy.
     number : float, optional
         The value, in the unit that the text states; None if the kind has none.
+    step : int, optional
+        Number of the load step, counted from 1, if it is an earlier one than that of the result.
     """
 
     kind: str
     subject: str
     text: str
     number: float | None = None
+    step: int | None = None
 
     def __str__(self) -> str:
         """Return the sentence."""

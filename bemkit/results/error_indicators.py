@@ -188,17 +188,21 @@ def nodal_error(contact: ContactTable, degree: int, n_sides: Callable[[str], int
     Returns
     -------
     float or None
-        None if a contact that carries tractions has fewer than three nodes, which have no second difference.
+        Of a contact with fewer than three nodes, which have no second difference, the tractions count as wrong; None if
+        all contacts are such.
     """
     degree = min(max(degree, 1), 2)
-    errors, squared = contact_errors(contact, degree), 0.0
+    errors, squared, has_estimate = contact_errors(contact, degree), 0.0, False
+    sizes = contact.weight * (contact.sigma_n**2 + contact.sigma_t**2)
     for part in contact.parts:
-        rows = contact.rows(part)
-        if np.count_nonzero(rows) < 3 and (contact.sigma_n[rows].any() or contact.sigma_t[rows].any()):
-            return None
-        factor = 2.0 * PAIR_CALIBRATION[degree - 1] if n_sides(part) == 2 else 1.0
-        squared += factor * float(errors[rows].sum())
-    return squared
+        rows, sides = contact.rows(part), n_sides(part)
+        if np.count_nonzero(rows) < 3:
+            squared += sides * float(sizes[rows].sum())
+            continue
+        has_estimate = True
+        factor = PAIR_CALIBRATION[degree - 1] if sides == 2 else 1.0
+        squared += sides * factor * float(errors[rows].sum())
+    return squared if has_estimate else None
 
 
 def mean_traction_errors(mesh: BoundaryMesh, traction: FloatArray) -> FloatArray:

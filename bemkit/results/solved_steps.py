@@ -54,10 +54,6 @@ def with_times(result: Solution, solutions: Sequence[Solution]) -> Solution:
     )
 
 
-_EARLIER = "Load step "
-"""How warnings begin that are those of an earlier step."""
-
-
 def following(so_far: Solution | None, solution: Solution, stated: Scene, number: int, n_steps: int) -> Solution:
     """Return a step of a load history with the records, solves, times, memory and warnings of all before it.
 
@@ -82,8 +78,8 @@ def following(so_far: Solution | None, solution: Solution, stated: Scene, number
     total = with_totals(solution, [*before, solution], [*("" for _ in before), name])
     earlier = [
         each
-        if each.text.startswith(_EARLIER)
-        else replace(each, text=f"{_EARLIER}{number - 1} of {n_steps}: {each.text}")
+        if each.step is not None
+        else replace(each, step=number - 1, text=f"Load step {number - 1} of {n_steps}: {each.text}")
         for each in (() if so_far is None else so_far.warnings)
     ]
     warnings = without_duplicates((*solution.warnings, *earlier))

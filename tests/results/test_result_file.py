@@ -301,7 +301,7 @@ def test_a_damaged_list_of_contents_is_named() -> None:
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        (attribute("/", "schema_version", 3), "has layout version 3, this bemkit .* reads version 5: use the bemkit"),
+        (attribute("/", "schema_version", 3), "has layout version 3, this bemkit .* reads version 6: use the bemkit"),
         (attribute("/", "format", "other"), "not a bemkit result"),
         (said("outcome", "status", "GREAT"), "inconsistent content .*GREAT"),
         (said("outcome", "energies", ["much"]), "inconsistent content"),

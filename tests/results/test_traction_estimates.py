@@ -9,7 +9,10 @@ import pytest
 
 import bemkit as bk
 from bemkit.arrays import FloatArray
+from bemkit.results.contact_table import ContactTable
+from bemkit.results.error_indicators import nodal_error
 from bemkit.results.solution import Solution
+from bemkit.solvers.active_sets import NodeStatus
 from tests.slow import slow_except
 
 
@@ -54,6 +57,17 @@ def test_tractions_that_a_few_nodes_carry_are_warned_of() -> None:
 
 def test_two_nodes_have_no_estimate() -> None:
     assert solved("tilted-punch", 1, bk.MeshOptions(elements=80)).estimated_traction_error is None
+
+
+def test_a_contact_of_two_nodes_counts_as_wrong_beside_others() -> None:
+    s = np.array([0.0, 1.0, 2.0, 3.0, 0.0, 1.0])
+    none, even = np.zeros(6), np.array([-1.0, -1.0, -1.0, -1.0, -3.0, -3.0])
+    parts = ("long",) * 4 + ("short",) * 2
+    table = ContactTable(
+        parts, s, none, s, none, none, even, none, none, none, np.full(6, NodeStatus.STICK), np.full(6, 0.5)
+    )
+    assert nodal_error(table, 1, lambda _: 2) == 2.0 * 9.0
+    assert nodal_error(table.renamed({"short": "short"}), 1, lambda _: 1) is None
 
 
 def test_a_part_with_few_elements_is_named_with_its_body() -> None:

@@ -121,7 +121,7 @@ def test_a_file_keeps_warnings(tmp_path: Path, solution: Solution) -> None:
 def test_json_lists_warnings(solution: Solution) -> None:
     summary = json.loads(to_json(solution))
     assert summary["warnings"] == [
-        {"kind": "first", "subject": "part", "text": "The first: do this.", "number": 1.5},
+        {"kind": "first", "subject": "part", "text": "The first: do this.", "number": 1.5, "step": None},
         WARNINGS[1].as_dict(),
     ]
     assert summary["plan"]["warnings"] == [WARNINGS[0].as_dict()]
@@ -383,6 +383,6 @@ def test_warnings_of_an_earlier_step_name_it() -> None:
     solution = bk.run(scene)
     assert solution.is_converged
     assert not solution.contact.sigma_n.any()
-    zones = [str(warning) for warning in solution.warnings if "contact zone" in str(warning)]
-    assert zones
-    assert all(words.startswith("Load step 1 of 3: A contact zone of part 'tip'") for words in zones)
+    zones = [warning for warning in solution.warnings if "contact zone" in str(warning)]
+    assert {zone.step for zone in zones} == {1}
+    assert all(str(zone).startswith("Load step 1 of 3: A contact zone of part 'tip'") for zone in zones)
