@@ -125,9 +125,9 @@ const mouse = (target, kind, x, y) =>
  try {
   while (!window.isDrawn) await pause(50);
   const plot = document.getElementById("drawing");
-  const layer = plot.querySelector("[data-subplot=x2y2].nsewdrag, .x2y2 .nsewdrag") ?? plot.querySelectorAll(".nsewdrag")[1];
+  const layer = plot.querySelectorAll(".nsewdrag")[1];
   const box = layer.getBoundingClientRect();
-  const nodes = () => plot.data.find((trace) => trace.name.startsWith("nodes of"));
+  const nodes = () => plot._fullData.find((trace) => trace.name.startsWith("nodes of"));
   const {xaxis2, yaxis2} = plot._fullLayout;
   const at = [box.left + xaxis2.l2p(nodes().x[3]), box.top + yaxis2.l2p(nodes().y[3])];
   mouse(layer, "mouseover", ...at);

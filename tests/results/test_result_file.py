@@ -103,7 +103,7 @@ def test_scenes_that_follow_each_other_come_back(tmp_path: Path, solution: Solut
 def test_provenance_names_versions_but_neither_people_nor_places(file: Path) -> None:
     with h5py.File(file) as stored:
         provenance = dict(stored["provenance"].attrs)
-        assert stored.attrs["schema_version"] == 5
+        assert stored.attrs["schema_version"] == 6
     assert set(provenance) == {"bemkit", "python", "numpy", "scipy", "h5py", "platform", "created"}
     text = " ".join(map(str, provenance.values()))
     assert str(Path.home()) not in text
