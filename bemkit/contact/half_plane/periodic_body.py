@@ -112,11 +112,21 @@ class _System:
 
     @cached_property
     def _for_motions(self) -> tuple[FloatArray, FloatArray]:
-        """Return the tractions (n_unknowns, n_driven) that unit motions cause, and the inverse of their work."""
+        """Return the tractions (n_unknowns, n_driven) that unit motions cause, and the inverse of their work.
+
+        Raises
+        ------
+        SingularResponse
+            If they do no work on a motion.
+        """
         reduced, zero = self.reduced, np.zeros(self.body.n_contact, complex)
         tractions = [self._tractions_of(reduced.rows(motion, zero)) for motion in self.motions]
         works = [self._resultants(reduced.changes(unknowns)) for unknowns in tractions]
-        return np.array(tractions).T, np.asarray(np.linalg.inv(np.array(works).T))
+        try:
+            inverse = np.linalg.inv(np.array(works).T)
+        except np.linalg.LinAlgError as error:
+            raise SingularResponse("the contact conditions leave a motion far away free") from error
+        return np.array(tractions).T, np.asarray(inverse)
 
     @cached_property
     def _sizes(self) -> FloatArray:
