@@ -22,6 +22,7 @@ from bemkit.studies.accuracy.figures import draw_errors
 from bemkit.studies.accuracy.records import ErrorRecord, by_series, fitted_rate, pareto_front
 from bemkit.studies.accuracy.runs import adaptive, all_runs, error_tasks, graded, uniform
 from bemkit.studies.engine import compute
+from bemkit.table import markdown_table
 
 PAGE = Path(__file__).parent / "error-against-run-time.md"
 IMAGES = Path(__file__).parent / "images"
@@ -49,9 +50,10 @@ def main() -> None:
         save_small(figure, IMAGES / f"error-study-{name}.png")
         text = PAGE.read_text("utf-8")
         write_orders(rows, TABLES / f"orders-{name}.csv")
-        text = between(text, f"{name}-choice", choice_table(rows))
+        write_fastest(rows, TABLES / f"fastest-{name}.csv")
         text = between(text, f"{name}-reference", reference_sentence(reference))
         PAGE.write_text(text, "utf-8")
+    write_summary()
 
 
 def save_small(figure: Figure, path: Path) -> None:
@@ -95,23 +97,36 @@ def write_orders(rows: Sequence[ErrorRecord], path: Path) -> None:
                 table.writerow([series[0].discretisation, series[0].meshes, *rates])
 
 
-def choice_table(rows: Sequence[ErrorRecord]) -> str:
-    """Return the fastest run that reaches each error of the normal traction, and of the energy."""
-    lines = ["| target error | in the normal traction | in the energy |", "|---|---|---|"]
-    for target in TARGETS:
-        cells = [fastest(rows, measure, target) for measure in ("sigma_n", "energy")]
-        lines.append(f"| {target:.0e} | {' | '.join(cells)} |")
-    return "\n".join(lines)
+def write_fastest(rows: Sequence[ErrorRecord], path: Path) -> None:
+    """Write the fastest run that reaches each error of the normal traction, and of the energy."""
+    with path.open("w", newline="") as stream:
+        table = csv.writer(stream, lineterminator="\n")
+        table.writerow(["target", "in", "discretisation", "meshes", "elements", "solver", "milliseconds"])
+        for measure in ("sigma_n", "energy"):
+            for target in TARGETS:
+                table.writerow([f"{target:.0e}", MEASURES[measure], *fastest(rows, measure, target)])
 
 
-def fastest(rows: Sequence[ErrorRecord], measure: str, target: float) -> str:
+def fastest(rows: Sequence[ErrorRecord], measure: str, target: float) -> list[str]:
     """Describe the fastest run whose error is at most the target."""
-    good = [row for row in pareto_front(rows, measure) if getattr(row, measure) <= target]
-    if not good:
-        return "not reached"
-    row = good[0]
-    driver = "" if row.solver == "semismooth-newton" else f", {row.solver}"
-    return f"{row.discretisation}, {row.meshes}, {row.elements} elements{driver}: {1e3 * row.seconds:.0f} ms"
+    for row in pareto_front(rows, measure):
+        if getattr(row, measure) <= target:
+            return [row.discretisation, row.meshes, str(row.elements), row.solver, f"{1e3 * row.seconds:.0f}"]
+    return ["not reached", "", "", "", ""]
+
+
+def write_summary() -> None:
+    """Write the table of the page from the files of all scenes: elements and milliseconds for the normal traction."""
+    cells = {}
+    for name in SCENES:
+        with (TABLES / f"fastest-{name}.csv").open(newline="") as stream:
+            for row in csv.DictReader(stream):
+                if row["in"] == MEASURES["sigma_n"]:
+                    cells[name, row["target"]] = f"{row['discretisation']} {row['milliseconds']}"
+    lines = [[f"{target:.0e}", *(cells[name, f"{target:.0e}"] for name in SCENES)] for target in TARGETS]
+    heads = ["error", *(f"`{name}`" for name in SCENES)]
+    table = markdown_table(heads, lines, [False] * len(heads)).rstrip()
+    PAGE.write_text(between(PAGE.read_text("utf-8"), "fastest", table), "utf-8")
 
 
 if __name__ == "__main__":
