@@ -132,9 +132,10 @@ def find_contact(
 
 @dataclass(frozen=True, eq=False)
 class _Side:
-    """The nodes of one contact part, as in `ContactData`; weights are the part's own."""
+    """The nodes of one contact part, as in `ContactData`; weights are the part's own, runs its connected pieces."""
 
     nodes: IntArray
+    runs: IntArray
     directions: FloatArray
     weights: FloatArray
     arc_length: FloatArray
@@ -148,17 +149,20 @@ class _Side:
         nodes, normals = nodes_on(space, elements)
         points = dof_points(space, mesh)[nodes]
         gap, directions = measure_contact(obstacle, points, normals)
-        lengths = mesh.lengths[elements]
+        lengths, ends = mesh.lengths[elements], mesh.elements[elements]
+        element_runs = np.cumsum(ends[:, 0] != np.roll(ends[:, 1], 1))
         begin = np.concatenate([[0.0], np.cumsum(lengths)[:-1]])
         dofs = space.element_dofs[elements]
         places = element_nodes(space)[elements]
         arc_length, facing = np.full(space.n_dofs // 2, np.inf), np.full(space.n_dofs // 2, -1.0)
+        runs = np.zeros(space.n_dofs // 2, np.intp)
+        runs[dofs] = element_runs[:, None]
         np.minimum.at(arc_length, dofs, begin[:, None] + 0.5 * lengths[:, None] * (places + 1.0))
         towards = np.zeros((space.n_dofs // 2, 2))
         towards[nodes] = directions
         np.maximum.at(facing, dofs, np.sum(mesh.normals_at(elements, places) * towards[dofs], axis=2))
         weights = dof_weights(space, elements)[nodes]
-        return cls(nodes, directions, weights, arc_length[nodes], gap, facing[nodes], points)
+        return cls(nodes, runs[nodes], directions, weights, arc_length[nodes], gap, facing[nodes], points)
 
     def take(self, rows: BoolArray) -> _Side:
         return _Side(*(column[rows] for column in vars(self).values()))
@@ -169,11 +173,15 @@ class _Side:
         return np.asarray((np.abs(cosine) <= SMOOTH_SIDE_COSINE) & np.isfinite(self.gap))
 
     def receivers(self, directions: FloatArray) -> IntArray:
-        """Return the node (n,) to which the weight of each node goes: itself, or the next one on this side."""
+        """Return the node (n,) to which the weight of each node goes: itself, or its neighbour on this side."""
         is_own = np.sum(directions[self.nodes] * self.directions, axis=1) > SMOOTH_SIDE_COSINE
         position = np.arange(self.nodes.size)
         following, before = np.minimum(position + 1, position[-1]), np.maximum(position - 1, 0)
-        return self.nodes[np.where(is_own, position, np.where(is_own[following], following, before))]
+        # the node listed next may lie on another piece of the boundary
+        goes_on = (following > position) & (self.runs[following] == self.runs)
+        goes_back = (before < position) & (self.runs[before] == self.runs)
+        chosen = np.where(goes_on & (is_own[following] | ~goes_back), following, np.where(goes_back, before, position))
+        return self.nodes[np.where(is_own, position, chosen)]
 
 
 def _nearest_of_each_part(parts: Sequence[FacingPart], sides: Sequence[_Side]) -> tuple[list[FacingPart], list[_Side]]:
@@ -200,7 +208,7 @@ def _owners(sides: Sequence[_Side], n_nodes: int, same: float) -> IntArray:
 
 def _joined(parts: Sequence[FacingPart], sides: Sequence[_Side], space: BoundarySpace) -> ContactData:
     columns = (np.concatenate(column) for column in zip(*(vars(side).values() for side in sides), strict=True))
-    nodes, directions, weights, arc_length, gap, facing, points = columns
+    nodes, _, directions, weights, arc_length, gap, facing, points = columns
     of_node = [part for part, side in zip(parts, sides, strict=True) for _ in range(side.nodes.size)]
     contact_nodes = ContactNodes(nodes, dof_points(space)[nodes], contact_frame(directions), weights)
     return ContactData(contact_nodes, tuple(part.name for part in of_node), arc_length, gap, facing, points)

@@ -87,6 +87,19 @@ def test_a_corner_node_touches_both_obstacles_without_friction(
     assert nodes.weights.sum() * np.sqrt(2.0) == pytest.approx(2.0, rel=1e-12)  # the diameter is the unit of length
 
 
+@pytest.mark.parametrize("discretisation", ELEMENTS[1:])  # constant elements have no node at corners
+def test_a_corner_node_hands_its_share_to_the_same_piece_of_a_part(discretisation: bk.Discretisation) -> None:
+    roof = bk.Part(
+        "roof", bk.Contact(bk.RigidHalfPlane((0.0, 1.0), (0.0, -1.0))), sides=("top",), where=bk.Expression("x > 0.5")
+    )
+    walls = bk.Part("walls", bk.Contact(bk.RigidCavity((0.5, 0.5), 2.0)), sides=("right", "left"))
+    contact = contact_of(block(roof, walls, law=bk.Coulomb(0.5), discretisation=discretisation))
+    own = np.array(contact.parts) == "walls"
+    weights, x = contact.nodes.weights[own] * np.sqrt(2.0), contact.points[own, 0]
+    for place in (0.0, 1.0):  # the upper corner of the right wall belongs to the roof
+        assert weights[np.isclose(x, place)].sum() == pytest.approx(1.0, rel=1e-12)
+
+
 def test_parts_that_go_on_in_one_line_share_their_node() -> None:
     left = bk.Part("left", bk.Contact(FLOOR), sides=("bottom",), where=bk.Expression("x < 0.5"))
     right = bk.Part("right", bk.Contact(FLOOR), sides=("bottom",), where=bk.Expression("x > 0.5"))
