@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import traceback
 import warnings
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
 from functools import partial
 from itertools import pairwise
+from math import isnan
 from pathlib import Path
 from typing import Any
 
 from bemkit.errors import BemkitError
 from bemkit.results.solution import Solution
+from bemkit.results.tables import TABLES, table_of, to_json
 from bemkit.runs.run import run
 from bemkit.studies.engine import Task
 from bemkit.testing.independent_check import energy_fault, violations_of
@@ -100,7 +102,11 @@ def judge(steps: Iterable[Solution]) -> tuple[Outcome, str, str]:
     """Judge the steps of a load history by the independent check; return outcome, reason and message, see `Trial`."""
     solutions: tuple[Solution, ...] = tuple(steps)
     for before, step in pairwise((None, *solutions)):
-        if step is None or not step.is_converged:
+        if step is None:
+            continue
+        if places := list(not_numbers(step)):
+            return Outcome.WRONG, "not a number", ", ".join(places)
+        if not step.is_converged:
             continue
         check = violations_of(step, before)
         if not check.is_good:
@@ -117,6 +123,31 @@ def judge(steps: Iterable[Solution]) -> tuple[Outcome, str, str]:
     if any(step.warnings for step in solutions):
         return Outcome.WARNED, "warning", "; ".join(sorted({each.text for step in solutions for each in step.warnings}))
     return Outcome.SUCCESS, "", ""
+
+
+def not_numbers(solution: Solution) -> Iterator[str]:
+    """Yield where the summary and the tables of a solution hold what is not a number; write the summary, too."""
+    to_json(solution)
+    yield from _not_numbers(solution.summary(), "summary")
+    for name in TABLES:
+        if name != "steps" or solution.loading is not None:
+            table = table_of(solution, name)
+            yield from (f"{name}.{head}" for head in table.names if _has_nan(table.values(head)))
+
+
+def _not_numbers(content: Any, path: str) -> Iterator[str]:
+    if isinstance(content, Mapping):
+        for key, value in content.items():
+            yield from _not_numbers(value, f"{path}.{key}")
+    elif isinstance(content, list | tuple):
+        for position, value in enumerate(content):
+            yield from _not_numbers(value, f"{path}[{position}]")
+    elif _has_nan([content]):
+        yield path
+
+
+def _has_nan(values: Iterable[Any]) -> bool:
+    return any(isinstance(value, float) and isnan(value) for value in values)
 
 
 def trial_tasks(seed: int, indices: Iterable[int]) -> list[Task[Trial]]:

@@ -171,9 +171,11 @@ class GivenSides:
             return HELD
         return ROLLER if isinstance(condition, Roller) else FREE
 
-    def _in_contact(self, element: int) -> WedgeSide:
-        """Return the status of the contact node nearest to the middle of an element."""
+    def _in_contact(self, element: int) -> WedgeSide | None:
+        """Return the status of the contact node nearest to the middle of an element; None if its part has no node."""
         own = np.flatnonzero(self._table.rows(self._part[element]))
+        if not own.size:  # both nodes of a part of one element belong to its neighbours
+            return None
         row = int(own[np.argmin(norms(self._points[own] - self._mesh.centres[element]))])
         status = NodeStatus(int(self._table.status[row]))
         if status in (NodeStatus.SEPARATED, NodeStatus.STICK):

@@ -186,6 +186,17 @@ def test_fields_of_another_body_are_wrong_unless_the_solution_says_that_it_is_co
     )
 
 
+def test_what_is_not_a_number_in_summary_or_tables_is_wrong() -> None:
+    solution = solved_block()
+    for changes, place in (
+        ({"energy": float("nan")}, "summary.energy"),
+        ({"contact": dataclasses.replace(solution.contact, u_t=0.0 * solution.contact.u_t + np.nan)}, "contact.u_t"),
+    ):
+        outcome, reason, message = judge([changed(solution, **changes)])
+        assert (outcome, reason) == (Outcome.WRONG, "not a number")
+        assert place in message
+
+
 def test_a_status_is_a_named_failure() -> None:
     stalled = changed(solved_block(), status=bk.Status.STALLED, energy=-1.0)
     assert judge([stalled])[:2] == (Outcome.NAMED, "stalled")
