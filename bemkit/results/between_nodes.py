@@ -32,6 +32,9 @@ _ROUND_OFF = 64.0 * float(np.finfo(float).eps)
 LARGEST_MISSED = 0.05
 """Overlap at points without traction, relative to the displacement that contact forces cause, up to which it belongs to
 the end of a contact zone inside an element."""
+LARGEST_OVERLAP = 1.0
+"""Overlap anywhere, relative to the same, above which the nodes do not find the contact: sides that are deeper in each
+other than contact forces move them are not the bodies of the scene."""
 _FREE_ROUND_OFF = 1e-12
 """Overlap of bodies without any contact force, relative to how far they move, that may be round-off."""
 
@@ -250,10 +253,10 @@ def violations_at(values: PointsBetween, law: FrictionLaw, stress: float, length
 
 
 def missed_contacts(table: ContactTable, measured: Mapping[str, BetweenNodes]) -> dict[str, tuple[float, float]]:
-    """Return the points where sides overlap without any traction, by contact.
+    """Return the points where the nodes do not find the contact, by contact.
 
     Of bodies that no contact force acts on every overlap above round-off counts; of others overlaps above a share of
-    the displacement that contact forces cause, in a contact without force at any point.
+    the displacement that contact forces cause where there is no traction, and above all of it where there is.
     """
     free, missed = free_contacts(table), {}
     for name, each in measured.items():
@@ -261,7 +264,19 @@ def missed_contacts(table: ContactTable, measured: Mapping[str, BetweenNodes]) -
             missed[name] = each.place
         elif name not in free and each.missed > LARGEST_MISSED:
             missed[name] = each.missed_place
+        elif name not in free and each.penetration > LARGEST_OVERLAP:
+            missed[name] = each.place
     return missed
+
+
+def unfound_contacts(table: ContactTable, measured: Mapping[str, BetweenNodes]) -> dict[str, tuple[float, float]]:
+    """Return the missed contacts without any force, and those with a force that are deeper than forces move them."""
+    free = free_contacts(table)
+    return {
+        name: place
+        for name, place in missed_contacts(table, measured).items()
+        if name in free or measured[name].penetration > LARGEST_OVERLAP
+    }
 
 
 def points_between(degree: int) -> FloatArray:

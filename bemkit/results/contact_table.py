@@ -44,6 +44,9 @@ FLICKER = 1e-8
 """Changes of status within this share of a side count as one. Clearances grow like d**1.5 with the distance d from the
 edge, so that they are round-off there, and the status may change from node to node."""
 
+FEW_NODES = 3
+"""Pressed nodes up to which the sides of a contact may meet elsewhere than at its nodes, or nowhere."""
+
 
 @dataclass(frozen=True, eq=False)
 class ContactTable:
@@ -264,6 +267,11 @@ def resolved_transitions(contact: ContactTable, transitions: Sequence[Transition
 def free_contacts(table: ContactTable) -> set[str]:
     """Return the names of the contacts without any force."""
     return {name for name in table.parts if not table.sigma_n[table.rows(name)].any()}
+
+
+def narrow_contacts(table: ContactTable) -> set[str]:
+    """Return the names of the contacts with a force at a few nodes at most."""
+    return {name for name in table.parts if np.count_nonzero(table.sigma_n[table.rows(name)]) <= FEW_NODES}
 
 
 def unresolved_contacts(contact: ContactTable, resolved: Sequence[Transition]) -> list[tuple[str, tuple[float, float]]]:

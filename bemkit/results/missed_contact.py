@@ -5,8 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-import numpy as np
-
+from bemkit.results.contact_table import free_contacts, narrow_contacts
 from bemkit.scene.unit_names import amount
 from bemkit.solvers.base import Status
 
@@ -16,19 +15,18 @@ if TYPE_CHECKING:
 LARGEST_APART = 1.0
 """Least distance of sides with a contact force, relative to the displacement that contact forces cause, up to which
 they touch: mortar conditions hold in the mean, which curved sides of long elements meet apart."""
-_FEW = 3
-"""Pressed nodes up to which sides may have a force although they touch nowhere."""
 
 
 def with_missed_contact_named(solution: Solution) -> Solution:
     """Return the same solution, with the status MISSED_CONTACT if the mesh does not find the contact.
 
-    A contact without any force overlaps between its nodes, or sides that touch nowhere have a force.
+    A contact without any force overlaps between its nodes, one with a force at a few nodes is deeper between them than
+    forces move the bodies, or sides that touch nowhere have a force.
     """
     if not solution.is_converged:
         return solution
-    if solution.wrongly_free:
-        name, (x, y) = next(iter(solution.wrongly_free.items()))
+    if solution.unfound_contacts:
+        name, (x, y) = next(iter(solution.unfound_contacts.items()))
         between = solution.between_nodes_of({name})[name]
         depth = amount(between.penetration_depth, "length", solution.units, 2)
         words = f"Contact {name!r} overlaps by {depth} at ({x:.4g}, {y:.4g})."
@@ -42,7 +40,6 @@ def with_missed_contact_named(solution: Solution) -> Solution:
 
 def _pressed_apart(solution: Solution) -> list[str]:
     """Return the contacts between elastic bodies with a force whose sides touch nowhere."""
-    table = solution.contact
-    n_pressed = {name: np.count_nonzero(table.sigma_n[table.rows(name)]) for name in table.parts}
-    narrow = {name for name, n in n_pressed.items() if 0 < n <= _FEW and solution.n_sides(name) > 1}
-    return [name for name, each in solution.between_nodes_of(narrow).items() if each.apart > LARGEST_APART]
+    pressed = narrow_contacts(solution.contact) - free_contacts(solution.contact)
+    pairs = {name for name in pressed if solution.n_sides(name) > 1}
+    return [name for name, each in solution.between_nodes_of(pairs).items() if each.apart > LARGEST_APART]

@@ -241,3 +241,26 @@ def test_a_free_contact_of_loaded_bodies_is_missed_by_a_share_of_their_displacem
     free = replace(table, sigma_n=0.0 * table.sigma_n, sigma_t=0.0 * table.sigma_t)
     found = BetweenNodes(penetration, 0.0, 0.0, 0.0, penetration, place=(1.0, 2.0), has_forces=has_forces)
     assert missed_contacts(free, {"tip": found}) == ({"tip": (1.0, 2.0)} if is_missed else {})
+
+
+def test_two_pressed_nodes_beside_a_deeper_point_are_not_converged() -> None:
+    """The lowest point of a sector is the end of two long elements, whose next nodes carry the whole load."""
+    scene = bk.Scene(
+        title="Sector under a load",
+        shape=bk.Sector(1.0, 180.0, 360.0, centre=(0.0, 1.0)),
+        material=STEEL,
+        parts=(
+            bk.Part("floor", bk.Contact(bk.RigidHalfPlane()), ("arc",)),
+            bk.Part("load", bk.Traction(y=bk.Expression("-3.33e-5 * (1 + 0.5 * cos(2 * x))")), ("start", "end")),
+        ),
+        law=bk.Tresca(1.72e-6),
+        discretisation=bk.Galerkin(7),
+        mesh=bk.MeshOptions(elements=21, grading=bk.Algebraic(2.936)),
+    )
+    missed = bk.run(scene)
+    assert missed.status is bk.Status.MISSED_CONTACT
+    assert missed.estimated_error is None
+    assert missed.unfound_contacts["floor"] == pytest.approx((0.0, 0.0), abs=1e-12)
+    fine = bk.run(replace(scene, mesh=bk.MeshOptions(elements=121)))
+    assert fine.status is bk.Status.CONVERGED
+    assert not fine.unfound_contacts
