@@ -30,7 +30,7 @@ _COMMANDS = {
     ),
     "new": ("new", "Write a commented scene to start from."),
     "outline": ("outline", "Show the sides of a part from a file; write a scene to start from."),
-    "plan": ("plan", "List what would be computed, what skipped, and why, with time and memory."),
+    "plan": ("plan", "List the steps of a solve with time and memory, and skipped steps with the reason."),
     "plot": ("plot", "Draw a result or a scene."),
     "report": ("report", "Write an HTML page on a result or a scene."),
     "run": ("run", "Solve a scene."),
@@ -38,7 +38,7 @@ _COMMANDS = {
     "schema": ("listings", "Print the JSON schema of scene files, for editors."),
     "show": ("show", "Show a result file."),
     "stability": ("stability", "Solve extreme variants of a scene and check the results."),
-    "study": ("study", "Measure error against run time; make the tables of the paper."),
+    "study": ("study", "Measure error against run time, count solutions, or halve load increments."),
     "sweep": ("sweep", "Solve a scene for several values of its numbers."),
     "verify": ("verify", "Compare results with closed forms and other known solutions."),
 }

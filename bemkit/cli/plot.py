@@ -29,7 +29,7 @@ class _PlotCommand(click.Command):
 @click.argument("source")
 @options.what_option
 @click.option(
-    "-o", "--output", "place", default="figures", metavar="PLACE", help="Write to a folder, or one picture to a file."
+    "-o", "--output", "place", default="figures", metavar="PATH", help="Write to a folder, or one picture to a file."
 )
 @click.option("--dpi", "dots_per_inch", type=click.IntRange(20, 1200), default=150, help="Dots per inch (150).")
 @click.option(
@@ -41,8 +41,8 @@ def plot(
 ) -> int:
     """Draw SOURCE: a result file, or a scene, which is solved first.
 
-    Without --what the pictures that suit the result are drawn. The place is a folder, or a file ending in .png, .svg
-    or .pdf for one picture, in .gif or .mp4 for the animation. The exit code is that of bemkit run.
+    Without --what it draws the pictures that suit the result. PATH is a folder, a file ending in .png, .svg or .pdf for
+    one picture, or one ending in .gif or .mp4 for the animation. The exit code is that of bemkit run.
     """
     with shown_progress(quiet) as callback:
         from bemkit.cli.sources import solved, solved_steps

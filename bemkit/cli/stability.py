@@ -40,8 +40,7 @@ def stability(
 ) -> int:
     """Solve extreme variants of SCENE (paper-1 by default) and check every result independently.
 
-    The exit code is 1 if a result is wrong. Random scenes of every kind are a tool of the repository:
-    ``python -m checks.random_scenes 200``.
+    The exit code is 1 if a result is wrong. Random scenes are in the repository: python -m checks.random_scenes 200.
     """
     with StudyProgress(quiet) as progress:
         from bemkit.cli.printed_stability import print_axis, print_left_out, print_verdicts

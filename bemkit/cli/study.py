@@ -40,7 +40,7 @@ class StudyGroup(click.Group):
 
 @click.group(cls=StudyGroup)
 def study() -> None:
-    """Many runs that answer one question; bemkit study SCENE is short for bemkit study errors SCENE."""
+    """Compare many runs of one scene; bemkit study SCENE is short for bemkit study errors SCENE."""
 
 
 @study.command(DEFAULT_COMMAND)

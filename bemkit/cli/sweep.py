@@ -61,7 +61,7 @@ def sweep(
 ) -> int:
     """Solve SCENE for several values of its numbers, such as --vary law.friction_coefficient=0:1:11.
 
-    The exit code is 1 if a row has no certified result, or one less accurate than asked for.
+    The exit code is 1 if a row has no certified result, or is less accurate than requested.
     """
     if jobs is not None and cluster is not None:
         raise click.UsageError("--jobs and --on exclude each other: give one of them")
