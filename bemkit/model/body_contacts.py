@@ -47,7 +47,7 @@ def touching_pairs(scene: Scene, bodies: Sequence[PlacedBody]) -> tuple[ContactP
     if scene.symmetry is not None:
         _check_images(sides, names, scene.symmetry, touching.within)
     known = {frozenset(pair.sides) for pair in scene.contacts}
-    law = scene.law if touching.law is None else touching.law
+    law = scene.law_of(touching)
     facing = find_facing(sides, touching.within, owners=owners, has_friction=not law.is_frictionless)
     found = [ContactPair((names[one], names[two]), multipliers_on=names[one]) for one, two in facing]
     return tuple(pair for pair in found if frozenset(pair.sides) not in known)
@@ -83,7 +83,7 @@ def body_rows(
     """
     numbers = {body.name: number for number, body in enumerate(bodies)}
     pairs = scene.elastic_contacts
-    laws = [scene.law if pair.law is None else pair.law for pair in pairs]
+    laws = [scene.law_of(pair) for pair in pairs]
     ordered = [_ordered(pair, law, bodies, numbers) for pair, law in zip(pairs, laws, strict=True)]
     lengths = [min(float(side.space.mesh.lengths[side.elements].sum()) for _, _, side in one) for one in ordered]
     taken: list[dict[int, str]] = [{} for _ in bodies]  # node -> the part that has its multiplier

@@ -9,7 +9,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray, IntArray
-from bemkit.contact.laws import FrictionLaw
+from bemkit.contact.further_laws import PiecewiseLaw
+from bemkit.contact.laws import FrictionLaw, Frictionless, LawOfCoefficients
+from bemkit.contact.problem import LawError
 from bemkit.errors import InputError
 from bemkit.model.contact_data import ContactData, FacingPart, find_contact
 from bemkit.model.placed import PlacedBody, groups
@@ -155,7 +157,7 @@ def candidates_of(scene: Scene, body: PlacedBody) -> ContactData:
     own = [pair for pair in scene.contacts if pair.rigid_body is not None and pair.elastic_parts[0][0] == body.name]
     obstacles = {each.name: each.obstacle for each in scene.rigid}
     facing = [
-        FacingPart(pair.name, _part(pair), obstacles[str(pair.rigid_body)], _law_of(scene, pair).is_frictionless)
+        FacingPart(pair.name, _part(pair), obstacles[str(pair.rigid_body)], scene.law_of(pair).is_frictionless)
         for pair in own
     ]
     return find_contact(body.scene, body.mesh, body.space_in_place, facing)
@@ -192,7 +194,7 @@ def obstacle_rows(
                 check_overlap(pair, -float(gap[deepest]), points[deepest], body.mesh.diameter)
                 touched = points + np.where(np.isfinite(gap), gap, 0.0)[:, None] * nodes.directions
                 k = rigid[str(pair.rigid_body)]
-                title, part, law, other = name, _part(pair), _law_of(scene, pair), len(bodies) + k
+                title, part, law, other = name, _part(pair), scene.law_of(pair), len(bodies) + k
                 gap, motions = gap + pair.gap_at(points), scene.rigid[k].motions_at(touched)
             is_held = np.asarray(fixed[nodes.nodes].any(axis=1))
             moves = motions is not None and bool(scene.rigid[other - len(bodies)].is_driven.any())
@@ -234,8 +236,32 @@ def retained_for(
     return tuple(replace(of_body, is_retained=nodes[:, None] & ~of_body.is_fixed) for of_body, nodes in pairs)
 
 
-def _law_of(scene: Scene, pair: ContactPair) -> FrictionLaw:
-    return scene.law if pair.law is None else pair.law
+def law_of_rows(contacts: Sequence[ContactRows]) -> FrictionLaw:
+    """Return the friction law of the nodes of all contacts, in physical units.
+
+    Raises
+    ------
+    LawError
+        If a coefficient is not finite or negative somewhere; the message names the contact.
+    """
+    laws: dict[object, tuple[FrictionLaw, list[IntArray]]] = {}
+    first = 0
+    for rows in contacts:
+        numbers = first + np.arange(rows.n_contact)
+        first += rows.n_contact
+        for law, chosen in ((rows.law, ~rows.is_frictionless), (Frictionless(), rows.is_frictionless)):
+            if not chosen.any():
+                continue
+            is_uniform = isinstance(law, LawOfCoefficients) and law.is_uniform
+            try:
+                evaluated = law if is_uniform else law.at(rows.points[chosen])
+            except ValueError as error:
+                kind = "part" if rows.other < 0 else "contact"
+                raise LawError(f"{kind} {rows.name!r}: friction law: {error}") from error
+            laws.setdefault(law if is_uniform else first, (evaluated, []))[1].append(numbers[chosen])
+    if len(laws) < 2:
+        return next((law for law, _ in laws.values()), Frictionless())
+    return PiecewiseLaw(*zip(*((law, np.concatenate(nodes)) for law, nodes in laws.values()), strict=True))
 
 
 def _part(pair: ContactPair) -> str:

@@ -96,7 +96,7 @@ def describe(prepared: Prepared, load: UnsolvableLoad) -> str:
     str
         With the resultant force for a translation, or the moment and the fixed point for a rotation.
     """
-    if not prepared.has_obstacles_only:
+    if not prepared.scene.has_obstacles_only:
         return f"{load.description}: hold what moves by a support, raise the friction, or change the loads"
     units = prepared.units
     mode = _rigid_mode(prepared, load)

@@ -13,13 +13,15 @@ from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.spaces import BoundarySpace, element_nodes
 from bemkit.model.units import Units
 from bemkit.operators.half_plane.far_drive import FarDrive
+from bemkit.operators.half_plane.surface import SurfaceElasticity
 from bemkit.operators.linear.solvers import (
     ChosenLinearSolver,
     Hierarchical,
     LinearSolverChoice,
     choose_linear_solver,
 )
-from bemkit.operators.steklov_poincare import TractionField
+from bemkit.operators.pair_form import Tag
+from bemkit.operators.steklov_poincare import SteklovPoincare, TractionField
 from bemkit.operators.steklov_poincare.forces_inside import ForcesInside
 from bemkit.operators.steklov_poincare.hierarchical_needs import choose_collocation_solver
 from bemkit.operators.steklov_poincare.needs import BodyCase, physical_memory
@@ -33,7 +35,6 @@ from bemkit.operators.steklov_poincare.nodal_conditions import (
 )
 from bemkit.scene.body_scene import BodyScene
 from bemkit.scene.conditions import Clamped, Load, Part, PrescribedDisplacement, Roller
-from bemkit.scene.discretisation import Discretisation
 
 
 def held_nodes(scene: BodyScene, mesh: BoundaryMesh, units: Units, space: BoundarySpace) -> NodalConditions:
@@ -110,6 +111,11 @@ def far_drive(scene: BodyScene, units: Units) -> FarDrive:
     return FarDrive(driven, (x, y, turn), (force_x, force_y, moment), (centre[0], centre[1]), strain)
 
 
+def driven_by(elastic: SteklovPoincare, drive: FarDrive) -> SteklovPoincare:
+    """Return a half-plane that moves otherwise far away; a body that ends somewhere stays as it is."""
+    return elastic.driven_by(drive) if isinstance(elastic, SurfaceElasticity) else elastic
+
+
 def given_data(conditions: NodalConditions, force: FloatArray, inside: ForcesInside | None) -> GivenData:
     """Return the forces and displacements under which an elastic map is solved, without what acts inside the body."""
     if inside is not None:
@@ -159,14 +165,17 @@ def _layout(part: Part) -> tuple[object, ...]:
 
 
 def linear_solver_of(
-    requested: LinearSolverChoice, discretisation: Discretisation, case: BodyCase
+    requested: LinearSolverChoice, elastic: SteklovPoincare, method: str, case: BodyCase
 ) -> ChosenLinearSolver:
     """Choose the linear solver of a map.
 
     Parameters
     ----------
     requested : LinearSolver, Hierarchical or Automatic
-    discretisation : Discretisation
+    elastic : SteklovPoincare
+        With dense equations.
+    method : str
+        Name of the discretisation in messages.
     case : BodyCase
         Its linear solver is not used.
 
@@ -175,11 +184,15 @@ def linear_solver_of(
     InputError
         If compressed equations of Galerkin's method are requested: there are none.
     """
-    if not discretisation.is_symmetric:
-        return choose_collocation_solver(requested, case, physical_memory(), discretisation.why_dense(case.mesh))
+    if Tag.SYMMETRIC not in elastic.tags:
+        from bemkit.operators.steklov_poincare.collocation import CollocationElasticity
+
+        # a map that derives from collocation may change what it condenses: only bemkit's own equations are compressed
+        hindrance = "" if type(elastic) is CollocationElasticity else f"{method} has no such equations"
+        return choose_collocation_solver(requested, case, physical_memory(), hindrance)
     if isinstance(requested, Hierarchical) and case.mesh.surface is None:
         raise InputError(
-            f"linear_solver is 'hierarchical', but discretisation {discretisation.method} has dense equations only: "
+            f"linear_solver is 'hierarchical', but discretisation {method} has dense equations only: "
             'take discretisation = "constant", whose equations are compressed, or hp with an accuracy and '
             'linear_solver = "automatic"'
         )

@@ -18,15 +18,16 @@ from bemkit.contact.body import ContactState
 from bemkit.contact.problem import ContactProblem
 from bemkit.errors import InputError
 from bemkit.model.fields import elastic_energy, insert_loads
+from bemkit.model.given import driven_by
 from bemkit.model.placed import groups, shape_numbers
 from bemkit.model.prepared import Prepared, PreparedBody
-from bemkit.model.shapes import condensed_shapes, driven_by, elastic_map
+from bemkit.model.shapes import condensed_shapes
 from bemkit.model.single_body import SingleBody, is_direct, is_single, single_body
 from bemkit.model.units import Units, motion_units
 from bemkit.operators.counts import OperationCounts
 from bemkit.operators.half_plane.surface import SurfaceElasticity
 from bemkit.operators.steklov_poincare import CondensedMap, SteklovPoincare
-from bemkit.operators.steklov_poincare.forces_inside import HeavyElasticity
+from bemkit.operators.steklov_poincare.forces_inside import HeavyElasticity, under_forces_inside
 from bemkit.operators.steklov_poincare.nodal_conditions import supporting_forces
 from bemkit.solvers.base import ContactSolver
 
@@ -299,7 +300,7 @@ def _single(prepared: Prepared, elastic: SteklovPoincare, body: SingleBody) -> M
 def _single_of(prepared: Prepared, executor: Executor | None) -> tuple[SteklovPoincare, SingleBody]:
     """Return the map of the only body, and the body as contact sees it."""
     if executor is None:
-        elastic = elastic_map(prepared, prepared.only)
+        elastic = under_forces_inside(prepared.elastic_map(prepared.only), prepared.only.inside)
         return elastic, single_body(prepared, elastic)
     if not is_direct(prepared):
         raise InputError("executor is given, but the only body is not condensed onto contact nodes: remove it")
@@ -312,9 +313,7 @@ def _loaded(maps: Sequence[SteklovPoincare], bodies: Sequence[PreparedBody]) -> 
     """Return the maps with the body forces of their bodies; copies under equal forces share one."""
     shared: dict[tuple[int, int], SteklovPoincare] = {}
     return tuple(
-        shared.setdefault(
-            (id(map_), id(body.inside)), map_ if body.inside is None else HeavyElasticity(map_, body.inside)
-        )
+        shared.setdefault((id(map_), id(body.inside)), under_forces_inside(map_, body.inside))
         for map_, body in zip(maps, bodies, strict=True)
     )
 

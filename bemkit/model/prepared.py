@@ -12,16 +12,15 @@ from functools import cached_property
 
 import numpy as np
 
-from bemkit.arrays import BoolArray, FloatArray, IntArray
+from bemkit.arrays import BoolArray, FloatArray
 from bemkit.contact.condensation.nodes import ContactNodes
-from bemkit.contact.further_laws import PiecewiseLaw
-from bemkit.contact.laws import FrictionLaw, Frictionless, LawOfCoefficients
-from bemkit.contact.problem import LawError
+from bemkit.contact.laws import FrictionLaw
 from bemkit.geometry.spaces import dof_points
 from bemkit.model.contact_data import ContactData
 from bemkit.model.contact_tractions import ContactSpread
-from bemkit.model.contacts import ContactRows, candidates_of, obstacle_rows, retained_for
+from bemkit.model.contacts import ContactRows, candidates_of, law_of_rows, obstacle_rows, retained_for
 from bemkit.model.given import (
+    driven_by,
     far_drive,
     given_data,
     held_nodes,
@@ -33,8 +32,10 @@ from bemkit.model.placed import Meshes, PlacedBody, place
 from bemkit.model.same_bodies import bodies_under, check_rigid, find_units, listed_contacts, with_found_contacts
 from bemkit.model.units import Units
 from bemkit.operators.half_plane.far_drive import FarDrive
-from bemkit.operators.linear.solvers import ChosenLinearSolver
+from bemkit.operators.linear.solvers import ChosenLinearSolver, DenseCholesky, LinearSolver
 from bemkit.operators.material import Material
+from bemkit.operators.pair_form import Tag
+from bemkit.operators.steklov_poincare import SteklovPoincare
 from bemkit.operators.steklov_poincare.forces_inside import ForcesInside
 from bemkit.operators.steklov_poincare.hierarchical_needs import LARGEST_BLOCK
 from bemkit.operators.steklov_poincare.needs import BodyCase
@@ -44,6 +45,8 @@ from bemkit.operators.steklov_poincare.nodal_conditions import (
     free_modes,
     turning,
 )
+from bemkit.result_warning import ResultWarning
+from bemkit.scene.mesh_options import thinness_warnings
 from bemkit.scene.scene import Scene
 
 
@@ -117,11 +120,6 @@ class Prepared:
         """Number of contact nodes."""
         return sum(rows.n_contact for rows in self.rows)
 
-    @property
-    def has_obstacles_only(self) -> bool:
-        """Whether there is one elastic body that touches nothing but fixed obstacles."""
-        return len(self.bodies) == 1 and all(rows.other < 0 for rows in self.rows)
-
     @cached_property
     def is_condensed(self) -> bool:
         """Whether contact sees the stiffness of bodies even if their equations are compressed over a tree.
@@ -130,17 +128,17 @@ class Prepared:
         that are too long can be negative, for rotations that no support holds and displacements do not contain, and for
         nodes between two obstacles (two rows each).
         """
-        if not self.has_obstacles_only:
+        if not self.scene.has_obstacles_only:
             return True
         body, nodes = self.only, np.concatenate([np.zeros(0, np.intp), *(rows.nodes for rows in self.rows)])
         if np.unique(nodes).size < nodes.size:
             return True
-        discretisation = body.scene.discretisation
-        if discretisation.is_symmetric:
+        tags = self._map_of(body, DenseCholesky()).tags
+        if Tag.SYMMETRIC in tags:
             return False
-        if not discretisation.keeps_rotations and turning(body.free_modes).any():
+        if Tag.KILLS_TRANSLATIONS in tags and turning(body.free_modes).any():
             return True
-        return discretisation.may_be_negative(body.own_space.mesh)
+        return bool(self.thinness_warnings(body))
 
     def material_of(self, body: PlacedBody) -> Material:
         """Return the material of a body, its modulus in dimensionless units."""
@@ -148,14 +146,31 @@ class Prepared:
 
     def linear_solver(self, body: PreparedBody) -> ChosenLinearSolver:
         """Return the linear solver that the map of a body takes, and why."""
-        case = BodyCase(
-            body.own_space.mesh,
-            self.material_of(body),
-            body.conditions,
-            (body.map_data,),
-            is_condensed=self.is_condensed,
-        )
-        return linear_solver_of(self.scene.linear_solver, body.scene.discretisation, case)
+        elastic = self._map_of(body, DenseCholesky())
+        data = (body.map_data,)
+        case = BodyCase(body.own_mesh.unit, elastic.material, body.conditions, data, is_condensed=self.is_condensed)
+        return linear_solver_of(self.scene.linear_solver, elastic, body.scene.discretisation.method, case)
+
+    def _map_of(self, body: PreparedBody, linear_solver: LinearSolver) -> SteklovPoincare:
+        return body.scene.discretisation.elastic_map(body.own_mesh.unit, self.material_of(body), linear_solver)
+
+    def elastic_map(self, body: PreparedBody) -> SteklovPoincare:
+        """Return the map of a body without forces inside, by its linear solver; nothing is assembled yet."""
+        chosen = self.linear_solver(body)
+        elastic = driven_by(self._map_of(body, chosen.solver), body.drive)
+        if chosen.hierarchical is None:
+            return elastic
+        from bemkit.operators.steklov_poincare.collocation import CollocationElasticity
+        from bemkit.operators.steklov_poincare.hierarchical import HierarchicalCollocation
+
+        assert isinstance(elastic, CollocationElasticity)
+        return HierarchicalCollocation.of(elastic, chosen.hierarchical)
+
+    def thinness_warnings(self, body: PreparedBody) -> tuple[ResultWarning, ...]:
+        """Warn if elements of a body whose map is not symmetric are too long for its thickness."""
+        if Tag.SYMMETRIC in self._map_of(body, DenseCholesky()).tags:
+            return ()
+        return thinness_warnings(body.own_mesh.unit, body.scene.discretisation.method)
 
     @cached_property
     def largest_matrix(self) -> int:
@@ -203,31 +218,8 @@ class Prepared:
 
     @cached_property
     def law(self) -> FrictionLaw:
-        """The friction law of the contact nodes, in physical units.
-
-        Raises
-        ------
-        LawError
-            If a coefficient is not finite or negative somewhere; the message names the contact.
-        """
-        laws: dict[object, tuple[FrictionLaw, list[IntArray]]] = {}
-        first = 0
-        for rows in self.rows:
-            numbers = first + np.arange(rows.n_contact)
-            first += rows.n_contact
-            for law, chosen in ((rows.law, ~rows.is_frictionless), (Frictionless(), rows.is_frictionless)):
-                if not chosen.any():
-                    continue
-                is_uniform = isinstance(law, LawOfCoefficients) and law.is_uniform
-                try:
-                    evaluated = law if is_uniform else law.at(rows.points[chosen])
-                except ValueError as error:
-                    kind = "part" if rows.other < 0 else "contact"
-                    raise LawError(f"{kind} {rows.name!r}: friction law: {error}") from error
-                laws.setdefault(law if is_uniform else first, (evaluated, []))[1].append(numbers[chosen])
-        if len(laws) < 2:
-            return next((law for law, _ in laws.values()), Frictionless())
-        return PiecewiseLaw(*zip(*((law, np.concatenate(nodes)) for law, nodes in laws.values()), strict=True))
+        """The friction law of the contact nodes, in physical units; see `law_of_rows`."""
+        return law_of_rows(self.rows)
 
     @property
     def tangent_follows(self) -> BoolArray:
@@ -301,7 +293,7 @@ class Prepared:
             replace(
                 rows,
                 gap=rows.gap + (two.gap_at(rows.points) - one.gap_at(rows.points)),
-                law=scene.law if two.law is None else two.law,
+                law=scene.law_of(two),
             )
             for rows, one, two in zip(self.rows, before, after, strict=False)
         )

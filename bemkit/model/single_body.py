@@ -33,7 +33,7 @@ def is_single(prepared: Prepared) -> bool:
     """
     if not prepared.n_contact:
         _check_without_nodes(prepared)
-    return prepared.has_obstacles_only
+    return prepared.scene.has_obstacles_only
 
 
 def _check_without_nodes(prepared: Prepared) -> None:

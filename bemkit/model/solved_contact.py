@@ -20,6 +20,7 @@ from bemkit.model.contacts import ContactRows
 from bemkit.model.fields import energy_beyond, map_fields
 from bemkit.model.model import Model
 from bemkit.model.prepared import PreparedBody
+from bemkit.operators.pair_form import Tag
 from bemkit.operators.rigid_modes import traction_free_modes
 from bemkit.operators.steklov_poincare import CondensedMap, SteklovPoincare
 from bemkit.result_warning import ResultWarning
@@ -161,7 +162,7 @@ def _negative_energy_of(
     if sensitivity is None:  # a node resists by about E' per displacement, for any elements around it
         sensitivity = np.full(displacement.shape, elastic.material.plane_modulus)
     # a symmetric map is negative in no direction but for round-off, which the work of the solution shows
-    if not body.scene.discretisation.is_symmetric and is_indefinite(condensed.stiffness, sensitivity):
+    if Tag.SYMMETRIC not in elastic.tags and is_indefinite(condensed.stiffness, sensitivity):
         return "the stiffness that the contact boundary sees is negative in some direction"
     return _negative_work(elastic, displacement, force, body.own_space, sensitivity)
 

@@ -119,13 +119,13 @@ def plan_steps(steps: Sequence[Prepared], proposal: Symmetry | None = None) -> P
     """
     first = steps[0]
     firsts = [int(group[0]) for group in groups(first.bodies)]
-    needs = [_needs(steps, number) for number in firsts]
+    needs, drawn = [_needs(steps, number) for number in firsts], [first.bodies[number] for number in firsts]
     sizes = find_sizes(first)
     linear_solver = first.linear_solver(max(first.bodies, key=lambda body: body.space.n_dofs))
     contact = _ContactSystem.of(first, sizes, is_matrix_free=any(each.is_matrix_free for each in needs))
     kept = sum(each.kept for each in needs)
     flops = sum(each.flops for each in needs) + CONTACT_STEPS * len(steps) * contact.flops
-    if first.has_obstacles_only:
+    if first.scene.has_obstacles_only:
         items = items_of_one(first.only.scene, sizes, needs[0].items, len(steps), proposal)
     else:
         items = tuple(items_of_several(first, sizes, len(steps), is_dense=contact.is_dense))
@@ -136,7 +136,7 @@ def plan_steps(steps: Sequence[Prepared], proposal: Symmetry | None = None) -> P
         memory=int(kept + max(contact.memory, *(each.memory - each.kept for each in needs))),
         seconds=LEAST_SECONDS + seconds_of(sum(each.evaluations for each in needs), flops),
         items=items,
-        warnings=tuple(dict.fromkeys(warning for each in needs for warning in each.warnings)),
+        warnings=tuple(dict.fromkeys(warning for body in drawn for warning in first.thinness_warnings(body))),
         is_compressed=linear_solver.hierarchical is not None,
     )
 
@@ -151,7 +151,7 @@ def _needs(steps: Sequence[Prepared], number: int) -> BodyNeeds:
         first.linear_solver(body),
         first.is_condensed,
     )
-    return body.scene.discretisation.needs(case)
+    return first.elastic_map(body).needs(case)
 
 
 @dataclass(frozen=True)
@@ -168,7 +168,7 @@ class _ContactSystem:
         n, u = sizes.n_contact_unknowns + sizes.n_free_motions, sizes.n_displacements
         if is_matrix_free or not prepared.n_contact:
             return cls(0.0, 0.0, is_dense=True)
-        if prepared.has_obstacles_only or n <= _most_dense():
+        if prepared.scene.has_obstacles_only or n <= _most_dense():
             flops = 2.0 / 3.0 * n**3 + _FLOPS_PER_NUMBER * (60.0 * n * n + u * u)
             return cls(6.0 * _BYTES * n**2, flops, is_dense=True)
         coupled = sum(int(np.count_nonzero(body.conditions.is_retained)) ** 2 for body in prepared.bodies)

@@ -130,7 +130,7 @@ def _of_bodies(stated: Scene) -> Iterator[Method]:
 def _of_discretisation(discretisation: Discretisation, *, has_layers: bool) -> Iterator[Method]:
     if isinstance(discretisation, ConstantCollocation):
         yield Method("collocation with constant elements", ("Paper", "Somigliana1885", "Betti1872"))
-    elif discretisation.is_symmetric:
+    elif isinstance(discretisation, Galerkin):
         yield Method("symmetric Galerkin boundary elements", ("Paper", "Steinbach2008", "SauterSchwab2011", "Han1994"))
     else:
         yield Method(f"{discretisation.method} of {type(discretisation).__module__}", ())

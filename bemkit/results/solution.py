@@ -135,7 +135,7 @@ class Solution(SolvedScene, Explorable):
             float(np.sum(body.element_errors)) for body in self.bodies.values() if body.element_errors is not None
         ]
         unit = sum(body.error_unit for body in self.bodies.values())
-        if len(errors) < len(self.bodies.values()):
+        if len(errors) < len(self.bodies):
             return None
         if max(sum(errors), unit) <= sum(body.energy_of_round_off for body in self.bodies.values()):
             return 0.0

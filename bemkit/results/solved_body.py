@@ -12,6 +12,8 @@ from bemkit.arrays import BoolArray, FloatArray, read_only
 from bemkit.errors import InputError
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.spaces import ConstantSpace
+from bemkit.operators.linear.solvers import DenseCholesky
+from bemkit.operators.pair_form import Tag
 from bemkit.scene.body_scene import BodyScene
 from bemkit.scene.conditions import Clamped, Load, PrescribedDisplacement, Roller
 
@@ -127,6 +129,11 @@ class SolvedBody:
     def contact_name(self, part: str) -> str:
         """Return the name of the contact of a part with a fixed obstacle: ``"body.part"``."""
         return f"{self.name}.{part}" if self.name else part
+
+    @cached_property
+    def map_tags(self) -> frozenset[Tag]:
+        """Promises of its elastic map: whether it is symmetric, and which motions cause no forces."""
+        return self.scene.discretisation.elastic_map(self.mesh, self.scene.material, DenseCholesky()).tags
 
     @cached_property
     def particular(self) -> ParticularFields | None:

@@ -13,6 +13,7 @@ from bemkit.geometry.local_values import values_on_elements
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.neighbours import break_nodes
 from bemkit.geometry.vectors import norms
+from bemkit.operators.pair_form import Tag
 from bemkit.operators.rigid_modes import without_motion
 from bemkit.result_warning import ResultWarning, first_of_each_kind
 from bemkit.results.between_nodes import BetweenNodes
@@ -183,9 +184,9 @@ def _without_estimate(body: SolvedBody) -> Iterator[ResultWarning]:
 
 def _turned(body: SolvedBody) -> Iterator[ResultWarning]:
     """Warn of constant elements without slopes, which take rotation for strain, if the rotation is larger."""
-    discretisation, mesh = body.scene.discretisation, body.mesh
-    if discretisation.keeps_rotations:
+    if Tag.KILLS_TRANSLATIONS not in body.map_tags:
         return
+    mesh = body.mesh
     points, displacement = body.boundary.points, body.boundary.displacement
     strained = without_motion(mesh, points, displacement)
     motion = displacement - strained

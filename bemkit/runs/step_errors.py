@@ -86,7 +86,7 @@ class StepErrors:
     @cached_property
     def surface(self) -> SurfaceErrors | None:
         """Errors of the tractions of a half-plane that is the only body; None of other bodies."""
-        if len(self.worst.bodies.values()) > 1:
+        if len(self.worst.bodies) > 1:
             return None
         errors = [step.body.surface_errors for step in self.steps]
         known = [each for each in errors if each is not None]

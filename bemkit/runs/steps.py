@@ -66,7 +66,7 @@ def checked(model: Model, result: ContactSolution) -> ContactSolution:
         from bemkit.model.turning import with_turning_checked
 
         result = with_turning_checked(model, result)
-    if model.prepared.has_obstacles_only:
+    if model.prepared.scene.has_obstacles_only:
         return result
     from bemkit.model.finite_sliding import with_sliding_checked
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import lru_cache
 from typing import Protocol
 
@@ -15,34 +15,22 @@ from bemkit.geometry.errors import GeometryError
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.neighbours import break_nodes
 from bemkit.geometry.spaces import BoundarySpace, ConstantSpace, LagrangeSpace, check_degree
-from bemkit.operators.linear.solvers import ChosenLinearSolver, DenseCholesky, Hierarchical, LinearSolver, MatrixFree
+from bemkit.operators.linear.solvers import LinearSolver
 from bemkit.operators.material import Material
 from bemkit.operators.steklov_poincare import SteklovPoincare
-from bemkit.operators.steklov_poincare.needs import BodyCase, BodyNeeds, collocation_needs, galerkin_needs
-from bemkit.scene.mesh_options import thinness_warnings
 
 
 class Discretisation(Protocol):
     """Spaces of displacements and tractions, and the map between them; a frozen dataclass without a mesh.
 
-    A discretisation of your own derives from this class, or from `SymmetricGalerkin`, and writes the members without a
-    default; `bemkit.testing.check_discretisation` proves its promises.
+    A discretisation of your own derives from this class and writes the members without a default;
+    `bemkit.testing.check_discretisation` proves its promises.
     """
 
     @property
     def method(self) -> str:
         """Name of the method in messages; by default that of the class."""
         return type(self).__name__
-
-    @property
-    def is_symmetric(self) -> bool:
-        """Whether the map is symmetric and positive semidefinite, and follows the linear solver of the scene."""
-        return False
-
-    @property
-    def keeps_rotations(self) -> bool:
-        """Whether rotations cause no forces."""
-        return True
 
     @property
     def estimates_error(self) -> bool:
@@ -62,80 +50,19 @@ class Discretisation(Protocol):
 
     @abstractmethod
     def elastic_map(self, mesh: BoundaryMesh, material: Material, linear_solver: LinearSolver) -> SteklovPoincare:
-        """Return the map from the displacements to the forces of a body.
+        """Return the map from the displacements to the forces of a body; nothing is assembled yet.
 
         Parameters
         ----------
         mesh : BoundaryMesh
         material : Material
         linear_solver : LinearSolver
-            To be used if `is_symmetric`.
+            To be used if the map is symmetric.
         """
-
-    def why_dense(self, mesh: BoundaryMesh) -> str:
-        """Return why the equations on a mesh cannot be compressed over a tree; empty if `hierarchical_map` does it."""
-        return f"{self.method} has no such equations"
-
-    def may_be_negative(self, mesh: BoundaryMesh) -> bool:
-        """Whether the elastic energy may be negative on a mesh, so that the stiffness has to be examined."""
-        return False
-
-    def hierarchical_map(
-        self, mesh: BoundaryMesh, material: Material, options: Hierarchical | MatrixFree
-    ) -> SteklovPoincare:
-        """Return the map with its equations compressed or not stored; `elastic_map` unless `why_dense` is empty."""
-        return self.elastic_map(mesh, material, DenseCholesky())
-
-    def chosen_map(self, mesh: BoundaryMesh, material: Material, chosen: ChosenLinearSolver) -> SteklovPoincare:
-        """Return the map with the linear solver that was chosen for it."""
-        if chosen.hierarchical is None:
-            return self.elastic_map(mesh, material, chosen.solver)
-        return self.hierarchical_map(mesh, material, chosen.hierarchical)
-
-    def needs(self, case: BodyCase) -> BodyNeeds:
-        """Return counts, memory and time that the map will take, for the plan; by default none are predicted."""
-        return BodyNeeds()
-
-
-class SymmetricGalerkin(Discretisation, Protocol):
-    """The symmetric Galerkin method; a discretisation of your own writes its two spaces.
-
-    Displacements are continuous; tractions may jump where boundary parts end and the boundary has corners, at least.
-    """
-
-    @property
-    def method(self) -> str:
-        """Galerkin."""
-        return "Galerkin"
-
-    @property
-    def is_symmetric(self) -> bool:
-        """True."""
-        return True
-
-    def elastic_map(self, mesh: BoundaryMesh, material: Material, linear_solver: LinearSolver) -> SteklovPoincare:
-        """Return the Galerkin map of the two spaces; of a half-plane the one of its surface."""
-        if mesh.surface is not None:
-            from bemkit.operators.half_plane.maps import half_plane_map
-
-            return half_plane_map(mesh, material)
-        from bemkit.operators.steklov_poincare.galerkin import GalerkinElasticity
-
-        displacements, tractions = self.displacement_space(mesh), self.traction_space(mesh)
-        return GalerkinElasticity(mesh, material, displacements, tractions, linear_solver)
-
-    def needs(self, case: BodyCase) -> BodyNeeds:
-        """Return counts, memory and time of the Galerkin map."""
-        if case.mesh.surface is not None:
-            from bemkit.operators.half_plane.maps import half_plane_needs
-
-            return half_plane_needs(case)
-        degree = self.displacement_space(case.mesh).degree
-        return galerkin_needs(case, self.traction_space(case.mesh).n_dofs, degree)
 
 
 @dataclass(frozen=True)
-class Galerkin(SymmetricGalerkin):
+class Galerkin(Discretisation):
     """Symmetric Galerkin: displacements continuous and of degree p, tractions of degree p - 1 on each element.
 
     Tractions are constant on each element for p = 1, else continuous except at corners and at ends of boundary parts.
@@ -198,6 +125,17 @@ class Galerkin(SymmetricGalerkin):
         """Return functions of one degree less, which may jump at corners and at ends of parts, or constants."""
         return _galerkin_tractions(self, mesh)
 
+    def elastic_map(self, mesh: BoundaryMesh, material: Material, linear_solver: LinearSolver) -> SteklovPoincare:
+        """Return the Galerkin map of the two spaces; of a half-plane the one of its surface."""
+        if mesh.surface is not None:
+            from bemkit.operators.half_plane.maps import half_plane_map
+
+            return half_plane_map(mesh, material)
+        from bemkit.operators.steklov_poincare.galerkin import GalerkinElasticity
+
+        displacements, tractions = self.displacement_space(mesh), self.traction_space(mesh)
+        return GalerkinElasticity(mesh, material, displacements, tractions, linear_solver)
+
     def degrees_on(self, mesh: BoundaryMesh) -> IntArray | None:
         """Return the degrees (n_elements,) of the elements of a mesh; None if all are equal."""
         if not isinstance(self.degree, tuple):
@@ -250,11 +188,6 @@ class ConstantCollocation(Discretisation):
         """Collocation."""
         return "collocation"
 
-    @property
-    def keeps_rotations(self) -> bool:
-        """True with slopes only."""
-        return self.slopes
-
     def displacement_space(self, mesh: BoundaryMesh) -> BoundarySpace:
         """Return the constants on elements; their nodes are the centres."""
         return ConstantSpace(mesh)
@@ -268,33 +201,3 @@ class ConstantCollocation(Discretisation):
         from bemkit.operators.steklov_poincare.collocation import CollocationElasticity
 
         return CollocationElasticity(mesh, material, slopes=self.slopes)
-
-    def why_dense(self, mesh: BoundaryMesh) -> str:
-        """Return no reason: collocation can always be compressed."""
-        return ""
-
-    def may_be_negative(self, mesh: BoundaryMesh) -> bool:
-        """Whether elements are too long for the thickness of the body."""
-        return bool(thinness_warnings(mesh))
-
-    def hierarchical_map(
-        self, mesh: BoundaryMesh, material: Material, options: Hierarchical | MatrixFree
-    ) -> SteklovPoincare:
-        """Return the map whose equations are compressed or not stored."""
-        from bemkit.operators.steklov_poincare.hierarchical import HierarchicalCollocation
-
-        return HierarchicalCollocation(mesh, material, options, slopes=self.slopes)
-
-    def needs(self, case: BodyCase) -> BodyNeeds:
-        """Return counts, memory and time of collocation, with a warning if the body is thin for its elements."""
-        if case.linear_solver.hierarchical is None:
-            needs = collocation_needs(case, takes_slopes=self.slopes)
-        elif isinstance(case.linear_solver.hierarchical, MatrixFree):
-            from bemkit.operators.steklov_poincare.matrix_free_needs import matrix_free_needs
-
-            needs = matrix_free_needs(case, case.linear_solver.hierarchical, takes_slopes=self.slopes)
-        else:
-            from bemkit.operators.steklov_poincare.hierarchical_needs import hierarchical_needs
-
-            needs = hierarchical_needs(case, takes_slopes=self.slopes)
-        return replace(needs, warnings=thinness_warnings(case.mesh))

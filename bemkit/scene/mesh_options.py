@@ -118,8 +118,8 @@ class MeshOptions:
 
 
 @lru_cache(maxsize=4)  # the plan and the choice of a linear solver ask for it, and it takes a while on large meshes
-def thinness_warnings(mesh: BoundaryMesh) -> tuple[ResultWarning, ...]:
-    """Warn if elements of collocation are too long for the thickness of the body."""
+def thinness_warnings(mesh: BoundaryMesh, method: str) -> tuple[ResultWarning, ...]:
+    """Warn if elements of a method such as collocation are too long for the thickness of the body."""
     if mesh.is_exterior:
         return ()
     longest = mesh.lengths / thicknesses(mesh, mesh.lengths / _LONGEST)
@@ -128,7 +128,7 @@ def thinness_warnings(mesh: BoundaryMesh) -> tuple[ResultWarning, ...]:
         return ()
     factor = float(np.median(longest[is_thin])) / _LONGEST
     text = (
-        f"collocation: on {int(np.count_nonzero(is_thin))} of {mesh.n_elements} elements the body is thinner than the "
+        f"{method}: on {int(np.count_nonzero(is_thin))} of {mesh.n_elements} elements the body is thinner than the "
         f"elements are long, and bends too stiffly: take {factor:.1f} times as many elements, or quadratic Galerkin"
     )
     return (ResultWarning("thin body", "", text, factor),)

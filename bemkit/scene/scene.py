@@ -37,6 +37,8 @@ from bemkit.scene.unit_names import UnitNames
 from bemkit.solvers.base import ContactSolver
 from bemkit.solvers.fallbacks import Fallbacks
 
+_OF_COPY = ("name", "placement", "copies")
+"""Fields of a body in which its copies differ."""
 OF_ONE_BODY = ("shape", "material", "parts", "body_forces", "far")
 """Fields of the short form."""
 OF_SEVERAL = ("bodies", "rigid", "contacts", "touching")
@@ -317,17 +319,10 @@ class Scene(ShownInNotebooks):
         Its shape is in the coordinates of the body; loads, given displacements and obstacles are those in its place.
         Copies without moments share one, and so do bodies that are made of the same objects.
         """
-        stated = (body.shape, body.mesh, body.discretisation, *body.parts, None, *body.body_forces)
-        key = (
-            *(id(entry) for entry in stated),
-            body.material,
-            body.far,
-            self.touching_parts(body),
-            self._lines_across(body),
-            body.placement
-            if any(isinstance(part.condition, Force) and part.condition.moment for part in body.parts)
-            else None,
-        )
+        has_moment = any(isinstance(part.condition, Force) and part.condition.moment for part in body.parts)
+        own = [getattr(body, each.name) for each in fields(body) if each.name not in _OF_COPY]
+        placement = body.placement if has_moment else None
+        key = (*map(_identity, own), self.touching_parts(body), self._lines_across(body), placement)
         if key not in self._scenes:
             self._scenes[key] = self._new_scene(body)
         return self._scenes[key]
@@ -372,6 +367,13 @@ class Scene(ShownInNotebooks):
     def with_contacts(self, contacts: tuple[ContactPair, ...]) -> Scene:
         """Return the scene with all its contacts listed."""
         return replace(self, contacts=contacts, touching=None)
+
+
+def _identity(value: object) -> object:
+    """Return what values share that are taken for one: numbers are compared, other objects must be the same."""
+    if isinstance(value, tuple):
+        return tuple(id(entry) for entry in value)
+    return value if isinstance(value, Material | FarField) else id(value)
 
 
 def _check_among_others(body: Body, scene: BodyScene) -> None:

@@ -19,6 +19,7 @@ from bemkit.model.model import build_model
 from bemkit.model.prepared import prepare
 from bemkit.model.shapes import NotSentError
 from bemkit.operators.linear.dense import SingularMatrixError
+from bemkit.operators.steklov_poincare.galerkin import GalerkinElasticity
 from bemkit.results.solution import Solution
 
 SAME = 1e-9
@@ -148,7 +149,19 @@ class Fading(bk.Galerkin):
         super().__init__(1)
         object.__setattr__(self, "secret", secret)
 
-    def chosen_map(self, *arguments: Any) -> Any:
+    def elastic_map(self, *arguments: Any) -> Any:
+        """Return a map that leaves."""
+        elastic = FadingMap(*arguments[:2])
+        elastic.secret = vars(self)["secret"]
+        return elastic
+
+
+class FadingMap(GalerkinElasticity):
+    """A map that ends another process."""
+
+    secret: Any
+
+    def condense(self, *arguments: Any) -> Any:
         """Leave, if this is another process."""
         assert parent_process() is not None
         os._exit(1)
@@ -157,7 +170,15 @@ class Fading(bk.Galerkin):
 class Loose(bk.Galerkin):
     """Elements of bodies that nothing holds."""
 
-    def chosen_map(self, *arguments: Any) -> Any:
+    def elastic_map(self, *arguments: Any) -> Any:
+        """Return a map that refuses."""
+        return LooseMap(*arguments[:2])
+
+
+class LooseMap(GalerkinElasticity):
+    """A map that cannot be condensed."""
+
+    def condense(self, *arguments: Any) -> Any:
         """Refuse."""
         raise SingularMatrixError("nothing holds it")
 

@@ -15,12 +15,13 @@ from bemkit.arrays import FloatArray
 from bemkit.cli.main import main
 from bemkit.geometry.spaces import BoundarySpace, ConstantSpace, LinearSpace, QuadraticSpace
 from bemkit.operators.linear.solvers import LinearSolver
+from bemkit.operators.pair_form import Tag
 from bemkit.operators.steklov_poincare import CondensedMap
 from bemkit.operators.steklov_poincare.collocation import CollocationElasticity
 from bemkit.operators.steklov_poincare.galerkin import GalerkinElasticity
 from bemkit.operators.steklov_poincare.needs import BodyCase, BodyNeeds
 from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions
-from bemkit.scene.discretisation import Discretisation, SymmetricGalerkin
+from bemkit.scene.discretisation import Discretisation
 from bemkit.scene.registry import DISCRETISATIONS
 from bemkit.testing import CheckFailed, check_discretisation
 from tests.slow import slow_except
@@ -29,10 +30,11 @@ PLUGIN = """
 from dataclasses import dataclass
 import numpy as np
 from bemkit.geometry.spaces import LinearSpace, QuadraticSpace
-from bemkit.scene.discretisation import SymmetricGalerkin
+from bemkit.operators.steklov_poincare.galerkin import GalerkinElasticity
+from bemkit.scene.discretisation import Discretisation
 
 @dataclass(frozen=True)
-class Jumping(SymmetricGalerkin):
+class Jumping(Discretisation):
     everywhere: bool = True
 
     def displacement_space(self, mesh):
@@ -40,6 +42,10 @@ class Jumping(SymmetricGalerkin):
 
     def traction_space(self, mesh):
         return LinearSpace(mesh, np.full(mesh.n_nodes, self.everywhere))
+
+    def elastic_map(self, mesh, material, linear_solver):
+        spaces = self.displacement_space(mesh), self.traction_space(mesh)
+        return GalerkinElasticity(mesh, material, *spaces, linear_solver)
 """
 
 
@@ -100,7 +106,7 @@ def test_one_without_a_word_is_shown_by_its_name(capsys: pytest.CaptureFixture[s
 
 
 @dataclass(frozen=True)
-class Own(SymmetricGalerkin):
+class Own(Discretisation):
     """Quadratic displacements with linear tractions that may jump at every node."""
 
     def displacement_space(self, mesh: bk.BoundaryMesh) -> BoundarySpace:
@@ -111,14 +117,24 @@ class Own(SymmetricGalerkin):
         """Return linear functions without any continuity."""
         return LinearSpace(mesh, np.ones(mesh.n_nodes, bool))
 
+    def elastic_map(
+        self, mesh: bk.BoundaryMesh, material: bk.Material, linear_solver: LinearSolver
+    ) -> GalerkinElasticity:
+        """Return the Galerkin map of these spaces."""
+        return GalerkinElasticity(
+            mesh, material, self.displacement_space(mesh), self.traction_space(mesh), linear_solver
+        )
 
-class NoDataclass(SymmetricGalerkin):
+
+class NoDataclass(Discretisation):
     displacement_space, traction_space = Own.displacement_space, Own.traction_space
+    elastic_map = Own.elastic_map
 
 
 @dataclass(frozen=True, eq=False)
-class UnlikeItsCopy(SymmetricGalerkin):
+class UnlikeItsCopy(Discretisation):
     displacement_space, traction_space = Own.displacement_space, Own.traction_space
+    elastic_map = Own.elastic_map
 
 
 @dataclass(frozen=True)
@@ -128,7 +144,7 @@ class Nameless(Own):
 
 @dataclass(frozen=True)
 class Vague(Own):
-    is_symmetric = None  # type: ignore[assignment]
+    estimates_error = None  # type: ignore[assignment]
 
 
 @dataclass(frozen=True)
@@ -147,15 +163,44 @@ class TooHigh(Own):
         return ConstantSpace(mesh)
 
 
-@dataclass(frozen=True)
-class Uncounted(Own):
+class Unforeseen(CollocationElasticity):
+    """Predicts nothing."""
+
     def needs(self, case: BodyCase) -> BodyNeeds:
+        """Return nothing."""
         return BodyNeeds()
 
 
 @dataclass(frozen=True)
+class Uncounted(bk.ConstantCollocation):
+    def elastic_map(self, mesh: bk.BoundaryMesh, material: bk.Material, linear_solver: LinearSolver) -> Unforeseen:
+        return Unforeseen(mesh, material)
+
+
+class Promising(CollocationElasticity):
+    """Promises what collocation without slopes does not keep."""
+
+    promise: Tag
+
+    @property
+    def tags(self) -> frozenset[Tag]:
+        """Return one promise."""
+        return frozenset({self.promise})
+
+
+@dataclass(frozen=True)
 class NotSymmetric(bk.ConstantCollocation):
-    is_symmetric = True
+    promise = Tag.SYMMETRIC
+
+    def elastic_map(self, mesh: bk.BoundaryMesh, material: bk.Material, linear_solver: LinearSolver) -> Promising:
+        elastic = Promising(mesh, material, slopes=False)
+        elastic.promise = self.promise
+        return elastic
+
+
+@dataclass(frozen=True)
+class Turning(NotSymmetric):
+    promise = Tag.KILLS_RIGID_MOTIONS
 
 
 class Distorted(CollocationElasticity):
@@ -201,11 +246,12 @@ class HalfTheTractions(bk.ConstantCollocation):
         (NoDataclass(), "NoDataclass is not a dataclass"),
         (UnlikeItsCopy(), "UnlikeItsCopy does not equal its copy"),
         (Nameless(), "Nameless.method is empty"),
-        (Vague(), "Vague.is_symmetric is None, not a bool"),
+        (Vague(), "Vague.estimates_error is None, not a bool"),
         (OtherSpace(), "OtherSpace.displacement_space is not the displacement_space of its map"),
         (TooHigh(), r"TooHigh.estimates_error is True with .* of the degrees \(2, 0\)"),
-        (Uncounted(), "Uncounted.needs foresees .*'element_pairs': 0.*, but its map counts"),
-        (NotSymmetric(), "NotSymmetric.is_symmetric is True, but the map differs from its transpose by"),
+        (Uncounted(), "Uncounted.elastic_map: its needs foresee .*'element_pairs': 0.*, but it counts"),
+        (NotSymmetric(), "NotSymmetric.elastic_map says it is symmetric: it differs from its transpose by"),
+        (Turning(), "Turning.elastic_map says it is zero on rigid motions: a turn causes"),
         (Springs(), "Springs.elastic_map: a translation causes forces"),
         (Softer(), "Softer: displacements under uniform tension are wrong by 2.*e-01"),
         (HalfTheTractions(), "HalfTheTractions: stresses inside under uniform tension are wrong"),

@@ -74,9 +74,9 @@ class CondensedHalfPlane:
             stiffness = factor.solve(np.eye(acting.size))
             stiffness = 0.5 * (stiffness + stiffness.T)
         driven = motions[acting][:, list(drive.driven)]
-        held, resistance = stiffness @ driven, np.eye(len(drive.driven))
-        if driven.size:
-            resistance = driven.T @ held
+        held = stiffness @ driven
+        # a half-plane that nothing touches is not driven against anything
+        resistance = driven.T @ held if acting.size else np.eye(len(drive.driven))
         spread = np.linalg.solve(resistance, held.T).T
         stiffness = stiffness - spread @ held.T
         stiffness = 0.5 * (stiffness + stiffness.T)

@@ -8,9 +8,11 @@ from functools import cached_property
 import numpy as np
 
 from bemkit.arrays import ComplexArray, FloatArray
-from bemkit.operators.counts import Entries, Factorisation, FactorKind, OperationCounts
+from bemkit.operators.counts import OperationCounts
 from bemkit.operators.half_plane.flexibility import mean_logarithms
+from bemkit.operators.half_plane.needs import half_plane_work, strip_needs
 from bemkit.operators.half_plane.surface import SurfaceElasticity
+from bemkit.operators.steklov_poincare.needs import BodyCase, BodyNeeds
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,6 +35,10 @@ class HalfPlaneElasticity(SurfaceElasticity):
         """Operation counts of the flexibility."""
         return half_plane_work(self.mesh.n_elements)
 
+    def needs(self, case: BodyCase) -> BodyNeeds:
+        """Return counts, memory and time of the map."""
+        return strip_needs(case, has_tree=False)
+
     def _displaced(self, traction: ComplexArray) -> ComplexArray:
         force = self.mesh.lengths * traction
         along = self.flexibility @ np.stack([force.real, force.imag], axis=1)
@@ -48,13 +54,3 @@ class HalfPlaneElasticity(SurfaceElasticity):
         across = 0.5 * self.material.plane_compressibility * np.sign(order[:, None] - order)
         local = np.array([[self.flexibility, across], [-across, self.flexibility]])  # by components t and n
         return self.full_from_local(local)
-
-
-def half_plane_work(n_elements: int, n_acting: int = 0) -> OperationCounts:
-    """Return what a flexibility takes, and its inverse on `n_acting` directions that are retained or fixed."""
-    return OperationCounts(
-        element_pairs=n_elements**2,
-        single_layer=Entries.full(n_elements, n_elements),
-        factorisations=(Factorisation(FactorKind.CHOLESKY, n_acting),) if n_acting else (),
-        right_hand_sides=n_acting,
-    )

@@ -13,8 +13,10 @@ from bemkit.operators.counts import OperationCounts
 from bemkit.operators.half_plane.elasticity import HalfPlaneElasticity
 from bemkit.operators.half_plane.equations import HalfPlaneEquations, StripView, potential_of
 from bemkit.operators.half_plane.far_drive import FarDrive
+from bemkit.operators.half_plane.needs import strip_needs
 from bemkit.operators.hierarchy.factor import Factor
 from bemkit.operators.hierarchy.tree import ClusterTree
+from bemkit.operators.steklov_poincare.needs import BodyCase, BodyNeeds
 
 _LEAF = 96
 """Elements of a leaf."""
@@ -36,6 +38,10 @@ class LargeHalfPlane(HalfPlaneElasticity):
     def work(self) -> OperationCounts:
         """Nothing is counted: no whole matrix is formed."""
         return OperationCounts()
+
+    def needs(self, case: BodyCase) -> BodyNeeds:
+        """Return memory and time of the map."""
+        return strip_needs(case, has_tree=True)
 
     @cached_property
     def factor(self) -> Factor:

@@ -15,8 +15,10 @@ import numpy as np
 
 from bemkit.arrays import ComplexArray, FloatArray
 from bemkit.errors import InputError
+from bemkit.operators.half_plane.needs import periodic_needs
 from bemkit.operators.half_plane.surface import SurfaceElasticity
 from bemkit.operators.material import Material
+from bemkit.operators.steklov_poincare.needs import BodyCase, BodyNeeds
 
 _EQUAL = 1e-6
 """Relative difference of the lengths of equal elements: numbers hold those of a million elements to 1e-10."""
@@ -64,6 +66,10 @@ class PeriodicElasticity(SurfaceElasticity):
                 f"elements of a periodic half-plane have lengths from {lengths.min():.4g} to {lengths.max():.4g} of a "
                 "period: remove the grading, and let parts end where equal elements do"
             )
+
+    def needs(self, case: BodyCase) -> BodyNeeds:
+        """Return memory and time of the map."""
+        return periodic_needs(case)
 
     @cached_property
     def flexibility(self) -> FloatArray:

@@ -18,6 +18,8 @@ from bemkit.geometry.spaces import ConstantSpace, dof_points
 from bemkit.operators.counts import Factorisation, FactorKind, OperationCounts
 from bemkit.operators.half_plane.far_drive import FarDrive
 from bemkit.operators.material import Material
+from bemkit.operators.pair_form import Tag
+from bemkit.operators.steklov_poincare.needs import BodyCase, BodyNeeds
 from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions
 from bemkit.operators.steklov_poincare.protocol import CondensedMap
 
@@ -56,6 +58,15 @@ class SurfaceElasticity(ABC):
     @abstractmethod
     def flexibility(self) -> FloatArray:
         """Displacements by tractions, without the rigid motion far away; computed once."""
+
+    @property
+    def tags(self) -> frozenset[Tag]:
+        """Symmetric."""
+        return frozenset({Tag.SYMMETRIC})
+
+    @abstractmethod
+    def needs(self, case: BodyCase) -> BodyNeeds:
+        """Return counts, memory and time of the map."""
 
     @property
     def work(self) -> OperationCounts:

@@ -16,12 +16,10 @@ from bemkit.operators.linear.dense import DenseLU
 from bemkit.operators.linear.threads import for_each_chunk
 from bemkit.operators.material import Material
 from bemkit.operators.pair_form import Tag
+from bemkit.operators.steklov_poincare.needs import CHUNK_PAIRS, BodyCase, BodyNeeds, collocation_needs
 from bemkit.operators.steklov_poincare.nodal_conditions import GivenData, NodalConditions, rotate_columns
 from bemkit.operators.steklov_poincare.protocol import CondensedMap
 from bemkit.stopwatch import assembling
-
-CHUNK_PAIRS = 32768
-"""Pairs of a midpoint and an element that are evaluated at a time on each thread."""
 
 
 class CollocationElasticity:
@@ -60,6 +58,10 @@ class CollocationElasticity:
         if self.mesh.is_exterior:
             return frozenset()
         return frozenset({Tag.KILLS_RIGID_MOTIONS if self.slopes else Tag.KILLS_TRANSLATIONS})
+
+    def needs(self, case: BodyCase) -> BodyNeeds:
+        """Return counts, memory and time of the map."""
+        return collocation_needs(case, takes_slopes=self.slopes)
 
     def stiffness(self) -> FloatArray:
         """Return S, (n_dofs, n_dofs) [Pa]: the stiffness when all displacements are retained."""

@@ -18,12 +18,14 @@ from bemkit.geometry.local_values import values_on_elements
 from bemkit.geometry.quadrature import gauss_legendre
 from bemkit.geometry.spaces import BoundarySpace, dof_points
 from bemkit.operators.material import Material
+from bemkit.operators.pair_form import Tag
 from bemkit.operators.rigid_modes import without_motion
 from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions, integrate_traction
 from bemkit.operators.steklov_poincare.protocol import CondensedMap, SteklovPoincare
 
 if TYPE_CHECKING:
     from bemkit.operators.particular_solutions import ParticularSolution
+    from bemkit.operators.steklov_poincare.needs import BodyCase, BodyNeeds
 
 _MORE_POINTS = 5
 
@@ -188,6 +190,15 @@ class HeavyElasticity:
         """The space of the tractions."""
         return self.weightless.traction_space
 
+    @property
+    def tags(self) -> frozenset[Tag]:
+        """Those of the map without forces inside."""
+        return self.weightless.tags
+
+    def needs(self, case: BodyCase) -> BodyNeeds:
+        """Return the costs of the map without forces inside."""
+        return self.weightless.needs(case)
+
     def condense(self, conditions: NodalConditions, force: FloatArray) -> CondensedMap:
         """Condense the map without forces inside, and add these; see `SteklovPoincare.condense`."""
         return self.inside.add_to(self.weightless.condense(*self.inside.left_of(conditions, force)), conditions)
@@ -241,6 +252,11 @@ class HeavyElasticity:
         measure = space.mesh.jacobian(elements, xi) * weights
         of_heat = integrate_traction(moved_space, elements, inside.solution.expansions.traction)
         return at_nodes, np.einsum("eq,lq,eqc->elc", measure, space.basis(xi), rest, optimize=True), of_heat
+
+
+def under_forces_inside(elastic: SteklovPoincare, inside: ForcesInside | None) -> SteklovPoincare:
+    """Return a map under forces inside the body, the map itself if there are none."""
+    return elastic if inside is None else HeavyElasticity(elastic, inside)
 
 
 def projected_tractions(solution: ParticularSolution, space: BoundarySpace) -> FloatArray:

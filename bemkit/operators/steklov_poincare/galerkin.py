@@ -31,6 +31,7 @@ from bemkit.operators.material import Material
 from bemkit.operators.pair_form import Tag
 from bemkit.operators.rigid_modes import traction_free_modes
 from bemkit.operators.steklov_poincare.layer_operators import assemble_layers, dilatation_of
+from bemkit.operators.steklov_poincare.needs import BodyCase, BodyNeeds, galerkin_needs
 from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions, integrate_traction
 from bemkit.operators.steklov_poincare.protocol import CondensedMap
 from bemkit.operators.steklov_poincare.schur import SchurCondensation
@@ -118,6 +119,10 @@ class GalerkinElasticity:
         """Symmetric and semidefinite; the kernel are the rigid motions that the space holds, of a bounded body."""
         tags = {Tag.SYMMETRIC, Tag.POSITIVE_SEMIDEFINITE}
         return frozenset(tags if self.mesh.is_exterior else tags | {Tag.KILLS_RIGID_MOTIONS})
+
+    def needs(self, case: BodyCase) -> BodyNeeds:
+        """Return counts, memory and time of the map."""
+        return galerkin_needs(case, self.traction_space.n_dofs, self.displacement_space.degree)
 
     @cached_property
     def factors(self) -> GalerkinFactors:

@@ -18,6 +18,8 @@ from bemkit.operators.linear.dense import SingularMatrixError
 from bemkit.operators.linear.solvers import Hierarchical, MatrixFree
 from bemkit.operators.material import Material
 from bemkit.operators.steklov_poincare.collocation import CollocationElasticity
+from bemkit.operators.steklov_poincare.hierarchical_needs import hierarchical_needs
+from bemkit.operators.steklov_poincare.needs import BodyCase, BodyNeeds
 from bemkit.operators.steklov_poincare.nodal_conditions import GivenData, NodalConditions, free_modes, turning
 from bemkit.operators.steklov_poincare.protocol import CondensedMap
 
@@ -88,6 +90,19 @@ class HierarchicalCollocation(CollocationElasticity):
     ) -> None:
         super().__init__(mesh, material, slopes=slopes)
         self.options = options
+
+    @classmethod
+    def of(cls, elastic: CollocationElasticity, options: Hierarchical | MatrixFree) -> HierarchicalCollocation:
+        """Return a map with the equations of another one."""
+        return cls(elastic.mesh, elastic.material, options, slopes=elastic.slopes)
+
+    def needs(self, case: BodyCase) -> BodyNeeds:
+        """Return memory and time of the map; ranks, and with them counts, are not predicted."""
+        if isinstance(self.options, MatrixFree):
+            from bemkit.operators.steklov_poincare.matrix_free_needs import matrix_free_needs
+
+            return matrix_free_needs(case, self.options, takes_slopes=self.slopes)
+        return hierarchical_needs(case, self.options, takes_slopes=self.slopes)
 
     def system(self, conditions: NodalConditions, may_be_loaded: BoolArray, may_move: BoolArray) -> HierarchicalSystem:
         """Return the equations in the frames of the elements, compressed or not stored.

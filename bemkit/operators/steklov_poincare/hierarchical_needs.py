@@ -154,14 +154,8 @@ def _gain(
     return f"compressed over a tree they would take {share:.2g} times as long"
 
 
-def _options(case: BodyCase) -> Hierarchical:
-    chosen = case.linear_solver.hierarchical
-    return chosen if isinstance(chosen, Hierarchical) else Hierarchical()
-
-
-def hierarchical_needs(case: BodyCase, *, takes_slopes: bool) -> BodyNeeds:
+def hierarchical_needs(case: BodyCase, options: Hierarchical, *, takes_slopes: bool) -> BodyNeeds:
     """Return the costs of the compressed equations, without counts, because ranks are not predicted."""
-    options = _options(case)
     slopes = "rotations then cause no tractions" if takes_slopes else "the method of the source paper"
     reason = f"compressed over a tree to {options.tolerance:g}: {case.linear_solver.reason}"
     items = (

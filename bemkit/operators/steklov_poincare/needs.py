@@ -20,13 +20,14 @@ from bemkit.operators.linear.threads import n_threads
 from bemkit.operators.material import Material
 from bemkit.operators.rigid_modes import admissible_modes
 from bemkit.operators.steklov_poincare.nodal_conditions import GivenData, NodalConditions
-from bemkit.result_warning import ResultWarning
 
 _BYTES = 8
 CONTACT_STEPS = 8
 """Steps of Newton's method for a contact problem; they hardly depend on its size."""
 _SECONDS_PER_EVALUATION, _SECONDS_PER_FLOP = 2e-8, 1e-10
 """Seconds of a common computer for a closed-form integral, and for a flop of a factorisation."""
+CHUNK_PAIRS = 32768
+"""Pairs of a midpoint and an element that collocation evaluates at a time on each thread."""
 _OWN_SOLVER = ChosenLinearSolver(DenseCholesky(), "the map has a linear solver of its own")
 
 
@@ -119,8 +120,6 @@ class BodyNeeds:
         Of closed-form integrals, at one point for one element, on each thread.
     flops : float
         Of dense linear algebra.
-    warnings : tuple of ResultWarning
-        What to check in the result, known before the solve.
     is_matrix_free : bool
         Whether the contact problem has no matrix either: all of its work and memory is counted here.
     """
@@ -131,7 +130,6 @@ class BodyNeeds:
     kept: int = 0
     evaluations: float = 0.0
     flops: float = 0.0
-    warnings: tuple[ResultWarning, ...] = ()
     is_matrix_free: bool = False
 
     @property
@@ -284,8 +282,6 @@ def _zero_columns(name: str, reason: str, n_columns: int, n_all: int) -> PlanIte
 
 def _pairs_in_chunks(mesh: BoundaryMesh) -> int:
     """Return how many element pairs are evaluated at the same time."""
-    from bemkit.operators.steklov_poincare.collocation import CHUNK_PAIRS
-
     n_pairs = mesh.n_elements * mesh.whole.n_elements
     return min(n_pairs, n_threads(n_pairs) * CHUNK_PAIRS)
 

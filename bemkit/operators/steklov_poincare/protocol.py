@@ -4,13 +4,17 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 from bemkit.arrays import FloatArray, IntArray
 from bemkit.geometry.spaces import BoundarySpace
 from bemkit.operators.counts import OperationCounts
 from bemkit.operators.material import Material
+from bemkit.operators.pair_form import Tag
 from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions
+
+if TYPE_CHECKING:
+    from bemkit.operators.steklov_poincare.needs import BodyCase, BodyNeeds
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -71,7 +75,10 @@ class CondensedMap(ABC):
 
 
 class SteklovPoincare(Protocol):
-    """The elastic body seen from its boundary: nodal forces that go with displacements."""
+    """The elastic body seen from its boundary: nodal forces that go with displacements.
+
+    Nothing is assembled before `condense`.
+    """
 
     @property
     def material(self) -> Material:
@@ -84,6 +91,13 @@ class SteklovPoincare(Protocol):
     @property
     def traction_space(self) -> BoundarySpace:
         """The space of the tractions."""
+
+    @property
+    def tags(self) -> frozenset[Tag]:
+        """Whether the map is symmetric and positive semidefinite, and which motions cause no forces."""
+
+    def needs(self, case: BodyCase) -> BodyNeeds:
+        """Return counts, memory and time that `condense` will take, for the plan; ``BodyNeeds()`` predicts none."""
 
     def condense(self, conditions: NodalConditions, force: FloatArray) -> CondensedMap:
         """Eliminate every direction that is not retained, with the given nodal forces (n_nodes, 2) on the free ones."""

@@ -1,0 +1,85 @@
+"""Costs of the elastic maps of half-planes, predicted from sizes."""
+
+from __future__ import annotations
+
+from bemkit.operators.counts import Entries, Factorisation, FactorKind, OperationCounts
+from bemkit.operators.steklov_poincare.needs import CONTACT_STEPS, BodyCase, BodyNeeds, PlanItem
+
+_BYTES = 8
+_BYTES_OF_TREE = 10_000
+"""Bytes for each element of larger strips."""
+_FLOPS_OF_TREE = 6e5
+"""Flops for each element of larger strips, in all responses."""
+_BASIS = 120
+"""Vectors that the iteration for a response keeps, all others included."""
+_RESPONSES, _ITERATIONS, _FLOPS_OF_TRANSFORM = 20, 40, 500.0
+"""About, of a rough surface: responses, iterations of each, and work on each node in an iteration."""
+
+
+def strip_needs(case: BodyCase, *, has_tree: bool) -> BodyNeeds:
+    """Return the costs of a half-plane, with its flexibility as a matrix or, where its motion is free, over a tree."""
+    n, n_acting = case.mesh.n_elements, case.n_retained + case.n_fixed
+    items = (
+        PlanItem("flexibility of the surface", True, f"closed form: {n} x {n} means of logarithms"),
+        PlanItem("elements inside, around or below", False, "the surface beyond the strip is free in closed form"),
+        PlanItem("double layer, hypersingular operator", False, "they vanish on a straight free surface"),
+        PlanItem("supports", case.n_fixed > 0, "the half-plane is held or driven far away"),
+    )
+    square, matrix = _BYTES * n_acting * n_acting, _BYTES * n * n
+    if case.is_condensed:  # both components of the whole strip, and the inverse
+        return BodyNeeds(
+            items=items,
+            work=half_plane_work(n, n_acting),
+            memory=32 * matrix,
+            kept=8 * matrix + 2 * square,
+            evaluations=4.0 * n**2,
+            flops=4.0 / 3.0 * float(n_acting) ** 3,
+        )
+    if has_tree and not case.n_fixed:
+        leaves = PlanItem("tree of clusters", True, f"{n} elements are many: one factor over them")
+        kept = _BYTES_OF_TREE * n
+        return BodyNeeds(
+            items=(*items, leaves),
+            memory=kept,
+            kept=kept,
+            flops=_FLOPS_OF_TREE * n,
+            is_matrix_free=True,
+        )
+    kept = matrix + 3 * square  # the equations of closed nodes, at most all, and their factor
+    flops = CONTACT_STEPS * 2.0 / 3.0 * float(n_acting) ** 3
+    memory = max(4 * matrix, kept)
+    return BodyNeeds(
+        items=items,
+        work=half_plane_work(n),
+        memory=memory,
+        kept=kept,
+        evaluations=float(n) ** 2,
+        flops=flops,
+        is_matrix_free=True,
+    )
+
+
+def periodic_needs(case: BodyCase) -> BodyNeeds:
+    """Return the costs of a periodic half-plane."""
+    n = case.mesh.n_elements
+    items = (
+        PlanItem("flexibility of the surface", True, f"one number for each of {n} waves, by Fourier transforms"),
+        PlanItem("elements inside, around or below", False, "waves die out below the surface in closed form"),
+        PlanItem(
+            "matrices", False, f"each response is found by GMRES, with {_BASIS} vectors of {case.n_retained} numbers"
+        ),
+        PlanItem("supports", False, "the half-plane is held or driven far away"),
+    )
+    kept = _BYTES * _BASIS * case.n_retained
+    flops = _RESPONSES * _ITERATIONS * n * (_FLOPS_OF_TRANSFORM + 4.0 * _ITERATIONS)
+    return BodyNeeds(items=items, memory=kept, kept=kept, flops=flops, is_matrix_free=True)
+
+
+def half_plane_work(n_elements: int, n_acting: int = 0) -> OperationCounts:
+    """Return what a flexibility takes, and its inverse on `n_acting` directions that are retained or fixed."""
+    return OperationCounts(
+        element_pairs=n_elements**2,
+        single_layer=Entries.full(n_elements, n_elements),
+        factorisations=(Factorisation(FactorKind.CHOLESKY, n_acting),) if n_acting else (),
+        right_hand_sides=n_acting,
+    )
