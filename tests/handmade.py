@@ -92,8 +92,13 @@ def block_body(n=12, *, press=1.0, push=1.0, is_held_sideways=True, poisson_rati
 class Inexact(LinearBody):
     """A body whose responses are those of another one but for a relative error, and which counts them."""
 
-    def __init__(self, body, error=0.0, *, accuracy=1e-14, is_costly=False):
-        self.body, self.error, self.accuracy, self.is_costly = body, error, accuracy, is_costly
+    def __init__(self, body, error=0.0, *, accuracy=1e-14, responses_are_expensive=False):
+        self.body, self.error, self.accuracy, self.responses_are_expensive = (
+            body,
+            error,
+            accuracy,
+            responses_are_expensive,
+        )
         self.weights, self.n_responses = body.weights, 0
 
     @property

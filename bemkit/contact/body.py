@@ -149,14 +149,14 @@ class LinearBody(Protocol):
     accuracy : float
         Relative error of the displacements and tractions of a response: 1e-14 (the default) for a direct solver, the
         tolerance at which it stops for an iterative one. Solvers take their tolerances from it.
-    is_costly : bool
+    responses_are_expensive : bool
         Whether solvers should ask for tens of responses at most, rather than for several per contact node. False by
         default.
     """
 
     weights: FloatArray
     accuracy: float = 1e-14
-    is_costly: bool = False
+    responses_are_expensive: bool = False
 
     @property
     def n_contact(self) -> int:

@@ -13,7 +13,7 @@ from scipy.sparse import csc_array
 from bemkit.arrays import FloatArray
 from bemkit.contact.conditions import RigidMotions, largest_components, scaled_motions
 from bemkit.contact.limit_load import WITHOUT_BOUND, largest_factor
-from bemkit.contact.solvability import with_met_nodes
+from bemkit.contact.solvability import with_violated_nodes
 from bemkit.errors import InputError
 
 _N_STEPS = 60
@@ -115,7 +115,7 @@ def coulomb_limit(
         return _limit(blocks)
 
     # sliding does not dilate: only points that the motion presses, or that hold without pressure, join
-    found = with_met_nodes(scaled, cohesion / scale, 0.0 * slope, programme)
+    found = with_violated_nodes(scaled, cohesion / scale, 0.0 * slope, programme)
     if np.isnan(found.factor):
         raise InputError("no state of collapse was found: compare largest_load_factor, a bound from above")
     held, factor, smallest = (scale / size * value for value in (found.held, found.factor, found.smallest))

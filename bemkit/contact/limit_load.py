@@ -9,7 +9,7 @@ import numpy as np
 
 from bemkit.arrays import FloatArray
 from bemkit.contact.conditions import RigidMotions, largest_components, scaled_motions
-from bemkit.contact.solvability import contact_forces, with_met_nodes
+from bemkit.contact.solvability import contact_forces, with_violated_nodes
 from bemkit.errors import InputError
 
 WITHOUT_BOUND = 1e6
@@ -62,7 +62,7 @@ def largest_factor(
     factors = []
     for cohesion, slope in envelopes:
         programme = partial(_programme, motions, constant / scale, growing / size, cohesion / scale)
-        factors.append(with_met_nodes(motions, cohesion / scale, slope, programme))
+        factors.append(with_violated_nodes(motions, cohesion / scale, slope, programme))
     bounded = [scale / size * factor for factor in factors if factor is not None]
     return min(bounded) if len(bounded) == len(factors) else None
 

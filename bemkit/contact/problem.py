@@ -227,7 +227,7 @@ def _check_members(body: LinearBody, law: FrictionLaw) -> None:
 
 
 _BODY_MEMBERS = (
-    *("weights", "n_contact", "stiffness_scale", "accuracy", "is_costly", "tangent_follows"),
+    *("weights", "n_contact", "stiffness_scale", "accuracy", "responses_are_expensive", "tangent_follows"),
     *("respond", "rigid_motions", "rigid_load", "moving_bodies", "partners_of", "shares", "imbalance"),
 )
 _LAW_MEMBERS = ("bound", "bound_derivative", "is_frictionless", "acts_across_gap", "scaled")

@@ -47,7 +47,7 @@ class UnsolvableLoad:
     Parameters
     ----------
     motion : (n_contact, 2) array
-        Normal and tangential components of the escape at the contact nodes, scaled to a largest entry of one.
+        Normal and tangential components of the mechanism at the contact nodes, scaled to a largest entry of one.
     lift : (n_contact,) array
         How much faster each node leaves the obstacle than sliding at full friction would allow, ``-v_n - s |v_t|``;
         zero everywhere if the body slides, nan where a node can never touch.
@@ -72,7 +72,7 @@ class UnsolvableLoad:
 
     @property
     def description(self) -> str:
-        """One sentence that names the escape."""
+        """One sentence that names the mechanism."""
         if np.isnan(self.lift).all():
             how = f"moves {self.who} where no obstacle can meet it"
         elif not self.is_sliding:
@@ -99,10 +99,10 @@ def find_unsolvable_load(problem: ContactProblem, state: ContactState | None = N
 
     Notes
     -----
-    A motion v escapes if it nowhere presses into the obstacle harder than friction can wedge, ``v_n + s |v_t| <= 0``,
-    and the load does more work on it than friction present without pressure takes up, ``L(v) > sum w c |v_t|``. By
-    linear duality no escape exists exactly if tractions with ``sigma_n <= 0`` and ``|sigma_t| <= c + s |sigma_n|``
-    balance the load. c and s envelop the law from above, and a cap is tried as a second pair (c = cap, s = 0), so the
+    A motion v is a mechanism if it nowhere presses into the obstacle harder than friction can wedge,
+    ``v_n + s |v_t| <= 0``, and the load does more work on it than cohesion, ``L(v) > sum w c |v_t|``. By linear
+    duality no mechanism exists exactly if tractions with ``sigma_n <= 0`` and ``|sigma_t| <= c + s |sigma_n|`` balance
+    the load. c and s envelop the law from above, and a cap is tried as a second pair (c = cap, s = 0), so the
     test never refuses a load that can be held. A load that it misses is left to the status of the solver.
     """
     motions = as_rows(problem.body.rigid_motions())
@@ -123,7 +123,7 @@ def find_unsolvable_load(problem: ContactProblem, state: ContactState | None = N
     best = None
     for cohesion, slope in pairs:
         resistance = np.where(touches, problem.body.weights * cohesion, 0.0) / force_scale
-        coefficients = _largest_escape(motions, load / force_scale, resistance, np.where(touches, slope, np.nan))
+        coefficients = _largest_mechanism(motions, load / force_scale, resistance, np.where(touches, slope, np.nan))
         motion = np.asarray(coefficients @ motions).reshape(-1, 2)
         work = float(load @ coefficients) - force_scale * float(resistance @ np.abs(motion[:, 1]))
         if work > _RELATIVE_WORK * force_scale:
@@ -163,7 +163,7 @@ def _rigid_load(problem: ContactProblem, unit: FloatArray) -> tuple[FloatArray, 
     return load, max(float(np.abs(load).max()), float(np.abs(forces).sum()))
 
 
-def find_long_travel(problem: ContactProblem) -> float | None:
+def find_long_motion(problem: ContactProblem) -> float | None:
     """Return how far the load moves the body before an obstacle can hold it, if that is too far to resolve deformation.
 
     Parameters
@@ -215,19 +215,21 @@ def envelopes_of(
     return [(cohesion, steepest), *([(cap, none)] if is_capped else [])]
 
 
-def _largest_escape(motions: RigidMotions, load: FloatArray, resistance: FloatArray, slope: FloatArray) -> FloatArray:
-    """Return (n_motions,) coefficients of the escape on which the load does most work, zeros if none.
+def _largest_mechanism(
+    motions: RigidMotions, load: FloatArray, resistance: FloatArray, slope: FloatArray
+) -> FloatArray:
+    """Return (n_motions,) coefficients of the mechanism on which the load does most work, zeros if none.
 
-    Their absolute values add up to one at most, which favours escapes along a single motion: those are the simplest to
-    name. `slope` is nan at nodes that never touch.
+    Their absolute values add up to one at most, which favours mechanisms with a single motion, the simplest to name.
+    `slope` is nan at nodes that never touch.
 
     Notes
     -----
-    The dual problem is solved: of all contact forces p that friction allows, find those with the smallest residual
-    ``r = M p + load``, M the work of unit forces on the motions. The multipliers of these equations are the escape. The
-    size of r is its largest component, so that absolute values of the multipliers add up to one; of many motions it is
-    the sum of all components, so that no multiplier exceeds one. Forces are sums of those on both edges of the cone of
-    friction and of tangential ones that need no pressure. So all conditions on p are bounds, and M is sparse.
+    This solves the dual problem: find the contact forces p within friction that have the smallest residual
+    ``r = M p + load``, M the work of unit forces on the motions. The multipliers of these equations are the mechanism.
+    The size of r is its largest component, so that absolute values of the multipliers add up to one; with many motions
+    it is the sum of all components, so that no multiplier exceeds one. Forces are sums of those on both edges of the
+    friction cone and of tangential ones that need no pressure. So all conditions on p are bounds, and M is sparse.
     """
     touches = np.isfinite(slope)
     if motions.shape[0] == 1 and isinstance(motions, np.ndarray):
@@ -237,14 +239,14 @@ def _largest_escape(motions: RigidMotions, load: FloatArray, resistance: FloatAr
                 return np.array([sign])
         return np.zeros(1)
 
-    def escape(slope: FloatArray) -> tuple[FloatArray, FloatArray]:
-        coefficients = _escape_from(motions, load, resistance, slope)
+    def mechanism(slope: FloatArray) -> tuple[FloatArray, FloatArray]:
+        coefficients = _mechanism_of(motions, load, resistance, slope)
         return coefficients, coefficients
 
-    return with_met_nodes(motions, resistance, slope, escape)
+    return with_violated_nodes(motions, resistance, slope, mechanism)
 
 
-def with_met_nodes(
+def with_violated_nodes(
     motions: RigidMotions,
     resistance: FloatArray,
     slope: FloatArray,
@@ -263,36 +265,36 @@ def with_met_nodes(
 
     Notes
     -----
-    Where two bodies meet, the outermost nodes nearly always suffice. Nodes between them join if the mechanism presses
+    Where two bodies meet, the extreme nodes nearly always suffice. Nodes between them join if the mechanism presses
     them, all of them if there is no mechanism.
     """
     touches = np.isfinite(slope)
-    takes_part = touches if isinstance(motions, np.ndarray) else outermost(motions, touches)
+    takes_part = touches if isinstance(motions, np.ndarray) else extreme_nodes(motions, touches)
     while True:
         result, velocities = programme(np.where(takes_part, slope, np.nan))
         joins = touches & ~takes_part
         if velocities is not None and joins.any():
-            joins &= met(motions, velocities, resistance, np.where(touches, slope, 0.0))
+            joins &= violated(motions, velocities, resistance, np.where(touches, slope, 0.0))
         if not joins.any():
             return result
         takes_part = takes_part | joins
 
 
-def met(motions: RigidMotions, velocities: FloatArray, resistance: FloatArray, slope: FloatArray) -> BoolArray:
+def violated(motions: RigidMotions, velocities: FloatArray, resistance: FloatArray, slope: FloatArray) -> BoolArray:
     """Return (n_contact,) bool: nodes that a motion presses into the obstacle, or that resist it without pressure."""
     motion = np.asarray(velocities @ motions).reshape(-1, 2)
     is_pressed = motion[:, 0] + slope * np.abs(motion[:, 1]) > _MEETS * np.abs(motion).max()
     return np.asarray(is_pressed | ((resistance > 0.0) & (motion[:, 1] != 0.0)))
 
 
-def outermost(motions: csr_array, touches: BoolArray) -> BoolArray:
+def extreme_nodes(motions: csr_array, touches: BoolArray) -> BoolArray:
     """Return (n_contact,) bool: the first and the last of the nodes at which the same motions meet."""
     nodes = np.flatnonzero(touches)
-    felt = (abs(motions.T)).tocsr()
-    merged = felt[2 * nodes] + felt[2 * nodes + 1]
+    works = (abs(motions.T)).tocsr()
+    merged = works[2 * nodes] + works[2 * nodes + 1]
     merged.sort_indices()
-    met = merged.indptr[1:] > merged.indptr[:-1]
-    nodes, begins, ends = nodes[met], merged.indptr[:-1][met], merged.indptr[1:][met]
+    has_motions = merged.indptr[1:] > merged.indptr[:-1]
+    nodes, begins, ends = nodes[has_motions], merged.indptr[:-1][has_motions], merged.indptr[1:][has_motions]
     pairs = np.stack([merged.indices[begins], merged.indices[ends - 1]], axis=1)
     chosen = np.zeros(touches.size, bool)
     for order in (slice(None), slice(None, None, -1)):
@@ -300,8 +302,8 @@ def outermost(motions: csr_array, touches: BoolArray) -> BoolArray:
     return chosen
 
 
-def _escape_from(motions: RigidMotions, load: FloatArray, resistance: FloatArray, slope: FloatArray) -> FloatArray:
-    """Return the coefficients of `_largest_escape` for the nodes whose slope is a number."""
+def _mechanism_of(motions: RigidMotions, load: FloatArray, resistance: FloatArray, slope: FloatArray) -> FloatArray:
+    """Return the coefficients of `_largest_mechanism` for the nodes whose slope is a number."""
     from scipy import sparse
     from scipy.optimize import linprog
 

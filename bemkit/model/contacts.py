@@ -197,7 +197,7 @@ def obstacle_rows(
                 title, part, law, other = name, _part(pair), scene.law_of(pair), len(bodies) + k
                 gap, motions = gap + pair.gap_at(points), scene.rigid[k].motions_at(touched)
             is_held = np.asarray(fixed[nodes.nodes].any(axis=1))
-            moves = motions is not None and bool(scene.rigid[other - len(bodies)].is_driven.any())
+            moves = motions is not None and bool(scene.rigid[other - len(bodies)].is_load_controlled.any())
             yield ContactRows(
                 name=title,
                 law=law,

@@ -1,4 +1,4 @@
-"""Rigid body modes in words and physical units: those that nothing holds, and the one along which a load escapes."""
+"""Rigid body modes in words and physical units: those that nothing holds, and the mechanism of a load."""
 
 from __future__ import annotations
 

@@ -12,7 +12,7 @@ from bemkit.errors import InputError
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.spaces import BoundarySpace, element_nodes
 from bemkit.model.units import Units
-from bemkit.operators.half_plane.far_drive import FarDrive
+from bemkit.operators.half_plane.far_drive import FarMotion
 from bemkit.operators.half_plane.surface import SurfaceElasticity
 from bemkit.operators.linear.solvers import (
     ChosenLinearSolver,
@@ -97,21 +97,21 @@ def dimensionless_load(load: Load, units: Units) -> TractionField:
     return field
 
 
-def far_drive(scene: BodyScene, units: Units) -> FarDrive:
+def far_drive(scene: BodyScene, units: Units) -> FarMotion:
     """Return how a half-plane moves far away, in the units given; at rest by default."""
     far = scene.far
     if far is None:
-        return FarDrive()
+        return FarMotion()
     motion = far.motion / (units.displacement, units.displacement, units.displacement / units.length)
     load = far.load / (units.stress * units.length * np.array([1.0, 1.0, units.length]))
     centre = ((np.array(far.centre) - units.centre) / units.length).tolist()
-    driven = tuple(np.flatnonzero(far.is_driven).tolist())
+    driven = tuple(np.flatnonzero(far.is_load_controlled).tolist())
     strain = far.strain * units.length / units.displacement
     (x, y, turn), (force_x, force_y, moment) = motion.tolist(), load.tolist()
-    return FarDrive(driven, (x, y, turn), (force_x, force_y, moment), (centre[0], centre[1]), strain)
+    return FarMotion(driven, (x, y, turn), (force_x, force_y, moment), (centre[0], centre[1]), strain)
 
 
-def driven_by(elastic: SteklovPoincare, drive: FarDrive) -> SteklovPoincare:
+def driven_by(elastic: SteklovPoincare, drive: FarMotion) -> SteklovPoincare:
     """Return a half-plane that moves otherwise far away; a body that ends somewhere stays as it is."""
     return elastic.driven_by(drive) if isinstance(elastic, SurfaceElasticity) else elastic
 
@@ -155,7 +155,7 @@ def check_same_body(
 
 
 def _driven(scene: BodyScene) -> list[bool]:
-    return [] if scene.far is None else scene.far.is_driven.tolist()
+    return [] if scene.far is None else scene.far.is_load_controlled.tolist()
 
 
 def _layout(part: Part) -> tuple[object, ...]:

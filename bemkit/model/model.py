@@ -48,7 +48,7 @@ class Model:
         Of each body, dimensionless; copies share theirs.
     condensed : tuple of CondensedMap
         Of each of the bodies that are joined; copies share their stiffness. Empty for a single body.
-    body : JoinedBodies, or the only body: DirectBody, HierarchicalBody, SurfaceBody or UntouchedBody
+    body : JoinedBodies, or the only body: DirectBody, HierarchicalBody, SurfaceBody or ContactFreeBody
     problem : ContactProblem
     work : OperationCounts
         Counted so far: integrals, factorisations and solves.
@@ -211,7 +211,7 @@ class Model:
         prepared, units = self.prepared, self.prepared.units
         in_place = prepared.column("weights")[:, None] * np.einsum("nk,nkc->nc", state.traction, prepared.frame)
         of_contacts: list[list[tuple[IntArray, FloatArray]]] = [[] for _ in prepared.bodies]
-        for number, elements, values in prepared.spread.tractions(units.stress * in_place):
+        for number, elements, values in prepared.recovery.tractions(units.stress * in_place):
             of_contacts[number].append((elements, values))
         fields: list[tuple[FloatArray, FloatArray, float]] = []
         bodies = zip(prepared.bodies, self.elastic, self.nodal_fields(state), strict=True)
@@ -247,9 +247,11 @@ class Model:
             begin += rows.n_contact
         bodies = []
         for body, reaction in zip(prepared.scene.rigid, reactions, strict=True):
-            motion, is_driven = body.motion, body.is_driven
-            if is_driven.any():
-                motion[is_driven] = next(unknowns) * units.displacement / motion_units(units)[is_driven]
+            motion, is_load_controlled = body.motion, body.is_load_controlled
+            if is_load_controlled.any():
+                motion[is_load_controlled] = (
+                    next(unknowns) * units.displacement / motion_units(units)[is_load_controlled]
+                )
             bodies.append((motion, reaction))
         return bodies
 

@@ -17,7 +17,6 @@ from bemkit.contact.condensation.nodes import ContactNodes
 from bemkit.contact.laws import FrictionLaw
 from bemkit.geometry.spaces import dof_points
 from bemkit.model.contact_data import ContactData
-from bemkit.model.contact_tractions import ContactSpread
 from bemkit.model.contacts import ContactRows, candidates_of, law_of_rows, obstacle_rows, retained_for
 from bemkit.model.given import (
     driven_by,
@@ -30,8 +29,9 @@ from bemkit.model.given import (
 from bemkit.model.overlaps import check_apart
 from bemkit.model.placed import Meshes, PlacedBody, place
 from bemkit.model.same_bodies import bodies_under, check_rigid, find_units, listed_contacts, with_found_contacts
+from bemkit.model.traction_recovery import TractionRecovery
 from bemkit.model.units import Units
-from bemkit.operators.half_plane.far_drive import FarDrive
+from bemkit.operators.half_plane.far_drive import FarMotion
 from bemkit.operators.linear.solvers import ChosenLinearSolver, DenseCholesky, LinearSolver
 from bemkit.operators.material import Material
 from bemkit.operators.pair_form import Tag
@@ -62,7 +62,7 @@ class PreparedBody(PlacedBody):
         Given nodal forces.
     inside : ForcesInside or None
         Body forces; None without any.
-    drive : FarDrive
+    drive : FarMotion
         How a half-plane moves far away.
     candidates : ContactData
         The nodes that may touch an obstacle or a rigid body, held by supports or not.
@@ -71,7 +71,7 @@ class PreparedBody(PlacedBody):
     conditions: NodalConditions
     force: FloatArray
     inside: ForcesInside | None
-    drive: FarDrive
+    drive: FarMotion
     candidates: ContactData
 
     @property
@@ -190,9 +190,9 @@ class Prepared:
         return np.concatenate([np.zeros((0, 2, 2)), *(rows.frame for rows in self.rows)])
 
     @cached_property
-    def spread(self) -> ContactSpread:
+    def recovery(self) -> TractionRecovery:
         """The map from forces of contact nodes to tractions of elements."""
-        return ContactSpread.of(self.bodies, self.rows)
+        return TractionRecovery.of(self.bodies, self.rows)
 
     @cached_property
     def names(self) -> tuple[str, ...]:
@@ -252,8 +252,8 @@ class Prepared:
         check_rigid(self.scene, scene)
         before = self if units is None else None
         following = _prepared(scene, bodies_under(scene, self.bodies), units or self.units, before)
-        if self.is_coupled_like(following) and "spread" in self.__dict__:
-            following.__dict__["spread"] = self.spread
+        if self.is_coupled_like(following) and "recovery" in self.__dict__:
+            following.__dict__["recovery"] = self.recovery
         return following
 
     def with_loads_of(self, other: Prepared) -> Prepared:

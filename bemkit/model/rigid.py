@@ -20,7 +20,7 @@ def rigid_motions(body: RigidBody, units: Units) -> tuple[sparse.csr_array, Floa
     sparse (3, n_driven) array, (3,) array
         Dimensionless motions x, y, turn are the product, and the array what is given.
     """
-    chosen = sparse.csr_array(np.eye(3)[:, body.is_driven])
+    chosen = sparse.csr_array(np.eye(3)[:, body.is_load_controlled])
     return chosen, body.motion * motion_units(units) / units.displacement
 
 
@@ -33,9 +33,9 @@ def rigid_members(prepared: Prepared) -> tuple[Member, ...]:
     modulus = max(body.material.plane_modulus for body in prepared.bodies) / units.modulus
     members = []
     for body in prepared.scene.rigid:
-        is_driven = body.is_driven
-        n_driven = int(np.count_nonzero(is_driven))
+        is_load_controlled = body.is_load_controlled
+        n_driven = int(np.count_nonzero(is_load_controlled))
         if n_driven:
-            load = (body.load / motion_units(units) / prepared.force_unit)[is_driven]
+            load = (body.load / motion_units(units) / prepared.force_unit)[is_load_controlled]
             members.append(Member(np.zeros((n_driven, n_driven)), load, np.eye(n_driven), modulus, body.name))
     return tuple(members)

@@ -144,7 +144,7 @@ def rigid_blocks(scene: Scene, bodies: Sequence[PlacedBody]) -> tuple[Block, ...
     """Return the blocks of a scene with a single load: those of placed bodies, then those of rigid bodies."""
     blocks = [_elastic_block(body) for body in bodies]
     for body in scene.rigid:
-        chosen = np.eye(3)[:, body.is_driven]
+        chosen = np.eye(3)[:, body.is_load_controlled]
         blocks.append(Block(np.array(body.centre), 1.0, chosen, body.load @ chosen))
     return tuple(blocks)
 
@@ -257,15 +257,18 @@ def _on_obstacle(
     xi = np.broadcast_to(_SAMPLES, (rows.size, _SAMPLES.size))
     is_met = np.isfinite(measured(rows, xi)[1])
     row, k = np.nonzero(is_met[:, 1:] | is_met[:, :-1])
-    ends, met = np.stack([_SAMPLES[k], _SAMPLES[k + 1]], axis=1), np.stack([is_met[row, k], is_met[row, k + 1]], axis=1)
+    ends, are_met = (
+        np.stack([_SAMPLES[k], _SAMPLES[k + 1]], axis=1),
+        np.stack([is_met[row, k], is_met[row, k + 1]], axis=1),
+    )
     # the end of the joint lies between a sample that meets the obstacle and one that does not
-    cut = np.flatnonzero(~met.all(axis=1))
-    inside, outside = ends[cut][met[cut]], ends[cut][~met[cut]]
+    cut = np.flatnonzero(~are_met.all(axis=1))
+    inside, outside = ends[cut][are_met[cut]], ends[cut][~are_met[cut]]
     for _ in range(_N_HALVINGS):
         middle = 0.5 * (inside + outside)
         is_inside = np.isfinite(measured(row[cut], middle[:, None])[1][:, 0])
         inside, outside = np.where(is_inside, middle, inside), np.where(is_inside, outside, middle)
-    ends[cut] = np.where(met[cut], ends[cut], inside[:, None])
+    ends[cut] = np.where(are_met[cut], ends[cut], inside[:, None])
     points, gap, directions = (values.reshape(-1, *values.shape[2:]) for values in measured(row, ends))
     lengths = 0.5 * (ends[:, 1:] - ends[:, :1]) * mesh.jacobian(elements[row], ends)
     if row.size:

@@ -103,7 +103,7 @@ def check_rigid(first: Scene, other: Scene) -> None:
 
 
 def _layout(body: RigidBody) -> tuple[object, ...]:
-    return body.name, body.obstacle, body.centre, body.is_driven.tolist()
+    return body.name, body.obstacle, body.centre, body.is_load_controlled.tolist()
 
 
 def _first_of(names: Sequence[str]) -> str:

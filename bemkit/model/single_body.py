@@ -16,9 +16,9 @@ from bemkit.operators.steklov_poincare.forces_inside import HeavyElasticity
 if TYPE_CHECKING:
     from bemkit.contact.condensation.hierarchical_body import HierarchicalBody
     from bemkit.contact.half_plane.surface_body import SurfaceBody
-    from bemkit.model.untouched_body import UntouchedBody
+    from bemkit.model.contact_free_body import ContactFreeBody
 
-SingleBody: TypeAlias = "DirectBody | HierarchicalBody | SurfaceBody | UntouchedBody"
+SingleBody: TypeAlias = "DirectBody | HierarchicalBody | SurfaceBody | ContactFreeBody"
 
 
 def is_single(prepared: Prepared) -> bool:
@@ -76,9 +76,11 @@ def single_body(prepared: Prepared, elastic: SteklovPoincare, condensed: Condens
         nodes = prepared.contact_nodes
         return surface_body(elastic, opened(body.conditions, nodes), nodes, body.force)
     if not prepared.n_contact:
-        from bemkit.model.untouched_body import UntouchedBody
+        from bemkit.model.contact_free_body import ContactFreeBody
 
-        return UntouchedBody(body.own_space, body.conditions, body.force, elastic.condense(body.conditions, body.force))
+        return ContactFreeBody(
+            body.own_space, body.conditions, body.force, elastic.condense(body.conditions, body.force)
+        )
     nodes = prepared.contact_nodes
     if is_direct(prepared):
         conditions = body.conditions

@@ -63,7 +63,7 @@ class Sizes:
 
 def find_sizes(prepared: Prepared) -> Sizes:
     """Count the elements and unknowns of all bodies."""
-    bodies, n_driven = prepared.bodies, n_driven_motions(prepared.scene)
+    bodies, n_driven = prepared.bodies, n_load_controlled(prepared.scene)
     return Sizes(
         n_elements=sum(body.mesh.n_elements for body in bodies),
         n_curved=sum(int(np.count_nonzero(~body.mesh.is_straight)) for body in bodies),
@@ -199,7 +199,9 @@ def items_of_several(prepared: Prepared, sizes: Sizes, n_steps: int, *, is_dense
     yield PlanItem("contacts between bodies", n_pairs > 0, f"{n_pairs}, coupled by mortar integrals")
     yield PlanItem("rigid obstacles", n_fixed > 0, f"{n_fixed} parts face them" if n_fixed else "no part faces one")
     n_rigid = len(scene.rigid)
-    moving = f"{n_rigid} in {len(scene.contacts) - n_pairs} contacts, {n_driven_motions(scene)} motions driven by loads"
+    moving = (
+        f"{n_rigid} in {len(scene.contacts) - n_pairs} contacts, {n_load_controlled(scene)} motions driven by loads"
+    )
     yield PlanItem("rigid bodies", n_rigid > 0, moving if n_rigid else "there are none")
     yield _friction_item(rows.law for rows in prepared.rows)
     form = "one dense matrix of relative displacements"
@@ -215,9 +217,9 @@ def items_of_several(prepared: Prepared, sizes: Sizes, n_steps: int, *, is_dense
     yield from _last_items(n_steps, "fields inside the bodies")
 
 
-def n_driven_motions(scene: Scene) -> int:
+def n_load_controlled(scene: Scene) -> int:
     """Return how many motions of rigid bodies are unknown."""
-    return sum(int(np.count_nonzero(body.is_driven)) for body in scene.rigid)
+    return sum(int(np.count_nonzero(body.is_load_controlled)) for body in scene.rigid)
 
 
 def _names(bodies: Sequence[PlacedBody]) -> str:

@@ -11,7 +11,7 @@ import numpy as np
 
 from bemkit.arrays import FloatArray, IntArray
 from bemkit.contact.condensation.nodes import contact_frame
-from bemkit.contact.mortar.congruent import stand_alike
+from bemkit.contact.mortar.congruent import congruence_key
 from bemkit.contact.mortar.projection import mean_directions
 from bemkit.contact.mortar.segments import Segments, common_refinement, facing_points
 from bemkit.contact.mortar.sides import ContactSide
@@ -40,7 +40,7 @@ def contacts_between_bodies(solution: SolvedScene) -> Iterator[MeasuredContact]:
     def measured(pair: ContactPair, names: tuple[str, str], parts: tuple[str, str]) -> PointsBetween:
         one, two = (solved[name] for name in names)
         reach = reach_of(pair, one.mesh, two.mesh)
-        alike = stand_alike((one.mesh, placements[names[0]]), (two.mesh, placements[names[1]]), reach)
+        alike = congruence_key((one.mesh, placements[names[0]]), (two.mesh, placements[names[1]]), reach)
         key = (alike, parts)
         if key not in known:
             known[key] = _Facing.of((one, two), parts, placements[names[0]], reach)

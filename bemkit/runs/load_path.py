@@ -31,9 +31,9 @@ _SETTLED = 1e-10
 _FAST, _SLOW = 10, 20
 """Steps of the solver in one increment up to which the next is twice as large, and above which it is half as large."""
 
-_HOPELESS = (Status.UNSOLVABLE_LOAD, Status.TOO_FAR, Status.TOO_COSTLY)
+_NOT_RETRIED = (Status.UNSOLVABLE_LOAD, Status.TOO_FAR, Status.TOO_COSTLY)
 """Failures that smaller increments do not change."""
-_UNDECIDED = (Status.MAX_STEPS, Status.STALLED, Status.CYCLING, Status.SINGULAR)
+_RETRIED = (Status.MAX_STEPS, Status.STALLED, Status.CYCLING, Status.SINGULAR)
 """Failures that may be the solver's, or a collapse."""
 
 Callback = Callable[[StepRecord], None] | None
@@ -63,7 +63,7 @@ class StepModel(Protocol):
 
 
 @dataclass(frozen=True, eq=False)
-class Standing:
+class IncrementEnd:
     """The end of an increment.
 
     Parameters
@@ -83,7 +83,7 @@ class Standing:
     motion: SlipHistory
     gap: FloatArray
     loads: tuple[tuple[float, StepModel], ...] = ()
-    dragged: FloatArray | float = 0.0
+    obstacle_slip: FloatArray | float = 0.0
 
     @property
     def share(self) -> float:
@@ -100,18 +100,18 @@ class Standing:
         return forces, displacements
 
     @classmethod
-    def at_rest(cls, model: StepModel) -> Standing:
+    def at_rest(cls, model: StepModel) -> IncrementEnd:
         """Return the state before any load, with obstacles that overlap with the body still at its surface."""
         n = model.problem.n_contact
         rest = ContactState(np.zeros((n, 2)), np.zeros((n, 2)))
         return cls(rest, SlipHistory.at_rest(n), np.maximum(model.problem.gap, 0.0))
 
     @classmethod
-    def under(cls, model: StepModel, state: ContactState, motion: SlipHistory) -> Standing:
+    def under(cls, model: StepModel, state: ContactState, motion: SlipHistory) -> IncrementEnd:
         """Return the end of a step of a model."""
         return cls(state, motion, model.problem.gap, ((1.0, model),))
 
-    def work_from(self, before: Standing, model: StepModel) -> StepWork:
+    def work_from(self, before: IncrementEnd, model: StepModel) -> StepWork:
         """Return the work from the end of the increment before to this one, by the trapezoidal rule."""
         units = model.units
         unit = units.stress * units.displacement * units.length
@@ -122,14 +122,14 @@ class Standing:
             approached = np.where(np.isfinite(self.gap), self.gap - before.gap, 0.0)
         # at a node that opens or closes the traction is not that of the trapezoidal rule: not counted as dissipation
         is_held = (before.state.traction != 0.0).any(axis=1) & (self.state.traction != 0.0).any(axis=1)
-        slip = moved[:, 1] - self.dragged
+        slip = moved[:, 1] - self.obstacle_slip
         of_friction = -sigma[:, 1] * slip
         dissipation = max(float(of_friction[is_held].sum()), 0.0)
         along_slip = 2.0 * weights * self.state.traction[:, 1] * slip
         (forces_before, displacements_before), (forces, displacements) = before.acting, self.acting
         of_forces = 0.5 * float((forces_before + forces) @ (displacements - displacements_before))
         return StepWork(
-            external_work=of_forces + float(sigma[:, 0] @ approached + np.sum(sigma[:, 1] * self.dragged)),
+            external_work=of_forces + float(sigma[:, 0] @ approached + np.sum(sigma[:, 1] * self.obstacle_slip)),
             dissipation=dissipation,
             increment_work=float(sigma[:, 0] @ (approached - moved[:, 0])) + float(of_friction.sum()) - dissipation,
             friction_gain=float(np.maximum(along_slip, 0.0).sum()),
@@ -147,17 +147,17 @@ class ReachedStep:
         Of the last increment, slip counting from the one before, the law that of its slip.
     result : ContactSolution
         Of the last increment, with the records and linear solves of all; its message says what was done.
-    ends : tuple of Standing
+    ends : tuple of IncrementEnd
         Of the increments that converged.
     """
 
     path: Path
     problem: ContactProblem
     result: ContactSolution
-    ends: tuple[Standing, ...]
+    ends: tuple[IncrementEnd, ...]
 
     @property
-    def end(self) -> Standing:
+    def end(self) -> IncrementEnd:
         """The end of the last increment that converged."""
         return (self.path.start, *self.ends)[-1]
 
@@ -176,7 +176,7 @@ class Path:
     ----------
     model : StepModel
         Of the step.
-    start : Standing
+    start : IncrementEnd
         Where the step before has ended, or rest.
     time : float [s]
         At the end of the step.
@@ -191,7 +191,7 @@ class Path:
     """
 
     model: StepModel
-    start: Standing
+    start: IncrementEnd
     time: float
     before: StepModel | None
     between: Callable[[float], ContactProblem]
@@ -210,20 +210,20 @@ class Path:
         first, last = self.factors
         return f"load factor {first + share * (last - first):.6g}"
 
-    def dragged(self, start: Standing, share: float) -> FloatArray | float:
+    def obstacle_slip(self, start: IncrementEnd, share: float) -> FloatArray | float:
         """Return how far obstacles travel from the end of an increment to a share of the way."""
         return self.drag * (share if start is self.start else share - start.share)
 
-    def standing(self, attempt: _Attempt, share: float, start: Standing) -> Standing:
+    def end_of(self, attempt: _Attempt, share: float, start: IncrementEnd) -> IncrementEnd:
         """Return the end of an increment that has begun at another end."""
         state, motion, gap = attempt.result.state, attempt.motion, attempt.problem.gap
-        dragged = self.dragged(start, share)
+        obstacle_slip = self.obstacle_slip(start, share)
         if self.before is None or share == 1.0:
-            return Standing(state, motion, gap, ((1.0, self.model),), dragged)
-        return Standing(state, motion, gap, ((1.0 - share, self.before), (share, self.model)), dragged)
+            return IncrementEnd(state, motion, gap, ((1.0, self.model),), obstacle_slip)
+        return IncrementEnd(state, motion, gap, ((1.0 - share, self.before), (share, self.model)), obstacle_slip)
 
 
-def reach(path: Path, guess: ContactState | None = None, callback: Callback = None) -> ReachedStep:
+def advance(path: Path, guess: ContactState | None = None, callback: Callback = None) -> ReachedStep:
     """Go from the load of one step to that of the next one, in smaller increments where a jump does not converge.
 
     Parameters
@@ -253,7 +253,7 @@ def reach(path: Path, guess: ContactState | None = None, callback: Callback = No
     is_first, smallest = path.before is None, 0.5**MOST_HALVINGS
     increments = _Increments(path, callback)
     reached, increment, end = 0.0, 1.0, path.start
-    ends: tuple[Standing, ...] = ()
+    ends: tuple[IncrementEnd, ...] = ()
     while True:
         target = min(reached + increment, 1.0)
         attempt = increments.attempt(
@@ -261,7 +261,7 @@ def reach(path: Path, guess: ContactState | None = None, callback: Callback = No
         )
         result = attempt.result
         if result.is_converged:
-            end = path.standing(attempt, target, end)
+            end = path.end_of(attempt, target, end)
             reached, ends = target, (*ends, end)
             if reached == 1.0:
                 break
@@ -269,7 +269,7 @@ def reach(path: Path, guess: ContactState | None = None, callback: Callback = No
             increment = max(increment, smallest)
             _ = end.acting  # now, while a compressed body still holds this response
             announce(f"{path.name_of(reached)} reached")
-        elif is_first or result.status in _HOPELESS or target - reached <= smallest:
+        elif is_first or result.status in _NOT_RETRIED or target - reached <= smallest:
             break
         else:
             increment = 0.5 * (target - reached)
@@ -277,7 +277,7 @@ def reach(path: Path, guess: ContactState | None = None, callback: Callback = No
     words = result.message
     if result.is_converged and len(ends) > 1:
         words += f" The jump to this load stalled; {len(ends)} increments in its place led there."
-    elif not is_first and result.status in _UNDECIDED:
+    elif not is_first and result.status in _RETRIED:
         bound = "" if attempt.problem.law.is_frictionless else ", but friction may give way before that does"
         words = (
             f"{Status.LOAD_NOT_REACHED.value} Increments led to {path.name_of(reached)}, "
@@ -307,12 +307,12 @@ class _Increments:
     callback: Callback
     records: tuple[StepRecord, ...] = field(default=(), init=False)
 
-    def attempt(self, target: float, end: Standing, start: ContactState | None, *, is_last: bool) -> _Attempt:
+    def attempt(self, target: float, end: IncrementEnd, start: ContactState | None, *, is_last: bool) -> _Attempt:
         """Solve the increment to a share of the way; under a law that depends on its slip until slip and law agree."""
         path, n_before = self.path, len(self.records)
         problem, time = path.between(target), path.time_at(target)
         if path.before is not None:
-            problem = replace(problem, reference_slip=end.state.u_t + path.dragged(end, target))
+            problem = replace(problem, reference_slip=end.state.u_t + path.obstacle_slip(end, target))
         words = "" if target == 1.0 and not n_before else f"increment to {path.name_of(target)}"
         law, unit = problem.law, path.model.units.displacement
         motion = end.motion.followed(time, np.zeros(problem.n_contact), np.zeros(problem.n_contact, bool))
@@ -344,7 +344,7 @@ class _Increments:
             solver = _for_increments(self.path.model.solver, is_last=is_last) if records else self.path.model.solver
             result = solve(problem, solver, start=start, throw=False, callback=report)
         else:
-            from bemkit.model.untouched_body import certified
+            from bemkit.model.contact_free_body import certified
 
             result = certified(problem.body, report)
         self.records = continued(records, result.history, words)

@@ -22,7 +22,7 @@ from bemkit.plan import Plan, announce_plan, check_elements, check_memory, plan_
 from bemkit.results.load_history import LoadHistory, LoadStep
 from bemkit.results.missed_contact import with_missed_contact_named
 from bemkit.results.solved_steps import following
-from bemkit.runs.load_path import Callback, Path, ReachedStep, Standing, reach
+from bemkit.runs.load_path import Callback, IncrementEnd, Path, ReachedStep, advance
 from bemkit.runs.solution_of import solution_of
 from bemkit.scene.load_history import load_steps
 from bemkit.scene.scene import Scene
@@ -221,17 +221,17 @@ def solve_steps(
         If nothing can balance the first load.
     """
     solutions: list[Solution] = []
-    before, end = None, Standing.at_rest(model)
+    before, end = None, IncrementEnd.at_rest(model)
     done = None if history.done is None else history.done.loading
     n_done = 0 if done is None else len(done.steps)
     for number, step in enumerate(steps):
         if number:
             before, model = model, model.under(step)
         if done is not None and number < n_done:  # in an earlier run: only the model goes the same way again
-            end = Standing.under(model, done.steps[-1].state, done.motion) if number == n_done - 1 else end
+            end = IncrementEnd.under(model, done.steps[-1].state, done.motion) if number == n_done - 1 else end
             continue
         clock = clock.closed(Stage.CONDENSE)
-        reached = reach(_path(model, before, end, history, number), guess, callback)
+        reached = advance(_path(model, before, end, history, number), guess, callback)
         if before is None and not reached.result.history:
             raise UnsolvableSceneError(why_not(model, reached.result))
         model = replace(model, problem=reached.problem)
@@ -272,7 +272,7 @@ def joined(history: History, solutions: Sequence[Solution]) -> Solution:
     return whole
 
 
-def _path(model: Model, before: Model | None, end: Standing, history: History, number: int) -> Path:
+def _path(model: Model, before: Model | None, end: IncrementEnd, history: History, number: int) -> Path:
     def between(share: float) -> ContactProblem:
         problem: ContactProblem = model.problem if before is None else model.between(before, share)
         return problem

@@ -52,7 +52,7 @@ class PlaneMotion:
         return ""
 
     @property
-    def is_driven(self) -> BoolArray:
+    def is_load_controlled(self) -> BoolArray:
         """(3,) bool array: the motions x, y, turn that a load drives, and that are unknown."""
         return np.array([getattr(self, load) is not None for _, load in COMPONENTS])
 

@@ -11,11 +11,11 @@ import numpy as np
 from bemkit.arrays import IntArray
 from bemkit.contact.certificate import Certificate, certify
 from bemkit.contact.problem import ContactProblem, ContactState, SingularResponse
-from bemkit.contact.solvability import find_long_travel, find_unsolvable_load, needs_contact
+from bemkit.contact.solvability import find_long_motion, find_unsolvable_load, needs_contact
 from bemkit.errors import InputError, NoResultError
 from bemkit.interrupts import interruptible, raise_missed_interrupt
 from bemkit.solvers.active_sets import ActiveSets, NodeStatus, contact_sets
-from bemkit.solvers.newton import FloatingResponse, consistent_state, untouched_response, with_least_slip
+from bemkit.solvers.newton import FloatingResponse, consistent_state, contact_free_response, with_least_slip
 
 
 class Status(Enum):
@@ -269,10 +269,12 @@ class _Run:
         # Overflow is not warned about: it ends in the status NOT_FINITE.
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
             try:
-                untouched = self._untouched()
-                if untouched is None and (unsolvable := find_unsolvable_load(self.problem)) is not None:
+                contact_free = self._contact_free_response()
+                if contact_free is None and (unsolvable := find_unsolvable_load(self.problem)) is not None:
                     return self._without_state(Status.UNSOLVABLE_LOAD, unsolvable.description)
-                iterate = self._without_contact(self._first(start, n_before=int(untouched is not None)), untouched)
+                iterate = self._without_contact(
+                    self._first(start, n_before=int(contact_free is not None)), contact_free
+                )
             except SingularResponse as error:
                 return self._without_state(Status.SINGULAR, str(error))
             sets = contact_sets(self.problem, iterate.state)
@@ -283,14 +285,14 @@ class _Run:
                     following = self.solver.step(self.problem, iterate)
                 except SingularResponse as error:
                     following = replace(iterate, ended=Status.SINGULAR, message=str(error))
-                following = self._without_contact(following, untouched)
+                following = self._without_contact(following, contact_free)
                 new_sets = contact_sets(self.problem, following.state)
                 change = _relative_change(following.state, iterate.state)
                 history.append(self._record(following, new_sets, len(history), change, new_sets.n_changed(sets)))
                 iterate, sets = following, new_sets
             # where the travel to the obstacle hides the deformation, the certificate is relative to the travel
-            may_travel = untouched is None and status is not Status.MAX_STEPS
-            if may_travel and (travel := find_long_travel(self.problem)) is not None:
+            may_travel = contact_free is None and status is not Status.MAX_STEPS
+            if may_travel and (travel := find_long_motion(self.problem)) is not None:
                 status, words = Status.TOO_FAR, f"the travel is {travel:.1e} times the deformation"
                 iterate = replace(iterate, message=f"{words}; {iterate.message}".rstrip("; "))
             certificate = history[-1].certificate
@@ -303,11 +305,11 @@ class _Run:
                     sets = contact_sets(self.problem, state)
         return self._solution(iterate, status, sets, certificate, history)
 
-    def _untouched(self) -> FloatingResponse | None:
+    def _contact_free_response(self) -> FloatingResponse | None:
         """Return the response without any contact, if there is one; it does not depend on the law."""
         problem = self.problem
         return problem.for_all_laws(
-            "untouched", lambda: None if needs_contact(problem) else untouched_response(problem.body)
+            "contact_free", lambda: None if needs_contact(problem) else contact_free_response(problem.body)
         )
 
     def _first(self, start: ContactState | None, n_before: int) -> Iterate:
@@ -319,15 +321,15 @@ class _Run:
         iterate = self.solver.init(self.problem, state)
         return replace(iterate, linear_solves=iterate.linear_solves + linear_solves + n_before)
 
-    def _without_contact(self, iterate: Iterate, untouched: FloatingResponse | None) -> Iterate:
+    def _without_contact(self, iterate: Iterate, contact_free: FloatingResponse | None) -> Iterate:
         """Return the iterate without contact tractions, if the body needs none at its displacements.
 
         Solvers only approach tractions that vanish, and where all vanish nothing shows that the rest is small. A body
         that has moved far may be moved on by a little, out of the obstacle.
         """
-        if untouched is None or not iterate.state.is_finite:
+        if contact_free is None or not iterate.state.is_finite:
             return iterate
-        state = untouched.nearest_clear(iterate.state.displacement, self.problem.gap)
+        state = contact_free.nearest_clear(iterate.state.displacement, self.problem.gap)
         if not certify(self.problem, state).is_below(self.tolerance):
             return iterate
         return replace(iterate, state=state, message="the body rests without touching")

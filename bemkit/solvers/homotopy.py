@@ -80,7 +80,7 @@ def why_no_path(problem: ContactProblem, *, is_short: bool = False) -> str:
     Unless it is short it takes two responses or more for each contact node. The friction bound has to be continuous
     where nodes open.
     """
-    if problem.body.is_costly and not is_short:
+    if problem.body.responses_are_expensive and not is_short:
         return "the path of solutions is not followed, because responses of this body are costly"
     jumps = problem.cohesion > 0.0
     if np.any(jumps & ~np.asarray(problem.law.acts_across_gap)):

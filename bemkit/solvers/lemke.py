@@ -69,7 +69,7 @@ class LemkePivoting:
 
     def step(self, problem: ContactProblem, iterate: Iterate) -> Iterate:
         """Pivot from the origin to a solution; the body is asked for two responses for each contact node."""
-        if problem.body.is_costly:
+        if problem.body.responses_are_expensive:
             return replace(iterate, ended=Status.TOO_COSTLY)
         stiffness, load, linear_solves = _probed(problem)
         springs, spring_load = _springs(problem, iterate.state)

@@ -232,7 +232,7 @@ class FloatingResponse:
         return ContactState(state.displacement - shift.reshape(-1, 2), state.traction)
 
 
-def untouched_response(body: LinearBody) -> FloatingResponse | None:
+def contact_free_response(body: LinearBody) -> FloatingResponse | None:
     """Return the response without any contact, if rigid motions of the body are free and the load does no work on them.
 
     The work that round-off of supports leaves does not count.

@@ -72,7 +72,7 @@ class SolutionPath:
             end = follow_path(problem, bound)
         else:
             most = _SHORT + problem.n_contact // 8
-            most = min(most, _SHORT_AND_COSTLY) if problem.body.is_costly else most
+            most = min(most, _SHORT_AND_COSTLY) if problem.body.responses_are_expensive else most
             sets = contact_sets(problem, iterate.state)
             # a node whose friction drives its slip is on its way through stick to slip in the other direction
             direction = np.where(sets.direction * iterate.state.sigma_t > 0.0, 0, sets.direction)

@@ -16,7 +16,7 @@ from bemkit.contact.laws import Coulomb, FrictionLaw, Frictionless
 from bemkit.contact.problem import ContactProblem, ContactState
 from bemkit.geometry import BoundaryMesh, Polygon, Rectangle, Selection, Shape, discretise
 from bemkit.geometry.spaces import BoundarySpace, LinearSpace, dof_points
-from bemkit.model.untouched_body import UntouchedBody, certified
+from bemkit.model.contact_free_body import ContactFreeBody, certified
 from bemkit.operators.linear.dense import SingularMatrixError
 from bemkit.operators.material import Material
 from bemkit.operators.steklov_poincare import CondensedMap, SteklovPoincare
@@ -268,7 +268,7 @@ def test_a_body_that_touches_nothing_is_certified_under_its_own_weight() -> None
     space = heavy.displacement_space
     conditions = supported(space, [roller(mesh, part) for part in ("bottom", "left", "right")])
     nothing = np.zeros((space.n_dofs // 2, 2))
-    body = UntouchedBody(space, conditions, nothing, heavy.condense(conditions, nothing))
+    body = ContactFreeBody(space, conditions, nothing, heavy.condense(conditions, nothing))
     assert certified(body).status is Status.CONVERGED
     weightless = replace(body, condensed=replace(body.condensed, volume_force=None))
     assert weightless.imbalance(certified(body).state).force > 0.3

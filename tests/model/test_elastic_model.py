@@ -14,10 +14,10 @@ import bemkit as bk
 from bemkit.arrays import FloatArray, IntArray
 from bemkit.cli.console import print_summary
 from bemkit.geometry.spaces import dof_points
+from bemkit.model.contact_free_body import certified, contact_free_state
 from bemkit.model.free_motion import FreeBodyError
 from bemkit.model.model import build_model
 from bemkit.model.prepared import prepare
-from bemkit.model.untouched_body import certified, untouched_state
 from bemkit.operators.steklov_poincare import CondensedMap
 from bemkit.pictures import draw_boundary_traction, save_pictures
 from bemkit.results.result_file import read_result, write_result
@@ -304,8 +304,8 @@ def test_other_loads_need_no_other_matrices() -> None:
     scene = bending()
     model = build_model(prepare(scene, scene.build_mesh()))
     doubled = replace(scene, parts=(scene.parts[0], replace(scene.parts[1], condition=bk.Traction(y=0.1))))
-    ((u, _, energy),) = model.under(model.prepared.under(doubled)).boundary_fields(untouched_state())
-    ((v, _, fresh),) = build_model(prepare(doubled, model.prepared.only.mesh)).boundary_fields(untouched_state())
+    ((u, _, energy),) = model.under(model.prepared.under(doubled)).boundary_fields(contact_free_state())
+    ((v, _, fresh),) = build_model(prepare(doubled, model.prepared.only.mesh)).boundary_fields(contact_free_state())
     np.testing.assert_allclose(u, v, atol=1e-11 * np.abs(v).max())
     assert energy == pytest.approx(fresh, rel=1e-11)
     with pytest.raises(ValueError, match=r"material is .*: keep"):
@@ -332,7 +332,7 @@ def test_only_forces_in_equilibrium_are_certified() -> None:
     scene = bending()
     body = build_model(prepare(scene, scene.build_mesh())).body
     points = dof_points(body.space)
-    displacement, force = body.recover(untouched_state())
+    displacement, force = body.recover(contact_free_state())
     assert certified(body).is_converged
 
     def status_with(u: FloatArray, f: FloatArray) -> bk.Status:

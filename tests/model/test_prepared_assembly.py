@@ -9,8 +9,8 @@ import numpy as np
 import bemkit as bk
 from bemkit.contact.further_laws import PiecewiseLaw
 from bemkit.contact.laws import Coulomb, LawOfCoefficients
-from bemkit.model.contact_tractions import ContactSpread
 from bemkit.model.prepared import prepare_steps
+from bemkit.model.traction_recovery import TractionRecovery
 from bemkit.scene.load_history import load_steps
 from tests.runs.masonry import wall
 
@@ -34,10 +34,10 @@ def test_contacts_of_equal_laws_have_one_and_laws_of_the_place_each_their_own() 
 
 def test_forces_of_contacts_are_spread_alike_in_all_steps_of_a_history() -> None:
     steps = prepare_steps(load_steps(replace(wall(2, 2, push=True), load_factors=(0.0, 1.0))))
-    known = steps[0].spread
+    known = steps[0].recovery
     following = steps[0].under(steps[1].scene)
-    assert following.spread is known
-    anew = ContactSpread.of(following.bodies, following.rows)
+    assert following.recovery is known
+    anew = TractionRecovery.of(following.bodies, following.rows)
     for one, other in zip(anew.sides, known.sides, strict=True):
         np.testing.assert_array_equal(one.by_force, other.by_force)
     # forces arrive whole: as many as there are on both sides, against each other

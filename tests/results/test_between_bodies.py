@@ -105,7 +105,7 @@ def test_pairs_that_are_copies_of_each_other_are_measured_as_if_alone(
     alike = [each.as_dict() for each in solution.contacts_between_nodes.values()]
     assert [each["penetration_depth"] > 0.5 * DEPTH for each in alike] == [False, True, False]
     keys = count()
-    monkeypatch.setattr(between_bodies, "stand_alike", lambda one, two, reach: next(keys))
+    monkeypatch.setattr(between_bodies, "congruence_key", lambda one, two, reach: next(keys))
     alone = [each.as_dict() for each in replace(solution).contacts_between_nodes.values()]
     assert next(keys) == 3
     for one, other in zip(alike, alone, strict=True):

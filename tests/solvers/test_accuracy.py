@@ -33,7 +33,7 @@ def inexact_problem(law, accuracy=1e-10, error=1e-11, **options):
 @pytest.mark.parametrize("law", [Coulomb(0.5), Tresca(0.2)], ids=["coulomb", "tresca"])
 @pytest.mark.parametrize("driver", DRIVERS, ids=lambda driver: type(driver).__name__)
 def test_every_driver_ends_on_a_body_that_states_its_accuracy(driver, law):
-    problem = inexact_problem(law, is_costly=True)
+    problem = inexact_problem(law, responses_are_expensive=True)
     exact = solve(block_problem(law), driver)
     found = solve(problem, driver, tolerance=1e-8)
     np.testing.assert_array_equal(found.node_status, exact.node_status)
@@ -77,7 +77,7 @@ def test_the_whole_path_is_skipped_where_responses_are_costly():
     problem = hard_problem(16)
     whole = Fallbacks((SemismoothNewton(), SolutionPath(from_start=True)))
     assert any("path of" in record.message for record in solve(problem, whole).history)
-    costly = replace(problem, body=Inexact(problem.body, is_costly=True))
+    costly = replace(problem, body=Inexact(problem.body, responses_are_expensive=True))
     found = solve(costly, whole, throw=False)
     assert found.status is Status.CYCLING
     words = "the path of solutions is not followed, because responses of this body are costly"
@@ -88,7 +88,7 @@ def test_the_whole_path_is_skipped_where_responses_are_costly():
 
 
 def test_lemkes_method_declines_before_it_asks():
-    problem = inexact_problem(Coulomb(0.5), is_costly=True)
+    problem = inexact_problem(Coulomb(0.5), responses_are_expensive=True)
     found = solve(problem, LemkePivoting(), throw=False)
     assert found.status is Status.TOO_COSTLY
     assert found.message.startswith("This solver needs several responses for each contact node")

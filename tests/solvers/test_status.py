@@ -119,7 +119,7 @@ CASES = {
     ),
     "too costly": (
         Status.TOO_COSTLY,
-        ContactProblem(Inexact(block_body(n=3), is_costly=True), np.zeros(3), Coulomb(0.5)),
+        ContactProblem(Inexact(block_body(n=3), responses_are_expensive=True), np.zeros(3), Coulomb(0.5)),
         LemkePivoting(),
         {},
     ),

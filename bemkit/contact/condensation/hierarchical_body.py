@@ -140,7 +140,7 @@ class HierarchicalBody(LinearBody):
         return self.loaded.map.options.accuracy
 
     @property
-    def is_costly(self) -> bool:  # type: ignore[override]
+    def responses_are_expensive(self) -> bool:  # type: ignore[override]
         """Whether there are thousands of nodes."""
         return self.n_contact > _MANY
 
@@ -317,9 +317,9 @@ class HierarchicalBody(LinearBody):
                 break
             self._travelled[:] = [loaded.moved(travel)]
         response = self._elements.of_contact(state[:, :2] + traction, state[:, 2:] + moved)
-        met = conditions.with_given_tractions(response.traction)
-        met[self.tangent_follows, 1] = 0.0
-        return ContactState(conditions.with_given_displacements(response.displacement), met)
+        given_tractions = conditions.with_given_tractions(response.traction)
+        given_tractions[self.tangent_follows, 1] = 0.0
+        return ContactState(conditions.with_given_displacements(response.displacement), given_tractions)
 
 
 @dataclass(frozen=True, eq=False)

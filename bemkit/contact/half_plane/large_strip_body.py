@@ -32,7 +32,7 @@ class LargeStripBody(SurfaceBody):
 
     elastic: LargeHalfPlane
 
-    is_costly = True
+    responses_are_expensive = True
 
     @property
     def accuracy(self) -> float:  # type: ignore[override]

@@ -33,7 +33,7 @@ class PeriodicBody(SurfaceBody):
 
     elastic: PeriodicElasticity
 
-    is_costly = True
+    responses_are_expensive = True
 
     @property
     def accuracy(self) -> float:  # type: ignore[override]

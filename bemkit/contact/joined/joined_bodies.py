@@ -40,7 +40,7 @@ _WITHOUT_LOAD = (
         "_relative_stiffness",
         "_motion_fit",
     ),
-    *("owners", "moduli", "modulus", "stiffness_scale", "is_costly"),
+    *("owners", "moduli", "modulus", "stiffness_scale", "responses_are_expensive"),
 )
 """Cached values that do not depend on the load."""
 
@@ -97,10 +97,10 @@ class JoinedBodies(CoupledMembers, LinearBody):
     @cached_property
     def accuracy(self) -> float:  # type: ignore[override]  # an attribute of the protocol
         """Relative error of a response."""
-        return 1e-13 if self.is_costly else 1e-14
+        return 1e-13 if self.responses_are_expensive else 1e-14
 
     @cached_property
-    def is_costly(self) -> bool:  # type: ignore[override]  # an attribute of the protocol
+    def responses_are_expensive(self) -> bool:  # type: ignore[override]  # an attribute of the protocol
         """Whether a response takes a sparse factorisation."""
         if self.is_dense is not None:
             return not self.is_dense
@@ -113,7 +113,7 @@ class JoinedBodies(CoupledMembers, LinearBody):
         """Return relative displacements and tractions; see `LinearBody.respond`."""
         if self._is_direct:
             return self._dense.respond(conditions)
-        if not self.is_costly:
+        if not self.responses_are_expensive:
             return self._refined(conditions, self._dense.respond(conditions))
         self.held_friction.check(conditions)
         if conditions.free_motions(self.rigid_motions()).shape[0]:
@@ -146,7 +146,7 @@ class JoinedBodies(CoupledMembers, LinearBody):
 
     def rigid_motions(self) -> RigidMotions:
         """Return the relative displacements of the rigid motions of each member that no support resists."""
-        if self.is_costly:
+        if self.responses_are_expensive:
             return self.relative_motions
         return self.relative_motions.toarray().reshape(-1, self.n_contact, 2)
 
@@ -244,7 +244,7 @@ class JoinedBodies(CoupledMembers, LinearBody):
 
     @property
     def _is_direct(self) -> bool:
-        return not self.is_costly and self._node_coupling is not None
+        return not self.responses_are_expensive and self._node_coupling is not None
 
     @cached_property
     def _relative_stiffness(self) -> RelativeStiffness | DirectStiffness:

@@ -57,10 +57,10 @@ class CongruentCouplings:
 def _key(non_mortar: PlacedSide, mortar: PlacedSide, without: IntArray, reach: float) -> Hashable:
     one, two = ((placed.side.mesh, placed.placement) for placed in (non_mortar, mortar))
     sides = (non_mortar.side.elements.tobytes(), mortar.side.elements.tobytes())
-    return (stand_alike(one, two, reach), sides, without.tobytes())
+    return (congruence_key(one, two, reach), sides, without.tobytes())
 
 
-def stand_alike(one: tuple[BoundaryMesh, Placement], two: tuple[BoundaryMesh, Placement], reach: float) -> Hashable:
+def congruence_key(one: tuple[BoundaryMesh, Placement], two: tuple[BoundaryMesh, Placement], reach: float) -> Hashable:
     """Return a key that is equal for pairs of meshes that are copies of each other, moved as a whole.
 
     Parameters

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bemkit.arrays import FloatArray, IntArray
-from bemkit.operators.half_plane.far_drive import FarDrive
+from bemkit.operators.half_plane.far_drive import FarMotion
 from bemkit.operators.linear.dense import Cholesky
 from bemkit.operators.steklov_poincare.nodal_conditions import GivenData, NodalConditions, rotated
 from bemkit.operators.steklov_poincare.protocol import CondensedMap
@@ -25,7 +25,7 @@ class CondensedHalfPlane:
     Parameters
     ----------
     conditions : NodalConditions
-    drive : FarDrive
+    drive : FarMotion
     flexibility : (n_dofs, n_dofs) array [1/Pa]
         In the frames of the nodes.
     motions : (n_dofs, 3) array
@@ -44,7 +44,7 @@ class CondensedHalfPlane:
     """
 
     conditions: NodalConditions
-    drive: FarDrive
+    drive: FarMotion
     flexibility: FloatArray
     motions: FloatArray
     strained: FloatArray
@@ -58,7 +58,7 @@ class CondensedHalfPlane:
     def of(
         cls,
         conditions: NodalConditions,
-        drive: FarDrive,
+        drive: FarMotion,
         flexibility: FloatArray,
         points: FloatArray,
         along: FloatArray,

@@ -11,7 +11,7 @@ from bemkit.operators.rigid_modes import rigid_motions
 
 
 @dataclass(frozen=True)
-class FarDrive:
+class FarMotion:
     """Motion of a half-plane far away along x, along y and as a turn: given, or driven by a load.
 
     Parameters
@@ -34,7 +34,7 @@ class FarDrive:
     centre: tuple[float, float] = (0.0, 0.0)
     strain: float = 0.0
 
-    def blended(self, other: FarDrive, share: float) -> FarDrive:
+    def blended(self, other: FarMotion, share: float) -> FarMotion:
         """Return the drive a share of the way to another one."""
         pairs = ((self.motion, other.motion), (self.load, other.load))
         motion, load = (blended(np.array(one), np.array(two), share).tolist() for one, two in pairs)

@@ -12,7 +12,7 @@ from bemkit.arrays import ComplexArray
 from bemkit.operators.counts import OperationCounts
 from bemkit.operators.half_plane.elasticity import HalfPlaneElasticity
 from bemkit.operators.half_plane.equations import HalfPlaneEquations, StripView, potential_of
-from bemkit.operators.half_plane.far_drive import FarDrive
+from bemkit.operators.half_plane.far_drive import FarMotion
 from bemkit.operators.half_plane.needs import strip_needs
 from bemkit.operators.hierarchy.factor import Factor
 from bemkit.operators.hierarchy.tree import ClusterTree
@@ -53,7 +53,7 @@ class LargeHalfPlane(HalfPlaneElasticity):
         points = np.stack([equations.points.real, np.zeros(self.mesh.n_elements)], axis=1)
         return Factor(equations, ClusterTree.of(points, _LEAF), self.tolerance, level_view=StripView)
 
-    def driven_by(self, drive: FarDrive) -> Self:
+    def driven_by(self, drive: FarMotion) -> Self:
         """Return the same half-plane under another drive; under loads on the same motions, the factor is kept."""
         other = super().driven_by(drive)
         if (drive.driven, drive.centre) == (self.drive.driven, self.drive.centre) and "factor" in self.__dict__:

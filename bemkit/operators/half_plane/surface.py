@@ -16,7 +16,7 @@ from bemkit.arrays import ComplexArray, FloatArray
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.spaces import ConstantSpace, dof_points
 from bemkit.operators.counts import Factorisation, FactorKind, OperationCounts
-from bemkit.operators.half_plane.far_drive import FarDrive
+from bemkit.operators.half_plane.far_drive import FarMotion
 from bemkit.operators.material import Material
 from bemkit.operators.pair_form import Tag
 from bemkit.operators.steklov_poincare.needs import BodyCase, BodyNeeds
@@ -33,7 +33,7 @@ class SurfaceElasticity(ABC):
     mesh : BoundaryMesh
         The surface, in units of its length.
     material : Material
-    drive : FarDrive
+    drive : FarMotion
         How the half-plane moves far away; it rests unless given.
     last : list
         The last tractions and what they displace: a response, its certificate and its fields ask for the same.
@@ -41,7 +41,7 @@ class SurfaceElasticity(ABC):
 
     mesh: BoundaryMesh
     material: Material
-    drive: FarDrive = field(default_factory=FarDrive)
+    drive: FarMotion = field(default_factory=FarMotion)
     last: list[tuple[ComplexArray, ComplexArray]] = field(default_factory=list, repr=False)
 
     @cached_property
@@ -73,7 +73,7 @@ class SurfaceElasticity(ABC):
         """Operation counts of the flexibility."""
         return OperationCounts()
 
-    def driven_by(self, drive: FarDrive) -> Self:
+    def driven_by(self, drive: FarMotion) -> Self:
         """Return the same half-plane under another drive; nothing is integrated again."""
         other = replace(self, drive=drive)
         if "flexibility" in self.__dict__:

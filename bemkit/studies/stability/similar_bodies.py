@@ -110,7 +110,7 @@ class BodiesSimilarity:
 
     def _rigid(self, body: RigidBody) -> RigidBody:
         """Return the rigid body that moves alike; one that a force drives along only one axis cannot be turned."""
-        is_pushed = body.is_driven[:2]
+        is_pushed = body.is_load_controlled[:2]
         if is_pushed.any() and not is_pushed.all() and self.turn != 0.0:
             raise InputError(
                 f"rigid body {body.name!r} is driven by a force along only one axis, which cannot be turned: give "

@@ -133,10 +133,10 @@ def rigid_mismatch(joints: Joints) -> float:
             size += float(np.abs(force).sum()) + scales.stress * float(table.weight[rows].min())
         reach = np.array([1.0, 1.0, max(each.result.mesh.diameter for each in joints.bodies.values())])
         reaction = np.array([found.force_x, found.force_y, found.moment])
-        unexplained = (reaction - total, np.where(body.is_driven, reaction - body.load, 0.0))
+        unexplained = (reaction - total, np.where(body.is_load_controlled, reaction - body.load, 0.0))
         worst += [float(np.abs(each / reach).max()) / (size or 1.0) for each in unexplained]
         motion = np.array([found.x, found.y, found.turn])
-        worst.append(float(np.abs(np.where(body.is_driven, 0.0, motion - body.motion)).max()))
+        worst.append(float(np.abs(np.where(body.is_load_controlled, 0.0, motion - body.motion)).max()))
     return float(np.max(worst))
 
 

@@ -189,7 +189,7 @@ class Surface:
     @cached_property
     def _fitted(self) -> tuple[FloatArray, FloatArray]:
         """Driven motions (3,), and displacements (n_seen, 2) [m] that neither tractions nor motions explain."""
-        rows = np.flatnonzero(self.far.is_driven)
+        rows = np.flatnonzero(self.far.is_load_controlled)
         of_turn = np.array([1.0, 1.0, 1.0 / self.extent])
         motions = self.motions[self.seen]
         left = self.fields.solution.boundary.displacement[self.seen] - self.by_tractions - motions @ self.far.motion
@@ -219,7 +219,7 @@ class Surface:
     def imbalance(self) -> float:
         """Return the work of tractions and of loads far away on the motions that these drive, over that of all [-]."""
         worst = [0.0]
-        for k in np.flatnonzero(self.far.is_driven):
+        for k in np.flatnonzero(self.far.is_load_controlled):
             motions, load = self.motions[:, :, k], float(self.far.load[k])
             # by all forces: along a motion that none of them drives there is only round-off
             size = float(np.hypot(*self.force.T) @ np.hypot(*motions.T)) + abs(load)

@@ -28,7 +28,7 @@ FORMS = pytest.mark.parametrize("is_dense", [True, False])
 @FORMS
 def test_floating_blocks_keep_the_promises_of_a_body(is_dense):
     body = row_of_blocks((1.0, 3.0, 0.5), is_dense=is_dense)
-    assert body.is_costly is not is_dense
+    assert body.responses_are_expensive is not is_dense
     reloaded = body.under([1.3 * member.load for member in body.members], body.offset + 0.1)
     check_body(body, is_symmetric=True, reloaded=reloaded)
 

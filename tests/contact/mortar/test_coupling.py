@@ -154,8 +154,8 @@ def test_means_of_polynomials_are_their_values_at_the_nodes(degree: int) -> None
     points = coupling.points[is_dual]
     gap = (0.1 + 0.2 * points[:, 0]) / (np.cos(half) + 0.2 * np.sin(half))
     np.testing.assert_allclose(coupling.gap[is_dual], gap, rtol=1e-12)
-    met = (coupling.on_mortar @ dof_points(two.space))[is_dual]
-    np.testing.assert_allclose(met, points + gap[:, None] * direction, atol=1e-13)
+    partners = (coupling.on_mortar @ dof_points(two.space))[is_dual]
+    np.testing.assert_allclose(partners, points + gap[:, None] * direction, atol=1e-13)
 
 
 @given(st.tuples(degrees, degrees), st.floats(-0.5, 0.5), st.floats(-9.0, 9.0), st.floats(-3.0, 3.0))

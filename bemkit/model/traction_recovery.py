@@ -21,12 +21,12 @@ _Entries = tuple[FloatArray, IntArray, IntArray]
 
 
 @dataclass(frozen=True, eq=False)
-class ContactSpread:
+class TractionRecovery:
     """How the forces of contact nodes are spread over the elements of all contact sides.
 
     Parameters
     ----------
-    sides : tuple of SpreadSide
+    sides : tuple of RecoveredSide
 
     Notes
     -----
@@ -36,10 +36,10 @@ class ContactSpread:
     length. Forces of all contacts of a side are added up first.
     """
 
-    sides: tuple[SpreadSide, ...]
+    sides: tuple[RecoveredSide, ...]
 
     @classmethod
-    def of(cls, bodies: Sequence[PlacedBody], contacts: Sequence[ContactRows]) -> ContactSpread:
+    def of(cls, bodies: Sequence[PlacedBody], contacts: Sequence[ContactRows]) -> TractionRecovery:
         """Work out what the couplings of contacts say."""
         sides: dict[tuple[int, bytes], _Side] = {}
         first = 0
@@ -50,7 +50,7 @@ class ContactSpread:
                     sides[key] = _Side(number, elements, bodies[number])
                 sides[key].add(rows, first, *side_of_rows)
             first += rows.n_contact
-        return cls(tuple(side.spread() for side in sides.values()))
+        return cls(tuple(side.recovered() for side in sides.values()))
 
     def tractions(self, forces: FloatArray) -> list[tuple[int, IntArray, FloatArray]]:
         """Return body, elements (m,) and tractions (m, n_local, 2) [Pa] in x and y of each side.
@@ -64,7 +64,7 @@ class ContactSpread:
 
 
 @dataclass(frozen=True, eq=False)
-class SpreadSide:
+class RecoveredSide:
     """Elements (m,) of a body in contact, and their tractions under the forces of contact nodes.
 
     Parameters
@@ -115,7 +115,7 @@ class _Side:
         if rows.couplings is None:  # an obstacle ends nowhere
             self.reached[:] = 1.0 + self.reached.max()
 
-    def spread(self) -> SpreadSide:
+    def recovered(self) -> RecoveredSide:
         """Return the tractions of the elements equivalent to the forces of nodes."""
         is_reached = self.reached > _REACHED * self.reached.max(initial=0.0)
         is_covered = is_reached[self.local].all(axis=1)
@@ -134,7 +134,7 @@ class _Side:
         shares = is_covered[:, None] / np.where(totals > 0.0, totals, np.inf)[self.local]
         values = (self.projection @ lifting) * shares[:, None]  # (m, n_values, n_local)
         shares, contact_nodes, nodes = (np.concatenate(each) for each in zip(*self.entries, strict=True))
-        return SpreadSide(self.body, self.elements, shares, contact_nodes, nodes, values, self.local)
+        return RecoveredSide(self.body, self.elements, shares, contact_nodes, nodes, values, self.local)
 
 
 def _sides(rows: ContactRows, first: int) -> list[tuple[int, IntArray, _Entries]]:

@@ -25,7 +25,7 @@ _TOLERANCE = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
-class UntouchedBody(LinearBody):
+class ContactFreeBody(LinearBody):
     """An elastic body held only by its supports; fulfils `LinearBody` with no contact node.
 
     Parameters
@@ -55,13 +55,13 @@ class UntouchedBody(LinearBody):
 
     def respond(self, conditions: LinearConditions) -> ContactState:
         """Return the state without nodes."""
-        return untouched_state()
+        return contact_free_state()
 
     def recover(self, state: ContactState) -> tuple[FloatArray, FloatArray]:
         """Return displacement (n_nodes, 2) and total force (n_nodes, 2) of all boundary nodes, in x and y."""
         return self.condensed.recover(np.zeros(0))
 
-    def under(self, displacement: FloatArray, force: FloatArray, inside: ForcesInside | None = None) -> UntouchedBody:
+    def under(self, displacement: FloatArray, force: FloatArray, inside: ForcesInside | None = None) -> ContactFreeBody:
         """Return the same body under other displacements and forces; see `DirectBody.under`."""
         conditions = replace(self.conditions, displacement=displacement)
         condensed = condensed_under(self.condensed, conditions, force, inside)
@@ -85,7 +85,7 @@ class UntouchedBody(LinearBody):
         return residual.joined(resultant_imbalance(points, force, balanced, round_off, resultant, inner))
 
 
-def untouched_state() -> ContactState:
+def contact_free_state() -> ContactState:
     """Return the contact state without nodes."""
     return ContactState(np.zeros((0, 2)), np.zeros((0, 2)))
 
@@ -104,7 +104,7 @@ def certified(body: LinearBody, callback: Callable[[StepRecord], None] | None = 
     ContactSolution
         CONVERGED if all forces are in equilibrium.
     """
-    state = untouched_state()
+    state = contact_free_state()
     off = body.imbalance(state)
     certificate = Certificate(0.0, 0.0, 0.0, 0.0, 0.0, off.force, off.moment, off.round_off)
     if np.isnan(certificate.worst):
