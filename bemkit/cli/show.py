@@ -17,7 +17,7 @@ from bemkit.cli.streams import print_data
 @options.csv_option
 @click.option(
     "--table",
-    type=click.Choice(["contact", "boundary", "history", "steps", "forces"]),
+    type=click.Choice(["contact", "boundary", "history", "steps", "forces", "pressures"]),
     help="Table of --csv (contact).",
 )
 @options.json_option

@@ -5,22 +5,114 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from pathlib import Path
 
 import numpy as np
 
 from bemkit.arrays import FloatArray
+from bemkit.contact import profile_filters
+from bemkit.contact.profile_file import LARGEST_STEP, ProfileError, ReadProfile, read_profile
+from bemkit.contact.profile_filters import Levelling
 from bemkit.errors import InputError, printable
 
-_LARGEST_STEP = 5.0
-"""Distance of two neighbours, in usual steps, from which on points are missing between them."""
 _POINTS_OF_WAVE = 16
 """Points of the shortest wave: the error of a spline through them is less than 1e-4 of its height."""
 _MOST_WAVES = 1_000_000
+_STEEPER = 2.0
+"""Slope over the seam of a period, by the steepest one elsewhere, from which on it is a jump."""
 
 
-class ProfileError(InputError):
-    """A file that holds no profile; the message names the file, the line and the remedy."""
+@dataclass(frozen=True)
+class ProfilePoints:
+    """A rigid rough obstacle, straight between points; its highest point touches the undeformed body.
+
+    Parameters
+    ----------
+    points : sequence of (x, height) [m]
+        With increasing x.
+    period : float, optional [m]
+        Distance after which the profile repeats itself. Without it nothing can be touched beyond its ends.
+    distance : float [m]
+        Between the highest point and the body.
+
+    Raises
+    ------
+    InputError
+        If there are fewer than two points, x does not increase, a number is not finite, the points are longer than the
+        period, or they leave a gap at its end.
+    """
+
+    points: tuple[tuple[float, float], ...]
+    period: float | None = None
+    distance: float = 0.0
+
+    def __post_init__(self) -> None:
+        if not math.isfinite(self.distance):
+            raise InputError(f"distance is {self.distance}: give a finite number")
+        if len(self.points) < 2 or not np.isfinite(self.points).all():
+            raise InputError(f"points has {len(self.points)} entries: give at least two finite points")
+        x, _ = self.columns
+        steps = np.diff(x)
+        if (k := int(np.argmin(steps))) >= 0 and steps[k] <= 0.0:
+            raise InputError(f"points[{k + 1}] is at x = {x[k + 1]:.6g} after {x[k]:.6g}: sort the points by x")
+        if self.period is None:
+            return
+        length = float(x[-1] - x[0])
+        if not length <= self.period < math.inf:
+            raise InputError(
+                f"the profile is {length:.6g} long, more than its period, {self.period}: give the length after which "
+                "it repeats itself"
+            )
+        if self.period - length > LARGEST_STEP * float(np.median(steps)):
+            raise InputError(
+                f"the profile is {length:.6g} long, and no points are known up to its period, {self.period}: give the "
+                "length after which it repeats itself"
+            )
+
+    @cached_property
+    def columns(self) -> tuple[FloatArray, FloatArray]:
+        """Positions and heights, two (n,) arrays [m]."""
+        x, heights = np.array(self.points, float).T
+        return x, heights
+
+    @property
+    def rms_height(self) -> float:
+        """Root mean square of the heights about their mean [m]."""
+        return profile_filters.rms_height(*self._closed)
+
+    @property
+    def rms_slope(self) -> float:
+        """Root mean square of the slopes [-]; infinite with a vertical jump at the seam."""
+        return profile_filters.rms_slope(*self._closed)
+
+    @property
+    def _closed(self) -> tuple[FloatArray, FloatArray]:
+        """Positions and heights of a whole period, if there is one."""
+        x, heights = self.columns
+        return (
+            (x, heights) if self.period is None else (np.append(x, x[0] + self.period), np.append(heights, heights[0]))
+        )
+
+    @property
+    def seam_jump(self) -> float:
+        """The step [m] from the end of a period to the next one; zero if it is not steeper than others."""
+        x, heights = self._closed
+        steps, rises = np.diff(x), np.abs(np.diff(heights))
+        if self.period is None or rises.size < 2:
+            return 0.0
+        steepest = float((rises[:-1] / steps[:-1]).max())
+        is_jump = rises[-1] > _STEEPER * steepest * max(float(steps[-1]), float(np.median(steps)))
+        return float(heights[-1] - heights[-2]) if is_jump else 0.0
+
+    def heights(self, x: FloatArray) -> FloatArray:
+        """Return the heights (n,) [m] at positions (n,) [m], minus infinity beyond the ends."""
+        places, heights = self.columns
+        if self.period is not None:
+            return np.asarray(np.interp(x, places, heights, period=self.period))
+        return np.asarray(np.interp(x, places, heights, left=-np.inf, right=-np.inf))
+
+    def gap(self, points: FloatArray, normals: FloatArray) -> FloatArray:
+        """Measure how far the profile is below its highest point; see `bemkit.contact.obstacle.Obstacle.gap`."""
+        return np.asarray(self.distance + self.columns[1].max() - self.heights(points[:, 0]))
 
 
 @dataclass(frozen=True)
@@ -31,111 +123,106 @@ class Profile:
     ----------
     file : str
         Text of two columns, position and height [m], between which it is straight; separated by commas, semicolons or
-        blanks. Lines that begin with # and a first line without numbers are skipped. The file is found from the folder
-        in which bemkit runs.
+        blanks. Lines that begin with # and a first line without numbers are skipped. Files of instruments are read by
+        SurfaceTopography, in metres. A scene file names it from its own folder, Python from that in which it runs.
     period : float, optional [m]
         Distance after which the profile repeats itself. Without it nothing can be touched beyond its ends.
     distance : float [m]
         Between the highest point and the body.
+    row : int, optional
+        Row of a map of heights from an instrument, counted from 0.
+    scale : float, optional
+        Factor of all positions and heights of the file; default 1.
+    height_scale : float
+        Another factor of the heights, such as 1e-3 of a file in mm and um.
+    levelling : Levelling
+        What is subtracted first: nothing, the line of least squares, or the line through both ends.
+    shortest_wavelength, longest_wavelength : float, optional [m]
+        Cut-offs of Gaussian filters, which pass half the height of waves so long, and more of the waves between them.
 
     Raises
     ------
     ProfileError
         If the file cannot be read, a line is not two finite numbers, positions do not increase, points are missing
         between two, or the profile is longer than its period.
+    InputError
+        If another number is out of range.
     """
 
     file: str
     period: float | None = None
     distance: float = 0.0
+    row: int | None = None
+    scale: float | None = None
+    height_scale: float = 1.0
+    levelling: Levelling = Levelling.NONE
+    shortest_wavelength: float | None = None
+    longest_wavelength: float | None = None
 
     def __post_init__(self) -> None:
-        if not math.isfinite(self.distance):
-            raise InputError(f"distance is {self.distance}: give a finite number")
-        x, _ = self.points
-        if self.period is not None and not x[-1] - x[0] <= self.period < math.inf:
-            raise ProfileError(
-                f"{printable(self.file)}: the profile is {x[-1] - x[0]:.6g} long, more than its period, {self.period}: "
-                "give the length after which it repeats itself"
-            )
+        shortest, longest = self.shortest_wavelength, self.longest_wavelength
+        given = {"scale": self.scale, "shortest_wavelength": shortest, "longest_wavelength": longest}
+        for name, value in given.items():
+            if value is not None and not 0.0 < value < math.inf:
+                raise InputError(f"{name} is {value}: give a positive number")
+        if not (math.isfinite(self.height_scale) and self.height_scale):
+            raise InputError(f"height_scale is {self.height_scale}: give a finite factor other than zero")
+        if shortest is not None and longest is not None and shortest >= longest:
+            raise InputError(f"shortest_wavelength is {shortest}: give less than longest_wavelength, {longest}")
+        _ = self.profile
 
     @cached_property
-    def points(self) -> tuple[FloatArray, FloatArray]:
-        """Positions and heights, two (n,) arrays [m]."""
-        return read_profile(self.file)
+    def profile(self) -> ProfilePoints:
+        """Content of the file in plain numbers, levelled and filtered."""
+        cut_offs = self.shortest_wavelength, self.longest_wavelength
+        if cut_offs == (None, None):
+            return self._levelled
+        return self._points(*profile_filters.filtered(*self._levelled.columns, self.period, *cut_offs))
+
+    @cached_property
+    def _levelled(self) -> ProfilePoints:
+        scale = 1.0 if self.scale is None else self.scale
+        x, heights = scale * self._read.x, scale * self.height_scale * self._read.heights
+        return self._points(x, profile_filters.levelled(x, heights, self.levelling))
+
+    def _points(self, x: FloatArray, heights: FloatArray) -> ProfilePoints:
+        try:
+            return ProfilePoints(tuple(zip(x.tolist(), heights.tolist(), strict=True)), self.period, self.distance)
+        except InputError as error:
+            stated = f"; the file is in {self.unit!r}, and scale converts it" if self.unit else ""
+            raise ProfileError(f"{printable(self.file)}: {error}{stated}") from error
+
+    @property
+    def seam_jump(self) -> float:
+        """That of `ProfilePoints`, before filters spread it [m]."""
+        return self._levelled.seam_jump
+
+    @cached_property
+    def _read(self) -> ReadProfile:
+        return read_profile(self.file, self.row)
+
+    @property
+    def unit(self) -> str:
+        """Unit of length that the file states; empty if none, or if a scale replaces it."""
+        return self._read.unit if self.scale is None else ""
+
+    @property
+    def rms_height(self) -> float:
+        """Root mean square of the heights about their mean [m]."""
+        return self.profile.rms_height
+
+    @property
+    def rms_slope(self) -> float:
+        """Root mean square of the slopes [-]."""
+        return self.profile.rms_slope
 
     def heights(self, x: FloatArray) -> FloatArray:
         """Return the heights (n,) [m] at positions (n,) [m], minus infinity beyond the ends."""
-        places, heights = self.points
-        if self.period is not None:
-            return np.asarray(np.interp(x, places, heights, period=self.period))
-        return np.asarray(np.interp(x, places, heights, left=-np.inf, right=-np.inf))
+        return self.profile.heights(x)
 
     def gap(self, points: FloatArray, normals: FloatArray) -> FloatArray:
         """Measure how far the profile is below its highest point; see `bemkit.contact.obstacle.Obstacle.gap`."""
-        return np.asarray(self.distance + self.points[1].max() - self.heights(points[:, 0]))
-
-
-def read_profile(file: str | Path) -> tuple[FloatArray, FloatArray]:
-    """Read a profile; see `Profile`.
-
-    Returns
-    -------
-    x, heights : (n,) arrays [m]
-
-    Raises
-    ------
-    ProfileError
-    """
-    name = printable(str(file))
-    try:
-        lines = Path(file).read_text("utf-8-sig").splitlines()
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or "not text"
-        raise ProfileError(f"{name}: cannot be read ({reason}): give a text file of two columns") from error
-    rows: list[tuple[float, float]] = []
-    numbers: list[int] = []
-    for number, line in enumerate(lines, start=1):
-        cells = _cells(line)
-        if not cells or cells[0].startswith("#") or (not rows and number == 1 and not _is_number(cells[0])):
-            continue
-        if len(cells) != 2 or not all(map(_is_number, cells)):
-            raise ProfileError(
-                f"{name}: line {number} is {printable(line.strip())[:60]!r}: give two finite numbers, position and "
-                "height; where no height is known, cut the profile there or fill it in"
-            )
-        rows.append((float(cells[0]), float(cells[1])))
-        numbers.append(number)
-    if len(rows) < 2:
-        raise ProfileError(f"{name}: has {len(rows)} points: give at least two lines of position and height")
-    x, heights = np.array(rows).T
-    steps = np.diff(x)
-    if (k := int(np.argmin(steps))) >= 0 and steps[k] <= 0.0:
-        raise ProfileError(
-            f"{name}: line {numbers[k + 1]}: the position {x[k + 1]:.6g} comes after {x[k]:.6g}: sort the lines by "
-            "position, and remove repeated points"
-        )
-    if steps[k := int(np.argmax(steps))] > _LARGEST_STEP * float(np.median(steps)):
-        raise ProfileError(
-            f"{name}: line {numbers[k + 1]}: no points between {x[k]:.6g} and {x[k + 1]:.6g}, "
-            f"{steps[k] / np.median(steps):.3g} usual steps: cut the profile there or fill the gap"
-        )
-    return x, heights
-
-
-def _cells(line: str) -> list[str]:
-    """Split a line; a cell between two separators may be empty."""
-    for separator in (",", ";"):
-        if separator in line:
-            return [cell.strip() for cell in line.split(separator)]
-    return line.split()
-
-
-def _is_number(cell: str) -> bool:
-    try:
-        return math.isfinite(float(cell))
-    except ValueError:
-        return False
+        return self.profile.gap(points, normals)
 
 
 @dataclass(frozen=True, kw_only=True)

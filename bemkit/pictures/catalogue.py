@@ -20,12 +20,15 @@ from bemkit.pictures.convergence import draw_convergence
 from bemkit.pictures.deformation import draw_deformation, draw_scene
 from bemkit.pictures.drawing import Axes, Figure
 from bemkit.pictures.load_history import draw_friction_loop, draw_status_over_time, draw_work, has_friction
+from bemkit.pictures.pressure_distribution import draw_pressure_distribution
 from bemkit.pictures.shown import Result
 from bemkit.pictures.stress import draw_stress
 from bemkit.results.stress_measures import STRESSES
 from bemkit.stopwatch import announce
 
 _FEW = 2048
+_MANY_ZONES = 20
+"""Changes of the status along a contact from which on it is rough."""
 MOST_CONTACTS = 6
 """Contacts up to which each has pictures of its own where none is named."""
 
@@ -152,6 +155,11 @@ def _is_fast(result: Result) -> bool:
     return all(body.mesh.surface is None or body.mesh.n_elements <= _FEW for body in result.bodies.values())
 
 
+def _is_rough(result: Result) -> bool:
+    """Whether contact is in so many places that a distribution says more than a curve."""
+    return _has_few_contacts(result) and len(result.transitions) > _MANY_ZONES * len(result.contact.parts)
+
+
 def _never(result: Result) -> bool:
     return False
 
@@ -188,6 +196,9 @@ _ALL = (
     _contact("traction", "tractions and friction bound along each contact", draw_contact_traction),
     _contact("status", "pressure and clearance along each contact", draw_contact_clearance),
     _contact("friction-cone", "friction over pressure, along each contact", draw_friction_cone, is_default=_never),
+    _contact(
+        "pressures", "distribution of the pressures on each contact", draw_pressure_distribution, is_default=_is_rough
+    ),
     *map(_stress, STRESSES),
     Picture("scene", "bodies, supports, loads and obstacles", draw_scene, is_default=_never),
     Picture("convergence", "violations over the solver's steps", draw_convergence, is_default=_never),

@@ -28,6 +28,7 @@ from bemkit.plan.items import Sizes as Sizes
 from bemkit.plan.items import find_sizes, items_of_one, items_of_several
 from bemkit.result_warning import ResultWarning
 from bemkit.scene.load_history import load_steps
+from bemkit.scene.profiles import profile_warnings
 from bemkit.scene.scene import Scene
 from bemkit.stopwatch import announce
 
@@ -129,6 +130,8 @@ def plan_steps(steps: Sequence[Prepared], proposal: Symmetry | None = None) -> P
         items = items_of_one(first.only.scene, sizes, needs[0].items, len(steps), proposal)
     else:
         items = tuple(items_of_several(first, sizes, len(steps), is_dense=contact.is_dense))
+    thinness = [warning for body in drawn for warning in first.thinness_warnings(body)]
+    of_profiles = [each for body in drawn for each in profile_warnings(body.scene.parts, body.scene.units)]
     return Plan(
         linear_solver=linear_solver.solver,
         sizes=sizes,
@@ -136,7 +139,7 @@ def plan_steps(steps: Sequence[Prepared], proposal: Symmetry | None = None) -> P
         memory=int(kept + max(contact.memory, *(each.memory - each.kept for each in needs))),
         seconds=LEAST_SECONDS + seconds_of(sum(each.evaluations for each in needs), flops),
         items=items,
-        warnings=tuple(dict.fromkeys(warning for body in drawn for warning in first.thinness_warnings(body))),
+        warnings=tuple(dict.fromkeys([*thinness, *of_profiles])),
         is_compressed=linear_solver.hierarchical is not None,
     )
 

@@ -66,7 +66,7 @@ from bemkit.results.step_group import (
 from bemkit.scene.load_history import load_steps
 from bemkit.scene.scene import Scene
 from bemkit.scene.serialisation import structure
-from bemkit.scene.toml import MAX_BYTES, SceneError, scene_from_toml, scene_to_toml
+from bemkit.scene.toml import SceneError, scene_from_toml, scene_to_toml
 from bemkit.scene.written_tables import unstructure
 from bemkit.sealed_file import GrowingFile
 from bemkit.solvers.base import Status
@@ -78,6 +78,8 @@ if TYPE_CHECKING:
 
 __all__ = ["OutputFileError", "ResultFileError", "ResultWriter", "check_result_target", "read_result", "write_result"]
 
+_MOST_BYTES = 100_000_000
+"""Size of a scene as text, which holds the points of measured profiles."""
 FORMAT = FileFormat("bemkit-result", 6, "bemkit result", "bemkit run -o")
 _MAX_PLAN = 1_000_000
 
@@ -247,7 +249,7 @@ def _group(number: int) -> str:
 
 
 def _read_problem(reader: Reader, name: str) -> Scene:
-    return scene_from_toml(reader.text(name, MAX_BYTES), name="scene inside")
+    return scene_from_toml(reader.text(name, _MOST_BYTES), name="scene inside")
 
 
 def _read_history(reader: Reader, asked: Scene, listed: Scene, layout: StepLayout) -> Solution:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import fields
+from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,7 @@ from bemkit.geometry.local_values import values_on_elements
 from bemkit.geometry.vectors import components_before
 from bemkit.results.contact_table import CONTACT_COLUMNS
 from bemkit.results.load_history import step_rows
+from bemkit.results.pressure_distribution import PressureShare, pressure_shares
 from bemkit.results.resultants import part_facts
 from bemkit.results.solution import Solution
 from bemkit.results.solved_body import SolvedBody
@@ -22,7 +24,7 @@ from bemkit.results.stress_measures import STRESSES
 from bemkit.solvers.base import StepRecord
 from bemkit.table import Column, Table, json_text
 
-TABLES = ("contact", "boundary", "history", "steps", "forces")
+TABLES = ("contact", "boundary", "history", "steps", "forces", "pressures")
 CERTIFICATE_ENTRIES = tuple(entry.name for entry in fields(Certificate))
 RECORD_COUNTS = ("step", "linear_solves", "n_separated", "n_stick", "n_slip", "n_changed")
 _BOUNDARY = (
@@ -56,7 +58,7 @@ def to_csv(solution: Solution, table: str) -> str:
     table : str
         ``"contact"``: one row per contact node; ``"boundary"``: one row per element, values at its centre;
         ``"history"``: one row per step of the solver; ``"steps"``: one row per step of the load history; ``"forces"``:
-        the resultants on each part.
+        the resultants on each part; ``"pressures"``: the distribution of pressures on each contact.
 
     Raises
     ------
@@ -70,6 +72,9 @@ def table_of(solution: Solution, table: str) -> Table:
     """Return one table of a solution; see `to_csv`."""
     if table not in TABLES:
         raise InputError(f"table is {table!r}: give one of {', '.join(TABLES)}")
+    if table == "pressures":
+        shares = (pressure_shares(solution.contact, part) for part in solution.contact.parts)
+        return Table.from_records(PressureShare, chain.from_iterable(shares))
     arrays = _columns(solution, table)
     known = {head.name: head for head in (*CONTACT_COLUMNS, *_BOUNDARY, *_FORCES)}
     return Table.from_arrays([known.get(name) or Column(name) for name in arrays], arrays)

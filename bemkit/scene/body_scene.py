@@ -26,6 +26,7 @@ from bemkit.scene.conditions import Clamped, Contact, Free, Part, PrescribedDisp
 from bemkit.scene.discretisation import Discretisation, Galerkin
 from bemkit.scene.mesh_options import MeshOptions
 from bemkit.scene.plane_motion import FarField
+from bemkit.scene.profiles import check_profiles
 from bemkit.scene.steps import Step, check_laws
 from bemkit.scene.unit_names import UnitNames, check_length_of_file
 
@@ -87,6 +88,8 @@ class BodyScene:
             _check_half_plane(outline, self.far, self.discretisation, self.mesh, self.parts)
         if self.units is not None and outline.drawing is not None:
             check_length_of_file(outline.drawing.unit, self.units)
+        if self.units is not None:
+            check_profiles(self.parts, self.units)
         if self.body_forces and outline.is_exterior:
             raise InputError(
                 f"body_forces is {self.body_forces!r}, but the body has no end: nothing holds its infinite weight, and "

@@ -164,8 +164,8 @@ SHAPES = Registry(
     protocol="bemkit.geometry.shapes:Shape",
 )
 
-FILE_KINDS = ("mesh", "drawing")
-"""Shapes with the name of a file."""
+FILE_KINDS = ("mesh", "drawing", "profile")
+"""Shapes and obstacles with the name of a file."""
 
 SIDES = Registry(
     "side",
@@ -232,6 +232,7 @@ OBSTACLES = Registry(
         "signed-distance": "bemkit.contact.signed_distance:SignedDistance",
         "gap": "bemkit.contact.obstacle:Gap",
         "profile": "bemkit.contact.rough_profile:Profile",
+        "profile-points": "bemkit.contact.rough_profile:ProfilePoints",
         "self-affine": "bemkit.contact.rough_profile:SelfAffineProfile",
     },
     "bemkit.obstacles",

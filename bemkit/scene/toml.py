@@ -181,15 +181,17 @@ def _with_rising_degrees(table: dict[str, Any]) -> dict[str, Any]:
 
 
 def _with_places_of_files(table: dict[str, Any], folder: Path | None, path: str) -> dict[str, Any]:
-    """Return a table of a scene whose shapes name their files from the folder of the scene."""
+    """Return a table of a scene whose shapes and profiles name their files from the folder of the scene."""
     located = dict(table)
-    if isinstance(bodies := table.get("bodies"), dict):
-        located["bodies"] = {
-            name: _with_places_of_files(body, folder, f"bodies.{name}.") if isinstance(body, dict) else body
-            for name, body in bodies.items()
-        }
-    if isinstance(shape := table.get("shape"), dict):
-        located["shape"] = _with_places_of_files(shape, folder, f"{path}shape.")
+    for name in ("bodies", "parts", "rigid"):
+        if isinstance(entries := table.get(name), dict):
+            located[name] = {
+                key: _with_places_of_files(entry, folder, f"{path}{name}.{key}.") if isinstance(entry, dict) else entry
+                for key, entry in entries.items()
+            }
+    for name in ("shape", "condition", "obstacle"):
+        if isinstance(inner := table.get(name), dict):
+            located[name] = _with_places_of_files(inner, folder, f"{path}{name}.")
     if table.get("kind") in FILE_KINDS and isinstance(file := table.get("file"), str):
         if folder is None:
             raise SceneError(

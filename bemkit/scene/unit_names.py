@@ -73,13 +73,13 @@ def with_unit(label: str, quantity: str, units: UnitNames | None) -> str:
     return f"{label} [{unit}]" if unit else label
 
 
-def check_length_of_file(stated: str, units: UnitNames) -> None:
-    """Raise if the file of a shape states another unit of length than a scene; empty is not a statement."""
+def check_length_of_file(stated: str, units: UnitNames, owner: str = "shape") -> None:
+    """Raise if the file of a shape or profile states another unit of length than a scene; empty is no statement."""
     of_file, of_scene = length_in_metres(stated), length_in_metres(units.length)
     if of_file is None or of_scene is None or stated == units.length:
         return
     factor = of_file / of_scene
     raise InputError(
-        f"units.length is {units.length!r}, but the file of the shape is in {stated!r}: give the shape scale = "
+        f"units.length is {units.length!r}, but the file of the {owner} is in {stated!r}: give it scale = "
         f"{factor:.10g}, or scale = 1 to take its numbers as they are"
     )

@@ -66,9 +66,12 @@ def unstructure(value: Any, declared: Any = None, path: str = "", *, keep_defaul
 
 
 def _without_file(value: Any) -> Any:
-    """Return the shape that a file holds instead of the file, so that the text does not depend on the file."""
-    from bemkit.geometry.files.shape_file import ShapeFile  # heavy, and only needed for writing
+    """Return the shape or profile that a file holds instead of the file, so that the text does not depend on it."""
+    from bemkit.contact.rough_profile import Profile  # only needed for writing
+    from bemkit.geometry.files.shape_file import ShapeFile
 
+    if isinstance(value, Profile):
+        return value.profile
     return value.shape if isinstance(value, ShapeFile) else value
 
 

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import bemkit as bk
-from bemkit.contact.rough_profile import ProfileError, read_profile
+from bemkit.contact.profile_file import ProfileError, read_profile
+from bemkit.contact.profile_filters import Levelling
+from bemkit.contact.rough_profile import ProfilePoints
 
 
 def file_of(folder: Path, text: str) -> str:
@@ -26,9 +29,9 @@ def file_of(folder: Path, text: str) -> str:
     ],
 )
 def test_two_columns_are_read(tmp_path: Path, text: str) -> None:
-    x, heights = read_profile(file_of(tmp_path, text))
-    np.testing.assert_array_equal(x, [0.0, 1.0, 2.5])
-    np.testing.assert_array_equal(heights, [1.0, 3.0, 2.0])
+    read = read_profile(file_of(tmp_path, text))
+    np.testing.assert_array_equal(read.x, [0.0, 1.0, 2.5])
+    np.testing.assert_array_equal(read.heights, [1.0, 3.0, 2.0])
 
 
 def test_the_highest_point_touches_and_beyond_the_ends_there_is_nothing(tmp_path: Path) -> None:
@@ -64,8 +67,61 @@ def test_files_that_cannot_be_read_and_periods_too_short(tmp_path: Path) -> None
         bk.Profile(str(tmp_path / "none.csv"))
     with pytest.raises(ProfileError, match=r"more than its period, 2\.0"):
         bk.Profile(file_of(tmp_path, "0,1\n1,3\n2.5,2\n"), period=2.0)
-    with pytest.raises(bk.InputError, match="distance is nan"):
-        bk.Profile(file_of(tmp_path, "0,1\n1,3\n"), distance=float("nan"))
+    with pytest.raises(ProfileError, match=r"is 2\.5 long, and no points are known up to its period, 10"):
+        bk.Profile(file_of(tmp_path, "0,1\n1,3\n2.5,2\n"), period=10.0)
+    with pytest.raises(ProfileError, match="row is 2, but the file is one profile: remove row"):
+        bk.Profile(file_of(tmp_path, "0,1\n1,3\n"), row=2)
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"distance": float("nan")}, "distance is nan: give a finite number"),
+        ({"scale": -1.0}, "scale is -1.0: give a positive number"),
+        ({"longest_wavelength": 0.0}, "longest_wavelength is 0.0: give a positive number"),
+        ({"height_scale": 0.0}, "height_scale is 0.0: give a finite factor other than zero"),
+        (
+            {"shortest_wavelength": 0.8, "longest_wavelength": 0.08},
+            "shortest_wavelength is 0.8: give less than longest_wavelength, 0.08",
+        ),
+    ],
+)
+def test_options_of_profiles_out_of_range_are_named(tmp_path: Path, changes: dict[str, float], message: str) -> None:
+    with pytest.raises(bk.InputError, match=message):
+        bk.Profile(file_of(tmp_path, "0,1\n1,3\n"), **changes)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("points", "message"),
+    [
+        (((0.0, 1.0),), "points has 1 entries: give at least two finite points"),
+        (((0.0, 1.0), (1.0, float("inf"))), "points has 2 entries: give at least two finite points"),
+        (((0.0, 1.0), (2.0, 1.0), (1.0, 1.0)), r"points\[2\] is at x = 1 after 2: sort the points by x"),
+    ],
+)
+def test_points_that_are_no_profile_are_named(points: tuple[tuple[float, float], ...], message: str) -> None:
+    with pytest.raises(bk.InputError, match=message):
+        ProfilePoints(points)
+
+
+def test_scales_are_factors_of_positions_and_heights(tmp_path: Path) -> None:
+    profile = bk.Profile(file_of(tmp_path, "0,1\n1,3\n"), scale=10.0, height_scale=0.1).profile
+    assert profile.points == ((0.0, 1.0), (10.0, 3.0))
+
+
+def test_a_profile_is_levelled_before_its_period_begins_again(tmp_path: Path) -> None:
+    file = file_of(tmp_path, "0,1\n1,3\n2,2\n3,4\n")
+    ends = bk.Profile(file, period=4.0, levelling=Levelling.ENDS).profile
+    np.testing.assert_allclose(ends.columns[1], [0.0, 1.0, -1.0, 0.0], atol=1e-15)
+    assert ends.seam_jump == 0.0
+
+
+@pytest.mark.parametrize("file", ["surface.sdf", "scan.txt"])
+def test_files_of_instruments_need_an_extra(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, file: str) -> None:
+    (tmp_path / file).write_bytes(b"\xff\x00binary" if file == "surface.sdf" else b"a\0b")
+    monkeypatch.setitem(sys.modules, "SurfaceTopography", None)
+    with pytest.raises(ProfileError, match=r'need SurfaceTopography: pip install "bemkit\[surface\]"'):
+        bk.Profile(str(tmp_path / file))
 
 
 def rough(**changes: object) -> bk.SelfAffineProfile:
@@ -129,11 +185,10 @@ def test_a_profile_from_a_file_is_the_surface_of_a_scene(tmp_path: Path) -> None
         [parts.zone]
         condition = {{ kind = "contact", obstacle = {obstacle} }}
     """
-    file = str(tmp_path / "rough.txt").replace("\\", "/")
     scenes = [
-        bk.scene_from_toml(text.format(obstacle=obstacle))
+        bk.scene_from_toml(text.format(obstacle=obstacle), folder=tmp_path)
         for obstacle in (
-            f'{{ kind = "profile", file = "{file}", period = 1.0 }}',
+            '{ kind = "profile", file = "rough.txt", period = 1.0 }',
             '{ kind = "self-affine", period = 1.0, rms_height = 1e-3, hurst = 0.7, roll_off = 0.5, cut_off = 0.01, '
             "seed = 4 }",
         )
@@ -144,4 +199,9 @@ def test_a_profile_from_a_file_is_the_surface_of_a_scene(tmp_path: Path) -> None
     # the file knows the height on the elements alone, so that its highest point is a little lower
     np.testing.assert_array_equal(one.contact.status, other.contact.status)
     np.testing.assert_allclose(one.contact.sigma_n, other.contact.sigma_n, atol=1e-6)
-    assert bk.scene_from_toml(bk.scene_to_toml(scenes[0])) == scenes[0]
+    # what is written holds the points, and needs the file no more
+    (tmp_path / "rough.txt").unlink()
+    again = bk.scene_from_toml(bk.scene_to_toml(scenes[0])).only.parts[0].condition
+    assert isinstance(again, bk.Contact)
+    points = np.column_stack([one.contact.x, one.contact.y])
+    np.testing.assert_array_equal(again.obstacle.gap(points, points), one.contact.gap)

@@ -117,7 +117,7 @@ def test_another_unit_of_length_than_that_of_the_file_is_refused() -> None:
     for length, factor in (("m", "0.001"), ("in", "0.03937007874")):
         with pytest.raises(
             InputError,
-            match=rf"units.length is '{length}', but the file .* in 'mm': give the shape scale = {factor}, or",
+            match=rf"units.length is '{length}', but the file .* in 'mm': give it scale = {factor}, or",
         ):
             bk.Scene(
                 title="t", shape=shape, material=bk.Material(1.0, 0.3), parts=parts, units=bk.UnitNames(length, "Pa")

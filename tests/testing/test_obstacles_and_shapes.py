@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import bemkit as bk
-from bemkit.contact.rough_profile import Profile, SelfAffineProfile
+from bemkit.contact.rough_profile import Profile, ProfilePoints, SelfAffineProfile
 from bemkit.geometry import Arc, GeometryError, Outline, Side, discretise, shapes
 from bemkit.scene.registry import OBSTACLES
 from bemkit.testing import CheckFailed, check_obstacle, check_shape
@@ -28,6 +28,7 @@ DISTANCES = [
 ]
 GAPS = [
     bk.Gap(bk.Expression("where(x < 0.5, 0.1 * x, 100)"), direction=(0.0, -1.0)),
+    ProfilePoints(((-1.0, 0.1), (0.2, 0.0), (2.0, 0.3))),
     bk.load_scene("rough-surface").only.parts[0].condition.obstacle,  # type: ignore[union-attr]
 ]
 SHAPES = [
