@@ -13,6 +13,7 @@ from bemkit.reference.compare import Zone as Zone
 from bemkit.reference.compare import answer_of as answer_of
 from bemkit.reference.compare import errors_of as errors_of
 from bemkit.reference.compare import over_resolved as over_resolved
+from bemkit.reference.complete_contact import CompleteContact as CompleteContact
 from bemkit.reference.disc import DiscBetweenPlates as DiscBetweenPlates
 from bemkit.reference.elastic import BrazilianDisc as BrazilianDisc
 from bemkit.reference.elastic import KirschHole as KirschHole

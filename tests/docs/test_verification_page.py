@@ -8,7 +8,8 @@ from collections.abc import Mapping
 
 import pytest
 
-from bemkit.studies.verification.case import CASES, Case
+from bemkit.studies.verification.case import Case
+from bemkit.studies.verification.cases import CASES
 from tests.docs.pages import DOCS, Row, read, section, table
 
 

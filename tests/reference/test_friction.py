@@ -6,7 +6,9 @@ import pytest
 from scipy.integrate import quad
 
 from bemkit.errors import InputError
+from bemkit.operators.material import Material
 from bemkit.reference import (
+    CompleteContact,
     HertzLine,
     PartialSlip,
     arch_friction_limit,
@@ -68,7 +70,36 @@ def test_the_arch_of_21_blocks():
     assert arch_friction_limit(2001) == pytest.approx(arch_friction_limit(4001), rel=1e-4)
 
 
+STEEL = Material(0.91, 0.3)
+EDGES = [(60, 0.961909), (75, 0.717733), (90, 0.5430756), (105, 0.409581), (120, 0.302550)]
+
+
+@pytest.mark.parametrize(("degrees", "published"), EDGES)
+def test_an_edge_sticks_from_the_published_friction_on(degrees, published):
+    assert CompleteContact(np.radians(degrees), STEEL).friction_limit == pytest.approx(published, abs=6e-7)
+
+
+@pytest.mark.parametrize("degrees", [60, 90, 120])
+def test_the_sides_of_an_edge_are_free_and_its_field_is_elastic(degrees):
+    """Differences of the displacements give the stresses to the cancellation of 1e-5 wide differences."""
+    angle = np.radians(degrees)
+    edge = CompleteContact(angle, STEEL)
+    side = 0.7 * np.array([[np.cos(angle), np.sin(angle)]])
+    assert edge.stress(side)[0] @ [-np.sin(angle), np.cos(angle)] == pytest.approx([0.0, 0.0], abs=1e-13)
+    assert edge.stress(np.array([[-0.7, -1e-300]]))[0, :, 1] == pytest.approx([0.0, 0.0], abs=1e-13)
+    assert edge.stress(np.array([[0.5, 0.0]]))[0, 1, 1] == pytest.approx(-(0.5 ** (edge.exponent - 1.0)))
+    points, shifts = np.array([[0.3, -0.4], [0.2, 0.1]]), 1e-5 * np.eye(2)
+    slopes = [edge.displacement(points + shift) - edge.displacement(points - shift) for shift in shifts]
+    gradient = np.stack(slopes, axis=2) / 2e-5
+    strain = 0.5 * (gradient + gradient.transpose(0, 2, 1))
+    lame = 2.0 * STEEL.shear_modulus * 0.3 / (1.0 - 0.6)
+    volume = np.trace(strain, axis1=1, axis2=2)[:, None, None] * np.eye(2)
+    assert 2.0 * STEEL.shear_modulus * strain + lame * volume == pytest.approx(edge.stress(points), abs=1e-8)
+
+
 def test_refusals():
+    with pytest.raises(InputError, match=r"angle is 4.0: give an angle between 0 and pi"):
+        CompleteContact(4.0, STEEL)
     with pytest.raises(InputError, match=r"length_share is 0.5: give a number between 0 and 0.5"):
         closed_cracks_slip(0.5)
     with pytest.raises(InputError, match=r"load is 1e-05: the beams slip from 4e-05 on: give more"):

@@ -1,29 +1,26 @@
-"""A problem with a known answer, what of it is compared, and all such problems.
-
-Their scenes and the bounds of errors are in `cases/*.toml`. Of each case there are
-
-* ``source``: key of ``docs/references.md``;
-* ``validity``, ``resolutions``, ``n_quick``, ``title``: see `Case`; by default the title is that of the scene;
-* ``scene``: a table like a scene file, or the name of a shipped scene, with elements of the ``degree``, if it is given;
-* ``bounds``, ``orders``: of each row, by the names of `bemkit.studies.verification.measures`; see `Quantity`.
-"""
+"""A problem with a known solution: its scene, how it is solved, and which quantities are compared."""
 
 from __future__ import annotations
 
-import tomllib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
-from importlib import resources
-from types import MappingProxyType
-from typing import Any
+from typing import TypeAlias, cast
 
 from bemkit.errors import InputError
-from bemkit.scene.toml import load_scene, scene_from_table
-from bemkit.studies.verification.measures import ROWS, Measure, of_shipped
-from bemkit.studies.verification.solves import SOLVES, Solve, at_resolution
+from bemkit.results.solution import Solution
+from bemkit.runs.run import run
+from bemkit.scene.scene import Scene
+from bemkit.scene.toml import with_overrides
 
-_FILES = ("elastic", "obstacles", "pairs", "half_planes")
+Measure: TypeAlias = Callable[[Solution], float]
+Solve: TypeAlias = Callable[[Scene, float], Solution]
+
+
+def at_resolution(scene: Scene, resolution: float) -> Solution:
+    """Solve a scene with a number of elements, or to an accuracy, which is less than one."""
+    if resolution < 1.0:
+        return cast(Solution, run(with_overrides(scene, accuracy=resolution)))
+    return cast(Solution, run(with_overrides(scene, elements=int(resolution))))
 
 
 @dataclass(frozen=True)
@@ -34,13 +31,12 @@ class Quantity:
     ----------
     name : str
     measure : callable (solution) -> float
-        What came out.
     bounds : tuple of float
-        Of the error at each resolution of the case: about twice what is measured.
+        Of the error at each resolution of the case: about twice what was measured when the case was written.
     expected : float
-        What should have come out; errors are relative to it. Zero if `measure` returns a relative error itself.
+        The exact value; errors are relative to it. Zero if `measure` returns a relative error itself.
     order : float, optional
-        By which power of the number of elements the error falls at least, from the coarsest to the finest resolution.
+        Least power of the number of elements by which the error falls from the coarsest to the finest resolution.
         None where it does not fall steadily: at round-off, and at places where the contact status changes.
     """
 
@@ -57,21 +53,21 @@ class Quantity:
 
 @dataclass(frozen=True)
 class Case:
-    """A problem with a known answer.
+    """A problem with a known solution; see `bemkit.studies.verification.cases`.
 
     Parameters
     ----------
-    title : str
+    scene : Scene
     source : str
         Key of ``docs/references.md``.
     validity : str
-        Under which assumptions the answer holds, and what they cost where the scene meets them only nearly.
-    solve : callable (resolution) -> Solution
+        Assumptions of the known solution, and their cost where the scene meets them only nearly.
     resolutions : tuple of float
         Two or three, from coarse to fine: numbers of elements, or accuracies (less than one).
     quantities : tuple of Quantity
+    solve : callable (scene, resolution) -> Solution
     n_quick : int
-        How many of the resolutions, the coarsest ones, a quick verification takes.
+        Number of resolutions, the coarsest ones, in a quick verification.
 
     Raises
     ------
@@ -79,12 +75,12 @@ class Case:
         If a quantity has not one bound for each resolution.
     """
 
-    title: str
+    scene: Scene
     source: str
     validity: str
-    solve: Solve
     resolutions: tuple[float, ...]
     quantities: tuple[Quantity, ...]
+    solve: Solve = at_resolution
     n_quick: int = 2
 
     def __post_init__(self) -> None:
@@ -95,32 +91,7 @@ class Case:
                     "give one for each"
                 )
 
-
-def _case(name: str, table: Mapping[str, Any]) -> Case:
-    """Make the case of a table in a file."""
-    given, orders = table["scene"], table.get("orders", {})
-    scene = load_scene(given) if isinstance(given, str) else scene_from_table(given)
-    rows = ROWS[name]() if name in ROWS else of_shipped(given)
-    quantities = tuple(
-        Quantity(row, rows[row][0], tuple(bounds), rows[row][1], orders.get(row))
-        for row, bounds in table["bounds"].items()
-    )
-    return Case(
-        title=table.get("title", scene.title),
-        source=table["source"],
-        validity=table["validity"],
-        solve=SOLVES[name](scene) if name in SOLVES else at_resolution(scene, table.get("degree")),
-        resolutions=tuple(table["resolutions"]),
-        quantities=quantities,
-        n_quick=table.get("n_quick", 2),
-    )
-
-
-def _cases() -> dict[str, Callable[[], Case]]:
-    folder = resources.files("bemkit") / "studies" / "verification" / "cases"
-    tables = [tomllib.loads((folder / f"{name}.toml").read_text("utf-8")) for name in _FILES]
-    return {name: partial(_case, name, case) for table in tables for name, case in table.items()}
-
-
-CASES: Mapping[str, Callable[[], Case]] = MappingProxyType(_cases())
-"""The problems, by name, each made when it is needed."""
+    @property
+    def title(self) -> str:
+        """Title of the scene."""
+        return self.scene.title

@@ -14,7 +14,8 @@ from bemkit.errors import InputError
 from bemkit.formulas import closest
 from bemkit.results.solution import Solution
 from bemkit.studies.engine import Attempt, Task, attempt, compute
-from bemkit.studies.verification.case import CASES, Case, Quantity
+from bemkit.studies.verification.case import Case, Quantity
+from bemkit.studies.verification.cases import CASES
 from bemkit.studies.verification.records import FILE, Verification, VerificationRecord, rows_of
 from bemkit.version import __version__
 
@@ -92,13 +93,12 @@ def selected(names: Sequence[str], known: tuple[str, ...]) -> tuple[str, ...]:
 
 def compare(name: str, case: Case, resolution: float) -> Comparison:
     """Solve a case at one resolution and compare all its quantities."""
-    found: Attempt = attempt(lambda: case.solve(resolution))
+    found: Attempt = attempt(lambda: case.solve(case.scene, resolution))
     solution = found.solution
-    is_certified = solution is not None and solution.is_certified
     records = []
     for quantity in case.quantities:
         value, message = np.nan, found.message
-        if is_certified:
+        if solution is not None and solution.is_certified:
             value, message = _measured(quantity, solution)
         error = quantity.error(value)
         records.append(
@@ -116,7 +116,7 @@ def compare(name: str, case: Case, resolution: float) -> Comparison:
     return Comparison((name, resolution), tuple(records))
 
 
-def _measured(quantity: Quantity, solution: Solution | None) -> tuple[float, str]:
+def _measured(quantity: Quantity, solution: Solution) -> tuple[float, str]:
     """Return what came out, or nan and a message: a wrong solution may lack the zones that are compared."""
     try:
         return float(quantity.measure(solution)), ""
