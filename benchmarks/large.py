@@ -31,7 +31,7 @@ from bemkit.contact.condensation.hierarchical_body import HierarchicalBody
 from bemkit.operators.collocation import compiled
 from bemkit.operators.hierarchy.compression import Compression
 from bemkit.operators.hierarchy.factor import Factor
-from bemkit.runs.history import run_on_mesh
+from bemkit.runs.steps import run_on_mesh
 
 REFERENCE = (0.2575701, 0.4676382)
 """Where separation and slip end, from the source paper's example on other codes."""

@@ -39,7 +39,7 @@ def main() -> None:
         scene = rough_surface(2**power)
         cold = "-"
         if power <= 14:
-            from bemkit.runs.history import run_on_mesh
+            from bemkit.runs.steps import run_on_mesh
 
             cold = str(run_on_mesh(scene).linear_solves)
         begin, busy = time.perf_counter(), time.process_time()

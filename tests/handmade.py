@@ -4,9 +4,8 @@ import zlib
 
 import numpy as np
 
-from bemkit.contact.condensation.direct_body import DirectBody
+from bemkit.contact.condensation.direct_body import DirectBody, WholeBody
 from bemkit.contact.condensation.nodes import ContactNodes, contact_conditions, contact_frame, nodes_on
-from bemkit.contact.condensation.whole_body import WholeBody
 from bemkit.contact.laws import Coulomb
 from bemkit.contact.problem import ContactProblem, ContactState, DenseBody, LinearBody
 from bemkit.geometry.local_values import dof_weights

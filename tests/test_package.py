@@ -25,9 +25,15 @@ NOT_NEEDED = (
     *("geometry.reflection", "geometry.meshing.partition", "geometry.meshing.layers"),
     *("model.joined", "contact.joined", "scene.places", "scene.symmetry"),
     *("results.between_bodies", "results.contact_places", "results.zone_ends"),
-    *("runs.warm_start", "solvers.homotopy", "solvers.multistart"),
+    *("runs.warm_start", "solvers.homotopy", "solvers.multistart", "contact.further_laws", "contact.polygon"),
+    "contact.rough_profile",
+    *("model.obstacle_travel", "model.overlaps", "model.shapes", "results.load_history", "scene.written_tables"),
+    *("operators.half_plane", "operators.kernels", "operators.collocation.curved_elements"),
+    "operators.steklov_poincare.forces_inside",
 )
 """Of a scene with one body of straight sides on one obstacle, solved by collocation from a number of elements."""
+MOST_MODULES = 155
+"""Modules of the package, packages and command line counted, that may be loaded to solve a simple scene: a few more than are."""
 HEAVY = ("scipy.sparse.linalg", "h5py", "pyamg", "matplotlib", "meshio", "rich", "click")
 
 
@@ -168,6 +174,20 @@ assert all(find_spec(name) for name in names)
 """
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
+
+
+def test_the_command_line_loads_few_modules_for_a_simple_scene() -> None:
+    code = """
+import sys
+from bemkit.cli.main import main
+try:
+    main(["run", "paper-1", "--elements", "40"])
+except SystemExit as end:
+    assert end.code == 0
+print(sum(name.split(".")[0] == "bemkit" for name in sys.modules))
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert int(done.stdout.splitlines()[-1]) <= MOST_MODULES
 
 
 def test_the_public_names_are_few() -> None:

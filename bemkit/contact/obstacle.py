@@ -216,6 +216,10 @@ class RigidCavity(_Round):
         return unit_vectors(self._from_centre(points), normals)
 
 
+SIMPLE_OBSTACLES = (RigidHalfPlane, RigidCircle, RigidCavity)
+"""Obstacles for which no other module is loaded."""
+
+
 @dataclass(frozen=True)
 class Gap:
     """An obstacle given by its gap, as a number or a function of the boundary point.

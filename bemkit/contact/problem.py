@@ -12,7 +12,6 @@ from bemkit.arrays import BoolArray, FloatArray, read_only
 from bemkit.contact.body import ContactState, LinearBody, SingularResponse
 from bemkit.contact.condensation.dense_body import DenseBody
 from bemkit.contact.conditions import LinearConditions, separated, stick
-from bemkit.contact.further_laws import law_name
 from bemkit.contact.laws import FrictionLaw, LawError
 from bemkit.errors import InputError
 
@@ -177,7 +176,7 @@ class ContactProblem:
         if np.any(bound < 0.0):
             node = int(np.argmin(bound))
             raise LawError(
-                f"friction law {law_name(self.law)}.bound is {bound[node]:g} at contact node {node} "
+                f"friction law {_name(self.law)}.bound is {bound[node]:g} at contact node {node} "
                 f"(sigma_n = {sigma_n[node]:g}); a bound is zero or positive"
             )
         return self._where_acting(bound, is_closed)
@@ -207,7 +206,7 @@ class ContactProblem:
         return values
 
     def _name(self, method: str) -> str:
-        return f"friction law {law_name(self.law)}.{method}"
+        return f"friction law {_name(self.law)}.{method}"
 
 
 def _check_members(body: LinearBody, law: FrictionLaw) -> None:
@@ -221,7 +220,7 @@ def _check_members(body: LinearBody, law: FrictionLaw) -> None:
     absent = [name for name in _LAW_MEMBERS if not hasattr(law, name)]
     if absent:
         raise LawError(
-            f"friction law {law_name(law)} has no {', '.join(absent)}; "
+            f"friction law {_name(law)} has no {', '.join(absent)}; "
             "derive it from bemkit.contact.laws.FrictionLaw and write bound and bound_derivative"
         )
 
@@ -231,3 +230,9 @@ _BODY_MEMBERS = (
     *("respond", "rigid_motions", "rigid_load", "moving_bodies", "partners_of", "shares", "imbalance"),
 )
 _LAW_MEMBERS = ("bound", "bound_derivative", "is_frictionless", "acts_across_gap", "scaled")
+
+
+def _name(law: FrictionLaw) -> str:
+    from bemkit.contact.further_laws import law_name
+
+    return law_name(law)

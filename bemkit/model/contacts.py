@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray, IntArray
-from bemkit.contact.further_laws import PiecewiseLaw
 from bemkit.contact.laws import FrictionLaw, Frictionless, LawOfCoefficients
 from bemkit.contact.problem import LawError
 from bemkit.errors import InputError
@@ -261,6 +260,8 @@ def law_of_rows(contacts: Sequence[ContactRows]) -> FrictionLaw:
             laws.setdefault(law if is_uniform else first, (evaluated, []))[1].append(numbers[chosen])
     if len(laws) < 2:
         return next((law for law, _ in laws.values()), Frictionless())
+    from bemkit.contact.further_laws import PiecewiseLaw
+
     return PiecewiseLaw(*zip(*((law, np.concatenate(nodes)) for law, nodes in laws.values()), strict=True))
 
 

@@ -11,10 +11,8 @@ from bemkit.geometry.local_values import projector
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.quadrature import gauss_legendre
 from bemkit.geometry.spaces import BoundarySpace, dof_points
-from bemkit.operators.half_plane.surface import SurfaceElasticity
 from bemkit.operators.rigid_modes import without_motion
 from bemkit.operators.steklov_poincare import SteklovPoincare
-from bemkit.operators.steklov_poincare.forces_inside import HeavyElasticity
 from bemkit.scene.body_scene import BodyScene
 from bemkit.scene.conditions import Free, Load
 
@@ -22,28 +20,14 @@ _MORE_POINTS = 4
 """Gauss points of an element at which given loads are evaluated, beyond the degree of the tractions."""
 
 
-def map_fields(elastic: SteklovPoincare, displacement: FloatArray, force: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return nodal displacements and forces (n_nodes, 2) less those of what acts inside the body or far away."""
-    if isinstance(elastic, SurfaceElasticity):
-        return elastic.strain_displacement(force), force
-    if isinstance(elastic, HeavyElasticity):
-        return displacement - elastic.inside.displacement, force - elastic.inside.force
-    return displacement, force
-
-
 def elastic_energy(
     elastic: SteklovPoincare, space: BoundarySpace, displacement: FloatArray, force: FloatArray
 ) -> float:
     """Return the elastic energy of the stresses in the plane, dimensionless, from nodal fields (n_nodes, 2)."""
-    of_map, map_force = map_fields(elastic, displacement, force)
+    of_map, map_force = elastic.own_fields(displacement, force)
     # the forces are in equilibrium: on a rigid motion, which may be huge, they would only do the work of round-off
     strained = without_motion(space.mesh, dof_points(space), of_map)
-    return 0.5 * float(np.sum(strained * map_force)) + float(energy_beyond(elastic, of_map, map_force).sum())
-
-
-def energy_beyond(elastic: SteklovPoincare, displacement: FloatArray, force: FloatArray) -> FloatArray:
-    """Return the parts of the energy that what acts inside adds to that of `map_fields`; see `HeavyElasticity`."""
-    return elastic.energy_beyond(displacement, force) if isinstance(elastic, HeavyElasticity) else np.zeros(0)
+    return 0.5 * float(np.sum(strained * map_force)) + float(elastic.energy_beyond(of_map, map_force).sum())
 
 
 def insert_loads(

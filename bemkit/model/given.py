@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from itertools import zip_longest
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,8 +13,6 @@ from bemkit.errors import InputError
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.spaces import BoundarySpace, element_nodes
 from bemkit.model.units import Units
-from bemkit.operators.half_plane.far_drive import FarMotion
-from bemkit.operators.half_plane.surface import SurfaceElasticity
 from bemkit.operators.linear.solvers import (
     ChosenLinearSolver,
     Hierarchical,
@@ -22,7 +21,6 @@ from bemkit.operators.linear.solvers import (
 )
 from bemkit.operators.pair_form import Tag
 from bemkit.operators.steklov_poincare import SteklovPoincare, TractionField
-from bemkit.operators.steklov_poincare.forces_inside import ForcesInside
 from bemkit.operators.steklov_poincare.hierarchical_needs import choose_collocation_solver
 from bemkit.operators.steklov_poincare.needs import BodyCase, physical_memory
 from bemkit.operators.steklov_poincare.nodal_conditions import (
@@ -35,6 +33,10 @@ from bemkit.operators.steklov_poincare.nodal_conditions import (
 )
 from bemkit.scene.body_scene import BodyScene
 from bemkit.scene.conditions import Clamped, Load, Part, PrescribedDisplacement, Roller
+
+if TYPE_CHECKING:
+    from bemkit.operators.half_plane.far_drive import FarMotion
+    from bemkit.operators.steklov_poincare.forces_inside import ForcesInside
 
 
 def held_nodes(scene: BodyScene, mesh: BoundaryMesh, units: Units, space: BoundarySpace) -> NodalConditions:
@@ -97,11 +99,13 @@ def dimensionless_load(load: Load, units: Units) -> TractionField:
     return field
 
 
-def far_drive(scene: BodyScene, units: Units) -> FarMotion:
-    """Return how a half-plane moves far away, in the units given; at rest by default."""
+def far_drive(scene: BodyScene, units: Units) -> FarMotion | None:
+    """Return how a half-plane moves far away, in the units given; None if it is at rest there, or ends somewhere."""
     far = scene.far
     if far is None:
-        return FarMotion()
+        return None
+    from bemkit.operators.half_plane.far_drive import FarMotion
+
     motion = far.motion / (units.displacement, units.displacement, units.displacement / units.length)
     load = far.load / (units.stress * units.length * np.array([1.0, 1.0, units.length]))
     centre = ((np.array(far.centre) - units.centre) / units.length).tolist()
@@ -111,9 +115,33 @@ def far_drive(scene: BodyScene, units: Units) -> FarMotion:
     return FarMotion(driven, (x, y, turn), (force_x, force_y, moment), (centre[0], centre[1]), strain)
 
 
-def driven_by(elastic: SteklovPoincare, drive: FarMotion) -> SteklovPoincare:
-    """Return a half-plane that moves otherwise far away; a body that ends somewhere stays as it is."""
-    return elastic.driven_by(drive) if isinstance(elastic, SurfaceElasticity) else elastic
+def driven_by(elastic: SteklovPoincare, drive: FarMotion | None) -> SteklovPoincare:
+    """Return a half-plane that moves otherwise far away, by None not at all; any other body as it is."""
+    if elastic.traction_space.mesh.surface is None:
+        return elastic
+    from bemkit.operators.half_plane.far_drive import FarMotion
+    from bemkit.operators.half_plane.surface import SurfaceElasticity
+
+    return elastic.driven_by(drive or FarMotion()) if isinstance(elastic, SurfaceElasticity) else elastic
+
+
+def loaded_map(elastic: SteklovPoincare, inside: ForcesInside | None) -> SteklovPoincare:
+    """Return a map under forces inside the body, the map itself if there are none."""
+    if inside is None:
+        return elastic
+    from bemkit.operators.steklov_poincare.forces_inside import HeavyElasticity
+
+    return HeavyElasticity(elastic, inside)
+
+
+def weightless(elastic: SteklovPoincare, inside: ForcesInside | None) -> SteklovPoincare:
+    """Return a map of `loaded_map` without the forces inside the body."""
+    if inside is None:
+        return elastic
+    from bemkit.operators.steklov_poincare.forces_inside import HeavyElasticity
+
+    assert isinstance(elastic, HeavyElasticity)
+    return elastic.weightless
 
 
 def given_data(conditions: NodalConditions, force: FloatArray, inside: ForcesInside | None) -> GivenData:

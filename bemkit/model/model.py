@@ -18,16 +18,13 @@ from bemkit.contact.body import ContactState
 from bemkit.contact.problem import ContactProblem
 from bemkit.errors import InputError
 from bemkit.model.fields import elastic_energy, insert_loads
-from bemkit.model.given import driven_by
+from bemkit.model.given import driven_by, loaded_map, weightless
 from bemkit.model.placed import groups, shape_numbers
 from bemkit.model.prepared import Prepared, PreparedBody
-from bemkit.model.shapes import condensed_shapes
 from bemkit.model.single_body import SingleBody, is_direct, is_single, single_body
 from bemkit.model.units import Units, motion_units
 from bemkit.operators.counts import OperationCounts
-from bemkit.operators.half_plane.surface import SurfaceElasticity
 from bemkit.operators.steklov_poincare import CondensedMap, SteklovPoincare
-from bemkit.operators.steklov_poincare.forces_inside import HeavyElasticity, under_forces_inside
 from bemkit.operators.steklov_poincare.nodal_conditions import supporting_forces
 from bemkit.solvers.base import ContactSolver
 
@@ -138,7 +135,10 @@ class Model:
         inside = two.inside if one.inside is None or two.inside is None else one.inside.blended(two.inside, share)
         if one.drive == two.drive:
             return self._single_body.under(displacement, force, inside)
-        drive, conditions = one.drive.blended(two.drive, share), replace(two.conditions, displacement=displacement)
+        from bemkit.operators.half_plane.far_drive import FarMotion
+
+        drive = (one.drive or FarMotion()).blended(two.drive or FarMotion(), share)
+        conditions = replace(two.conditions, displacement=displacement)
         body = replace(two, drive=drive, conditions=conditions, force=force)
         return single_body(replace(self.prepared, bodies=(body,)), driven_by(self.elastic[0], drive))
 
@@ -153,9 +153,9 @@ class Model:
         for body, elastic, (displacement, force, total) in bodies:
             forces.append(supporting_forces(body.conditions, body.force, force) * prepared.force_unit)
             displacements.append(displacement.ravel() * prepared.units.displacement)
-            if isinstance(elastic, SurfaceElasticity):
+            if body.mesh.surface is not None:
                 forces.append(-total.ravel() * prepared.force_unit)
-                motion = displacement - elastic.strain_displacement(total)
+                motion = displacement - elastic.own_fields(displacement, total)[0]
                 displacements.append(motion.ravel() * prepared.units.displacement)
         rigid = self.rigid_bodies(state)
         forces += [reaction for _, reaction in rigid]
@@ -280,6 +280,7 @@ def build_model(prepared: Prepared, executor: Executor | None = None) -> Model:
     if is_single(prepared):
         return _single(prepared, *_single_of(prepared, executor))
     from bemkit.model.joined import joined_bodies, loaded_alone
+    from bemkit.model.shapes import condensed_shapes
 
     shapes = condensed_shapes(prepared, executor)
     numbers = shape_numbers(prepared.bodies)
@@ -302,10 +303,12 @@ def _single(prepared: Prepared, elastic: SteklovPoincare, body: SingleBody) -> M
 def _single_of(prepared: Prepared, executor: Executor | None) -> tuple[SteklovPoincare, SingleBody]:
     """Return the map of the only body, and the body as contact sees it."""
     if executor is None:
-        elastic = under_forces_inside(prepared.elastic_map(prepared.only), prepared.only.inside)
+        (elastic,) = _loaded([prepared.elastic_map(prepared.only)], prepared.bodies)
         return elastic, single_body(prepared, elastic)
     if not is_direct(prepared):
         raise InputError("executor is given, but the only body is not condensed onto contact nodes: remove it")
+    from bemkit.model.shapes import condensed_shapes
+
     ((alone, condensed),) = condensed_shapes(prepared, executor)
     (elastic,) = _loaded([alone], prepared.bodies)
     return elastic, single_body(prepared, elastic, condensed)
@@ -315,14 +318,15 @@ def _loaded(maps: Sequence[SteklovPoincare], bodies: Sequence[PreparedBody]) -> 
     """Return the maps with the body forces of their bodies; copies under equal forces share one."""
     shared: dict[tuple[int, int], SteklovPoincare] = {}
     return tuple(
-        shared.setdefault((id(map_), id(body.inside)), under_forces_inside(map_, body.inside))
+        shared.setdefault((id(map_), id(body.inside)), loaded_map(map_, body.inside))
         for map_, body in zip(maps, bodies, strict=True)
     )
 
 
 def _maps_under(prepared: Prepared, model: Model) -> tuple[SteklovPoincare, ...]:
     """Return the maps of a model under the body forces and the motions far away of another step."""
-    maps = [map_.weightless if isinstance(map_, HeavyElasticity) else map_ for map_ in model.elastic]
+    loaded = zip(model.elastic, model.prepared.bodies, strict=True)
+    maps = [weightless(map_, body.inside) for map_, body in loaded]
     pairs = zip(maps, model.prepared.bodies, prepared.bodies, strict=True)
     moved = [map_ if one.drive == two.drive else driven_by(map_, two.drive) for map_, one, two in pairs]
     return _loaded(moved, prepared.bodies)

@@ -5,6 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from bemkit.arrays import FloatArray
+from bemkit.contact.obstacle import RigidCircle
+from bemkit.contact.polygon import RigidPolygon
+from bemkit.geometry.overlap import ROUND_OFF, Polyline, deepest_overlap, near_pairs
 from bemkit.model.contacts import OverlapError
 from bemkit.model.placed import PlacedBody
 from bemkit.scene.scene import Scene
@@ -20,12 +23,6 @@ def check_apart(scene: Scene, bodies: Sequence[PlacedBody]) -> None:
     OverlapError
         With the names of both bodies, the depth and the place.
     """
-    if len(bodies) == 1 and not scene.rigid:
-        return
-    from bemkit.contact.obstacle import RigidCircle
-    from bemkit.contact.polygon import RigidPolygon
-    from bemkit.geometry.overlap import ROUND_OFF, Polyline, deepest_overlap, near_pairs
-
     finite = [body for body in bodies if body.mesh.surface is None]
     outlines = [Polyline.of(body.mesh) for body in finite]
     for k, m in near_pairs(outlines):

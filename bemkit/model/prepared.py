@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -26,17 +27,14 @@ from bemkit.model.given import (
     linear_solver_of,
     nodal_forces,
 )
-from bemkit.model.overlaps import check_apart
 from bemkit.model.placed import Meshes, PlacedBody, place
 from bemkit.model.same_bodies import bodies_under, check_rigid, find_units, listed_contacts, with_found_contacts
 from bemkit.model.traction_recovery import TractionRecovery
 from bemkit.model.units import Units
-from bemkit.operators.half_plane.far_drive import FarMotion
 from bemkit.operators.linear.solvers import ChosenLinearSolver, DenseCholesky, LinearSolver
 from bemkit.operators.material import Material
 from bemkit.operators.pair_form import Tag
 from bemkit.operators.steklov_poincare import SteklovPoincare
-from bemkit.operators.steklov_poincare.forces_inside import ForcesInside
 from bemkit.operators.steklov_poincare.hierarchical_needs import LARGEST_BLOCK
 from bemkit.operators.steklov_poincare.needs import BodyCase
 from bemkit.operators.steklov_poincare.nodal_conditions import (
@@ -48,6 +46,10 @@ from bemkit.operators.steklov_poincare.nodal_conditions import (
 from bemkit.result_warning import ResultWarning
 from bemkit.scene.mesh_options import thinness_warnings
 from bemkit.scene.scene import Scene
+
+if TYPE_CHECKING:
+    from bemkit.operators.half_plane.far_drive import FarMotion
+    from bemkit.operators.steklov_poincare.forces_inside import ForcesInside
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,8 +64,8 @@ class PreparedBody(PlacedBody):
         Given nodal forces.
     inside : ForcesInside or None
         Body forces; None without any.
-    drive : FarMotion
-        How a half-plane moves far away.
+    drive : FarMotion or None
+        How a half-plane moves far away; None at rest.
     candidates : ContactData
         The nodes that may touch an obstacle or a rigid body, held by supports or not.
     """
@@ -71,7 +73,7 @@ class PreparedBody(PlacedBody):
     conditions: NodalConditions
     force: FloatArray
     inside: ForcesInside | None
-    drive: FarMotion
+    drive: FarMotion | None
     candidates: ContactData
 
     @property
@@ -336,7 +338,10 @@ def prepare_steps(scenes: Sequence[Scene], meshes: Meshes = None) -> tuple[Prepa
     for step in steps[1:]:
         check_rigid(steps[0], step)
     first = _prepared(steps[0], bodies, find_units(steps, bodies))
-    check_apart(scenes[0], bodies)
+    if len(bodies) > 1 or scenes[0].rigid:
+        from bemkit.model.overlaps import check_apart
+
+        check_apart(scenes[0], bodies)
     later = tuple(first.under(step) for step in steps[1:])
     if later:  # what later steps give decides how much of the compressed equations is kept
         pairs = [(body, tuple(step.bodies[k].map_data for step in later)) for k, body in enumerate(first.bodies)]
@@ -357,7 +362,8 @@ def _prepared(scene: Scene, bodies: Sequence[PlacedBody], units: Units, before: 
             continue
         own_units = body.units(units.modulus, force_unit)
         held = held_nodes(body.scene, body.own_mesh, own_units, body.own_space)
-        supports.append(replace(held, driven=far_drive(body.scene, own_units).driven))
+        drive = far_drive(body.scene, own_units)
+        supports.append(held if drive is None else replace(held, driven=drive.driven))
         in_place = body.units(units.modulus, force_unit, body.mesh)
         forces.append(body.turn.turned_back(nodal_forces(body.scene, body.mesh, body.space_in_place, in_place)))
     candidates = [candidates_of(scene, body) for body in bodies]

@@ -7,12 +7,13 @@ from typing import TYPE_CHECKING
 
 from bemkit.arrays import FloatArray
 from bemkit.errors import CANNOT_BE_SENT, InputError, why_not_sent
+from bemkit.model.given import loaded_map
 from bemkit.model.placed import groups
 from bemkit.model.prepared import Prepared
 from bemkit.operators.linear.dense import SingularMatrixError
 from bemkit.operators.linear.threads import blas_threads_for
 from bemkit.operators.steklov_poincare import CondensedMap, SteklovPoincare
-from bemkit.operators.steklov_poincare.forces_inside import ForcesInside, under_forces_inside
+from bemkit.operators.steklov_poincare.forces_inside import ForcesInside
 from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions
 
 if TYPE_CHECKING:
@@ -36,7 +37,7 @@ class Shape:
     def condensed(self) -> tuple[SteklovPoincare, CondensedMap]:
         """Return the map without forces inside, and the body condensed under its load."""
         try:
-            return self.map, under_forces_inside(self.map, self.inside).condense(self.conditions, self.force)
+            return self.map, loaded_map(self.map, self.inside).condense(self.conditions, self.force)
         except SingularMatrixError as error:
             if not self.name:
                 raise

@@ -4,14 +4,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, TypeAlias
 
-from bemkit.contact.condensation.direct_body import DirectBody
+from bemkit.contact.condensation.direct_body import DirectBody, WholeBody
 from bemkit.contact.condensation.nodes import NoContactNodesError, opened
-from bemkit.contact.condensation.whole_body import WholeBody
 from bemkit.errors import InputError
+from bemkit.model.given import weightless
 from bemkit.model.prepared import Prepared
-from bemkit.operators.half_plane.surface import SurfaceElasticity
 from bemkit.operators.steklov_poincare import CondensedMap, SteklovPoincare
-from bemkit.operators.steklov_poincare.forces_inside import HeavyElasticity
 
 if TYPE_CHECKING:
     from bemkit.contact.condensation.hierarchical_body import HierarchicalBody
@@ -70,9 +68,11 @@ def single_body(prepared: Prepared, elastic: SteklovPoincare, condensed: Condens
         from bemkit.model.free_motion import check_held
 
         check_held(prepared)
-    if isinstance(elastic, SurfaceElasticity):
+    if body.mesh.surface is not None:
         from bemkit.contact.half_plane.bodies import surface_body
+        from bemkit.operators.half_plane.surface import SurfaceElasticity
 
+        assert isinstance(elastic, SurfaceElasticity)
         nodes = prepared.contact_nodes
         return surface_body(elastic, opened(body.conditions, nodes), nodes, body.force)
     if not prepared.n_contact:
@@ -93,6 +93,6 @@ def single_body(prepared: Prepared, elastic: SteklovPoincare, condensed: Condens
     from bemkit.contact.condensation.hierarchical_body import hierarchical_body
     from bemkit.operators.steklov_poincare.hierarchical import HierarchicalCollocation
 
-    weightless = elastic.weightless if isinstance(elastic, HeavyElasticity) else elastic
-    assert isinstance(weightless, HierarchicalCollocation)
-    return hierarchical_body(weightless, conditions, nodes, body.force, body.inside)
+    compressed = weightless(elastic, body.inside)
+    assert isinstance(compressed, HierarchicalCollocation)
+    return hierarchical_body(compressed, conditions, nodes, body.force, body.inside)

@@ -17,7 +17,6 @@ from bemkit.arrays import FloatArray, IntArray
 from bemkit.contact.equilibrium import NOISE_FACTOR, round_off_of
 from bemkit.geometry.spaces import BoundarySpace, dof_points
 from bemkit.model.contacts import ContactRows
-from bemkit.model.fields import energy_beyond, map_fields
 from bemkit.model.model import Model
 from bemkit.model.prepared import PreparedBody
 from bemkit.operators.pair_form import Tag
@@ -129,7 +128,8 @@ def with_energies_checked(model: Model, result: ContactSolution) -> ContactSolut
     for number, (body, fields) in enumerate(zip(model.prepared.bodies, model.nodal_fields(result.state), strict=True)):
         if body.mesh.surface is not None:  # the flexibility of a half-plane is positive in closed form
             continue
-        elastic, displacements = model.elastic[number], map_fields(model.elastic[number], *fields)
+        elastic = model.elastic[number]
+        displacements = elastic.own_fields(*fields)
         condensed = model.condensed_map(number)
         if condensed is None:  # only the work of the solution shows it
             sensitivity = np.full(displacements[0].shape, elastic.material.plane_modulus)
@@ -177,7 +177,7 @@ def _negative_work(
     """Say how negative the work of all forces is, without those inside or with them; empty if neither is."""
     motions = traction_free_modes(space.mesh, dof_points(space))
     share = negative_share(displacement, force, motions, sensitivity)
-    if not share and (beyond := energy_beyond(elastic, displacement, force)).any():
+    if not share and (beyond := elastic.energy_beyond(displacement, force)).any():
         share = negative_share(displacement, force, motions, sensitivity, 2.0 * beyond)
     return f"it is {-share:.1e} times the work of all forces, each taken by its size" if share else ""
 

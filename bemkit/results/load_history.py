@@ -197,8 +197,3 @@ class LoadHistory:
     def where(self) -> str:
         """Say in words how far the history has come."""
         return f"Finished: {len(self.steps)} of {self.n_steps} steps, up to t = {self.steps[-1].time:.6g}."
-
-
-def step_rows(loading: LoadHistory | None) -> list[dict[str, float | int]]:
-    """Return the numbers of each step; none without a load history."""
-    return [] if loading is None else [step.as_dict() for step in loading.steps]

@@ -5,18 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from bemkit.arrays import IntArray
-from bemkit.contact.obstacle import Obstacle, RigidCavity, RigidCircle, RigidHalfPlane
-from bemkit.contact.polygon import RigidPolygon
-from bemkit.contact.signed_distance import SignedDistance
-from bemkit.contact.spline import RigidSpline
+from bemkit.contact.obstacle import SIMPLE_OBSTACLES, Obstacle
 from bemkit.geometry.neighbours import along_boundary
 from bemkit.geometry.vectors import norms
 from bemkit.results.between_nodes import Interpolation, points_at_obstacle, points_between
 from bemkit.results.solved_body import SolvedBody
 from bemkit.scene.conditions import Contact
 
-_IN_THE_PLANE = (RigidHalfPlane, RigidCircle, RigidCavity, RigidPolygon, RigidSpline, SignedDistance)
-"""Obstacles with a position in the plane, so that their distance from a point that has moved is known."""
 _PRESSED = 0.01
 """Share of the largest pressure from which on a point counts as pressed."""
 
@@ -35,13 +30,24 @@ def distances_off(body: SolvedBody) -> dict[str, tuple[float, float]]:
     """
     found = {}
     for part in body.scene.parts:
-        if isinstance(part.condition, Contact) and isinstance(part.condition.obstacle, _IN_THE_PLANE):
+        if isinstance(part.condition, Contact) and _is_in_the_plane(part.condition.obstacle):
             elements = along_boundary(body.mesh, body.mesh.part(part.name))
             force = float(body.mesh.lengths[elements] @ norms(body.boundary.traction[elements]))
             if force > 0.0:
                 off = _distance_off(body, part.condition.obstacle, elements)
                 found[part.name] = off, force / body.scene.material.plane_modulus
     return found
+
+
+def _is_in_the_plane(obstacle: Obstacle) -> bool:
+    """Whether an obstacle has a position in the plane, so that its distance from a point that has moved is known."""
+    if isinstance(obstacle, SIMPLE_OBSTACLES):
+        return True
+    from bemkit.contact.polygon import RigidPolygon
+    from bemkit.contact.signed_distance import SignedDistance
+    from bemkit.contact.spline import RigidSpline
+
+    return isinstance(obstacle, RigidPolygon | RigidSpline | SignedDistance)
 
 
 def _distance_off(body: SolvedBody, obstacle: Obstacle, elements: IntArray) -> float:

@@ -50,8 +50,8 @@ from bemkit.hdf5 import FileFormat, Reader, ResultFileError, write_array, write_
 from bemkit.plan import Plan
 from bemkit.results.file_meanings import annotate
 from bemkit.results.load_history import LoadHistory, LoadStep
-from bemkit.results.resultants import part_facts
 from bemkit.results.solution import Solution
+from bemkit.results.solved_scene import part_facts
 from bemkit.results.solved_steps import following
 from bemkit.results.step_group import (
     NODES,

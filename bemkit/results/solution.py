@@ -25,10 +25,8 @@ from bemkit.results.contact_table import ContactTable as ContactTable
 from bemkit.results.contact_table import Transition as Transition
 from bemkit.results.contact_table import narrow_contacts
 from bemkit.results.contact_violations import violations_between_nodes
-from bemkit.results.load_history import step_rows
-from bemkit.results.resultants import contact_facts, part_facts
 from bemkit.results.solved_body import BoundaryFields as BoundaryFields
-from bemkit.results.solved_scene import SolvedScene
+from bemkit.results.solved_scene import SolvedScene, contact_facts, part_facts
 from bemkit.results.when_asked import WhenAsked
 from bemkit.solvers.base import Status, StepRecord
 
@@ -288,5 +286,5 @@ class Solution(SolvedScene, Explorable):
             "plan": self.plan.as_dict(),
             "work": self.work.as_dict(),
             "memory": dict(self.memory),
-            "steps": step_rows(self.loading),
+            "steps": [step.as_dict() for step in (() if self.loading is None else self.loading.steps)],
         }

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -10,7 +10,6 @@ from bemkit.notebook import ShownInNotebooks
 from bemkit.result_warning import without_duplicates
 from bemkit.results.solution import Solution
 from bemkit.solvers.base import StepRecord
-from bemkit.solvers.records import continued
 
 if TYPE_CHECKING:
     from bemkit.scene.scene import Scene
@@ -86,3 +85,30 @@ def following(so_far: Solution | None, solution: Solution, stated: Scene, number
     loading = None if solution.loading is None else replace(solution.loading, asked=stated)
     message = f"{name}: {solution.message}"
     return replace(total, message=message, warnings=warnings, loading=loading)
+
+
+def continued(records: Sequence[StepRecord], further: Iterable[StepRecord], words: str = "") -> tuple[StepRecord, ...]:
+    """Return the records of a solve after those of the solves before it.
+
+    Parameters
+    ----------
+    records : sequence of StepRecord
+        Of the solves before.
+    further : iterable of StepRecord
+        Of the next one: its steps and linear solves go on where those of the solves before end.
+    words : str
+        Begin the messages of the further records.
+    """
+    first, solves = (records[-1].step + 1, records[-1].linear_solves) if records else (0, 0)
+    return (
+        *records,
+        *(
+            replace(
+                record,
+                step=first + record.step,
+                linear_solves=solves + record.linear_solves,
+                message="; ".join(filter(None, (words, record.message))),
+            )
+            for record in further
+        ),
+    )

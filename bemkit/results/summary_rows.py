@@ -11,8 +11,8 @@ import numpy as np
 from bemkit.contact.certificate import Certificate
 from bemkit.geometry.shapes import Shape
 from bemkit.results.between_nodes import BetweenNodes
-from bemkit.results.resultants import contact_facts, part_facts
 from bemkit.results.solution import Solution
+from bemkit.results.solved_scene import contact_facts, part_facts
 from bemkit.scene.registry import DISCRETISATIONS, SOLVERS
 from bemkit.scene.unit_names import UnitNames, amount, unit_of
 from bemkit.solvers.fallbacks import drivers_at_work

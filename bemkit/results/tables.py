@@ -15,11 +15,10 @@ from bemkit.errors import InputError
 from bemkit.geometry.local_values import values_on_elements
 from bemkit.geometry.vectors import components_before
 from bemkit.results.contact_table import CONTACT_COLUMNS
-from bemkit.results.load_history import step_rows
 from bemkit.results.pressure_distribution import PressureShare, pressure_shares
-from bemkit.results.resultants import part_facts
 from bemkit.results.solution import Solution
 from bemkit.results.solved_body import SolvedBody
+from bemkit.results.solved_scene import part_facts
 from bemkit.results.stress_measures import STRESSES
 from bemkit.solvers.base import StepRecord
 from bemkit.table import Column, Table, json_text
@@ -125,7 +124,7 @@ def _columns(solution: Solution, table: str) -> dict[str, Any]:
             names = list(facts[0]) if facts else [head.name for head in _FORCES if head.name != "body"]
             return {name: [fact[name] for fact in facts] for name in names}
         case "steps":
-            rows = step_rows(solution.loading)
+            rows = [] if solution.loading is None else [step.as_dict() for step in solution.loading.steps]
             if not rows:
                 raise InputError("the result has no load history: give [[steps]] or several load_factors")
             return {name: [row[name] for row in rows] for name in rows[0]}

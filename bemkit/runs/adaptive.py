@@ -10,12 +10,11 @@ from bemkit.errors import InputError
 from bemkit.plan import make_plan
 from bemkit.runs.density import DensityMeshes
 from bemkit.runs.earlier_steps import EarlierSteps
-from bemkit.runs.history import guess_from, run_on_mesh
 from bemkit.runs.hp import LayeredMeshes
 from bemkit.runs.mesh_sequence import Level, MeshSequence
 from bemkit.runs.refinement import refined, required_accuracy
 from bemkit.runs.step_errors import in_which_step
-from bemkit.runs.steps import joined, solved_history
+from bemkit.runs.steps import guess_from, joined, run_on_mesh, solved_history
 from bemkit.scene.scene import Scene
 from bemkit.solvers.base import StepRecord
 

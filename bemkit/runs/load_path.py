@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import pairwise
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
@@ -14,12 +14,14 @@ from bemkit.arrays import FloatArray
 from bemkit.contact.body import ContactState, SlipHistory
 from bemkit.contact.problem import ContactProblem
 from bemkit.model.units import Units
-from bemkit.results.load_history import StepWork
+from bemkit.results.solved_steps import continued
 from bemkit.solvers.active_sets import NodeStatus
 from bemkit.solvers.base import ContactSolution, ContactSolver, Status, StepRecord, solve
 from bemkit.solvers.fallbacks import Fallbacks
-from bemkit.solvers.records import continued
 from bemkit.stopwatch import announce
+
+if TYPE_CHECKING:
+    from bemkit.results.load_history import StepWork
 
 MOST_HALVINGS = 6
 """How often an increment is halved before a step is given up."""
@@ -113,6 +115,8 @@ class IncrementEnd:
 
     def work_from(self, before: IncrementEnd, model: StepModel) -> StepWork:
         """Return the work from the end of the increment before to this one, by the trapezoidal rule."""
+        from bemkit.results.load_history import StepWork
+
         units = model.units
         unit = units.stress * units.displacement * units.length
         weights = 0.5 * unit * model.problem.body.weights
@@ -164,6 +168,8 @@ class ReachedStep:
     @property
     def work(self) -> StepWork:
         """The work up to that end."""
+        from bemkit.results.load_history import StepWork
+
         pairs = pairwise((self.path.start, *self.ends))
         return sum((end.work_from(before, self.path.model) for before, end in pairs), StepWork())
 

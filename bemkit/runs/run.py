@@ -12,9 +12,8 @@ from bemkit.interrupts import interruptible
 from bemkit.model.placed import Meshes
 from bemkit.plan.plan import few_on, make_plan
 from bemkit.results.solved_steps import SolvedSteps, with_times
-from bemkit.runs.history import guess_from, run_on_mesh
 from bemkit.runs.steps import UnsolvableSceneError as UnsolvableSceneError
-from bemkit.runs.steps import solved_history
+from bemkit.runs.steps import guess_from, run_on_mesh, solved_history
 from bemkit.scene.scene import Scene, check_scene
 from bemkit.solvers.base import StepRecord
 

@@ -4,28 +4,27 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from bemkit.arrays import FloatArray
 from bemkit.contact.body import ContactState
 from bemkit.contact.problem import ContactProblem
 from bemkit.contact.solvability import UnsolvableLoad, find_unsolvable_load
 from bemkit.errors import InputError
 from bemkit.model.model import Model, build_model
-from bemkit.model.obstacle_travel import obstacle_travel
 from bemkit.model.placed import Meshes
 from bemkit.model.prepared import Prepared, prepare_steps
 from bemkit.model.solved_contact import with_energies_checked
 from bemkit.operators.linear.threads import blas_threads_for
 from bemkit.plan import Plan, announce_plan, check_elements, check_memory, plan_steps
-from bemkit.results.load_history import LoadHistory, LoadStep
 from bemkit.results.missed_contact import with_missed_contact_named
 from bemkit.results.solved_steps import following
 from bemkit.runs.load_path import Callback, IncrementEnd, Path, ReachedStep, advance
 from bemkit.runs.solution_of import solution_of
 from bemkit.scene.load_history import load_steps
-from bemkit.scene.scene import Scene
+from bemkit.scene.scene import NoContactError, Scene
 from bemkit.solvers.active_sets import NodeStatus
 from bemkit.solvers.base import ContactSolution, Status
 from bemkit.stopwatch import Stage, StageClock, announce, assembly_time
@@ -33,7 +32,9 @@ from bemkit.stopwatch import Stage, StageClock, announce, assembly_time
 if TYPE_CHECKING:
     from concurrent.futures import Executor
 
+    from bemkit.results.load_history import LoadHistory, LoadStep
     from bemkit.results.solution import Solution
+    from bemkit.solvers.base import StepRecord
 
 
 class UnsolvableSceneError(InputError):
@@ -279,7 +280,11 @@ def _path(model: Model, before: Model | None, end: IncrementEnd, history: Histor
 
     factors = history.asked.load_factors
     ends = (factors[number - 1], factors[number]) if number and len(factors) == len(history.times) else None
-    drag = obstacle_travel(before.prepared, model.prepared) / model.units.displacement if before else 0.0
+    drag: FloatArray | float = 0.0
+    if before is not None:
+        from bemkit.model.obstacle_travel import obstacle_travel
+
+        drag = obstacle_travel(before.prepared, model.prepared) / model.units.displacement
     return Path(model, end, history.times[number], before, between, drag, ends)
 
 
@@ -291,6 +296,8 @@ def _loading(
     solution: Solution,
 ) -> LoadHistory:
     """Return the history up to a step that is finished."""
+    from bemkit.results.load_history import LoadHistory, LoadStep
+
     former = solutions[-1] if solutions else history.done
     steps: tuple[LoadStep, ...] = () if former is None or former.loading is None else former.loading.steps
     work, end = reached.work, reached.end
@@ -323,3 +330,25 @@ def _not_reached(before: Solution | None, result: ContactSolution, clock: StageC
         memory=clock.memory,
         warnings=before.plan.warnings,
     )
+
+
+def run_on_mesh(
+    scene: Scene,
+    mesh: Meshes = None,
+    start: Any = None,
+    callback: Callable[[StepRecord], None] | None = None,
+    executor: Executor | None = None,
+) -> Any:
+    """Solve a scene on one mesh of each body; of a load history return the last step with the records of all."""
+    return joined(*solved_history([scene], mesh, callback, guess=guess_from(scene, start), executor=executor))
+
+
+def guess_from(scene: Scene, start: Any) -> Callable[[Model], ContactState] | None:
+    """Return what takes a solution to the contact nodes of a model, where one is given."""
+    if start is None:
+        return None
+    if not scene.has_contact:
+        raise NoContactError("start is given, but no part is in contact: remove it; nothing is iterated")
+    from bemkit.runs.warm_start import state_on
+
+    return lambda model: state_on(model, start)

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bemkit.arrays import FloatArray, IntArray
-from bemkit.contact.further_laws import PiecewiseLaw
 from bemkit.contact.laws import FrictionLaw
 from bemkit.contact.problem import LawError
 from bemkit.errors import InputError
@@ -159,6 +158,8 @@ class BodyScene:
             return self.law
         if len(laws) == 1 or all(law is laws[0] for law in laws):
             return laws[0]
+        from bemkit.contact.further_laws import PiecewiseLaw
+
         return PiecewiseLaw(laws, nodes)
 
     @property

@@ -6,9 +6,7 @@ import inspect
 import re
 
 from bemkit.errors import InputError
-from bemkit.scene.docstrings import unit_of_parameter
-from bemkit.scene.known_units import PURE_NUMBER, Unit, read_unit
-from bemkit.scene.unit_names import UnitNames
+from bemkit.scene.unit_names import PURE_NUMBER, Unit, UnitNames, read_unit
 
 _TEXT = re.compile(r"\s*((?>[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?))\s*((?:[^\W\d_]|°)[\w°^/* -]*?)\s*")
 
@@ -33,8 +31,12 @@ def in_units_of_scene(text: str, owner: type, name: str, units: UnitNames | None
         If a number has a unit of another kind than the field, or the scene names no units that are known.
     """
     found = _TEXT.fullmatch(text)
-    documented = unit_of_parameter(inspect.getdoc(owner) or "", name) if found else ""
-    if found is None or not documented:
+    if found is None:
+        return text
+    from bemkit.scene.docstrings import unit_of_parameter
+
+    documented = unit_of_parameter(inspect.getdoc(owner) or "", name)
+    if not documented:
         return text
     expected = PURE_NUMBER if documented == "-" else read_unit(documented)
     given = read_unit(found[2])

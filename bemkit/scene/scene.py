@@ -26,8 +26,7 @@ from bemkit.scene.body import Body, check_place, lines_across
 from bemkit.scene.body_forces import BodyForce
 from bemkit.scene.body_scene import BodyScene
 from bemkit.scene.conditions import Contact, Force, Free, Part
-from bemkit.scene.contact_checks import check_contacts
-from bemkit.scene.contacts import ContactPair, Touching
+from bemkit.scene.contacts import ContactPair, Touching, check_contacts
 from bemkit.scene.discretisation import Discretisation, Galerkin
 from bemkit.scene.mesh_options import MeshOptions
 from bemkit.scene.objects import check_objects, outline_of

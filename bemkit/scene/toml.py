@@ -21,7 +21,6 @@ from bemkit.scene.registry import FILE_KINDS, RISING, SOLVERS
 from bemkit.scene.scene import Scene
 from bemkit.scene.serialisation import StructureError, structure
 from bemkit.scene.unit_names import UnitNames
-from bemkit.scene.written_tables import UnstructureError, unstructure
 from bemkit.solvers.base import ContactSolver
 from bemkit.solvers.fallbacks import Fallbacks
 
@@ -215,6 +214,8 @@ def scene_to_toml(scene: Scene) -> str:
         If the scene holds a Python function, or an object of a class that scene files have no name for.
     """
     import tomli_w
+
+    from bemkit.scene.written_tables import UnstructureError, unstructure
 
     try:
         table = unstructure(scene, keep_defaults=True)

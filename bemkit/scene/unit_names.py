@@ -1,13 +1,101 @@
-"""The names of the units that a scene is stated in; they label results and change no number."""
+"""Units of measurement: their sizes and dimensions, and the names of those that a scene is stated in."""
 
 from __future__ import annotations
 
+import math
+import re
+import unicodedata
+from collections.abc import Mapping
 from dataclasses import dataclass, fields
+from types import MappingProxyType
 
 from bemkit.errors import InputError
-from bemkit.scene.known_units import length_in_metres, name_of_force
+from bemkit.formulas import closest
 
 _LONGEST = 24
+_FACTOR = re.compile(r"([^\W\d_]+|°)(?:\^?(-?\d))?")
+
+
+@dataclass(frozen=True)
+class Unit:
+    """A unit of measurement.
+
+    Parameters
+    ----------
+    factor : float
+        Its size in SI units.
+    powers : (int, int, int, int, int)
+        Powers of mass, length, time, temperature and angle in it.
+    """
+
+    factor: float
+    powers: tuple[int, int, int, int, int]
+
+    def __mul__(self, other: Unit) -> Unit:
+        mass, length, time, temperature, angle = (a + b for a, b in zip(self.powers, other.powers, strict=True))
+        return Unit(self.factor * other.factor, (mass, length, time, temperature, angle))
+
+    def __pow__(self, power: int) -> Unit:
+        mass, length, time, temperature, angle = (power * each for each in self.powers)
+        return Unit(self.factor**power, (mass, length, time, temperature, angle))
+
+
+def _of(powers: tuple[int, int, int, int, int], **factors: float) -> dict[str, Unit]:
+    return {name: Unit(factor, powers) for name, factor in factors.items()}
+
+
+_UNITS: Mapping[str, Unit] = MappingProxyType(
+    _of((0, 1, 0, 0, 0), nm=1e-9, um=1e-6, mm=1e-3, cm=1e-2, m=1.0, km=1e3, ft=0.3048)
+    | {"in": Unit(0.0254, (0, 1, 0, 0, 0)), "\N{GREEK SMALL LETTER MU}m": Unit(1e-6, (0, 1, 0, 0, 0))}
+    | _of((1, 1, -2, 0, 0), mN=1e-3, N=1.0, kN=1e3, MN=1e6, lbf=4.4482216152605, kip=4448.2216152605)
+    | _of((1, -1, -2, 0, 0), Pa=1.0, kPa=1e3, MPa=1e6, GPa=1e9, bar=1e5, psi=6894.757293168361, ksi=6894757.293168361)
+    | _of((1, 0, 0, 0, 0), g=1e-3, kg=1.0, t=1e3)
+    | _of((0, 0, 1, 0, 0), s=1.0, ms=1e-3, min=60.0, h=3600.0)
+    | _of((0, 0, 0, 1, 0), K=1.0)
+    | _of((0, 0, 0, 0, 1), rad=1.0, deg=math.pi / 180.0, degree=math.pi / 180.0)
+    | {"°": Unit(math.pi / 180.0, (0, 0, 0, 0, 1))}
+)
+PURE_NUMBER = Unit(1.0, (0, 0, 0, 0, 0))
+
+
+def read_unit(text: str) -> Unit:
+    """Return a unit such as ``kN/mm^2``: factors with spaces or asterisks between them, divisors after slashes.
+
+    Raises
+    ------
+    InputError
+        If a factor is unknown.
+    """
+    unit = PURE_NUMBER
+    for number, side in enumerate(unicodedata.normalize("NFKC", text).split("/")):
+        for factor in side.replace("*", " ").split():
+            if number == 0 and factor == "1":
+                continue
+            found = _FACTOR.fullmatch(factor)
+            if found is None or found[1] not in _UNITS:
+                raise InputError(
+                    f"the unit {factor!r} is unknown: give one of {', '.join(_UNITS)}{closest(factor, _UNITS)}"
+                )
+            power = int(found[2] or 1)
+            unit = unit * _UNITS[found[1]] ** (-power if number else power)
+    return unit
+
+
+def name_of_force(length: str, stress: str) -> str:
+    """Return the name of the unit of forces per thickness, such as ``N/mm`` of mm and MPa; empty if none is known."""
+    try:
+        size = read_unit(stress).factor * read_unit(length).factor
+    except InputError:  # units of one's own
+        return ""
+    names = ("N", "kN", "MN", "mN", "lbf", "kip")
+    per_length = {f"{name}/{length}": read_unit(f"{name}/{length}").factor for name in names}
+    return next((name for name, own in per_length.items() if math.isclose(own, size, rel_tol=1e-9)), "")
+
+
+def length_in_metres(name: str) -> float | None:
+    """Return the size of a unit of length by its name; None if that names no known length."""
+    unit = _UNITS.get(name)
+    return unit.factor if unit is not None and unit.powers == (0, 1, 0, 0, 0) else None
 
 
 @dataclass(frozen=True)

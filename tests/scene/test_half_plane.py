@@ -13,7 +13,7 @@ import bemkit as bk
 from bemkit.geometry.errors import GeometryError
 from bemkit.geometry.outline import Outline, Side
 from bemkit.geometry.surface import Surface
-from bemkit.runs.history import run_on_mesh
+from bemkit.runs.steps import run_on_mesh
 from bemkit.scene.load_history import load_steps
 from bemkit.studies.stability.case import Case
 from bemkit.studies.stability.sweep import condition_number

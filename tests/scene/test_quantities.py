@@ -9,10 +9,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import bemkit as bk
-from bemkit.scene.known_units import read_unit
 from bemkit.scene.places import Place, with_value
 from bemkit.scene.quantities import in_units_of_scene
 from bemkit.scene.toml import SceneError
+from bemkit.scene.unit_names import read_unit
 
 MM = bk.UnitNames("mm", "MPa")
 BLOCK = """

@@ -8,18 +8,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray, IntArray
 from bemkit.contact.condensation.dense_body import FollowingTangents
-from bemkit.contact.condensation.exact_motions import resisting_none
 from bemkit.contact.condensation.nodes import ContactNodes
 from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions
 
-if TYPE_CHECKING:
-    from scipy.sparse import csr_array
+_ROUND_OFF = 1e-6
+"""A larger share is not round-off: it stays, and the certificate measures it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,32 +49,6 @@ class NodeCoupling:
         columns = number[contact.nodes]
         blocks = np.einsum("nkc,njc->nkj", contact.frame, conditions.frame[contact.nodes])
         return cls(columns, np.where(columns[:, None] >= 0, blocks, 0.0))
-
-    @classmethod
-    def from_matrix(cls, relative: csr_array, tangent_follows: BoolArray) -> NodeCoupling | None:
-        """Return the coupling of a matrix B (2 n_contact, n), None if its rows do not determine all displacements.
-
-        Parameters
-        ----------
-        relative : (2 n_contact, n) sparse array
-        tangent_follows : (n_contact,) bool array
-            Tangents that are not unknowns.
-        """
-        n_contact, n = relative.shape[0] // 2, relative.shape[1]
-        row = np.repeat(np.arange(2 * n_contact), np.diff(relative.indptr))
-        # the directions of each contact node, in ascending order; more than two are those of several nodes
-        pairs, pair = np.unique(row // 2 * n + relative.indices, return_inverse=True)
-        node, column = np.divmod(pairs, n)
-        count = np.bincount(node, minlength=n_contact)
-        if count.min() < 1 or count.max() > 2:
-            return None
-        slot = np.arange(node.size) - (np.cumsum(count) - count)[node]
-        columns, blocks = np.full((n_contact, 2), -1), np.zeros((n_contact, 2, 2))
-        columns[node, slot] = column
-        np.add.at(blocks, (row // 2, row % 2, slot[pair]), relative.data)
-        coupling = cls(columns, blocks)
-        is_like = np.array_equal(coupling.tangent_follows, tangent_follows)
-        return coupling if is_like and coupling.unknown_dofs.size == n else None
 
     @cached_property
     def partner(self) -> IntArray:
@@ -169,3 +141,39 @@ class NodeCoupling:
     def load(self, of_body: FloatArray, stiffness: FloatArray, offset: FloatArray) -> FloatArray:
         """Return the load (n_unknowns,) ``K_w o + R^T f`` of that on the body under an offset (2 n_contact,) [m]."""
         return self.on_unknowns(of_body) + stiffness @ offset[self.unknown_dofs]
+
+
+def resisting_none(stiffness: FloatArray, motions: FloatArray) -> FloatArray:
+    """Return a stiffness (n, n) that maps motions (n_motions, n) to no force, and makes no force that works on them.
+
+    Notes
+    -----
+    A body that supports leave free to move resists no rigid motion, and its load does on it the work of all given
+    forces (`with_work`). Elimination keeps that to the round-off of the forces on the whole body. A contact much
+    smaller than the body, such as a pin in a plate, has short lever arms: there the same round-off would be forces that
+    turn the body, by far.
+    """
+    if not len(motions):
+        return stiffness
+    basis = np.linalg.qr(motions.T)[0]
+    forces, works = stiffness @ basis, basis.T @ stiffness
+    if max(np.abs(forces).max(), np.abs(works).max()) > _ROUND_OFF * np.abs(stiffness).max():
+        return stiffness
+    result: FloatArray = stiffness - forces @ basis.T - basis @ (works - (works @ basis) @ basis.T)
+    return result
+
+
+def with_work(load: FloatArray, motions: FloatArray, work: FloatArray, size: float) -> FloatArray:
+    """Return a load (n,) that does a given work (n_motions,) on motions (n_motions, n).
+
+    Parameters
+    ----------
+    load, motions, work : arrays
+        The forces that are added are the least ones.
+    size : float [N/m]
+        Sum of the sizes of all given forces.
+    """
+    missing = work - motions @ load
+    if not len(missing) or np.abs(missing).max() > _ROUND_OFF * size:
+        return load
+    return np.asarray(load + np.linalg.lstsq(motions, missing, rcond=None)[0])

@@ -1,4 +1,4 @@
-"""One or few members: the dense stiffness of their relative displacements, computed once."""
+"""Few members: the dense stiffness of their relative displacements, computed once."""
 
 from __future__ import annotations
 
@@ -8,39 +8,8 @@ import numpy as np
 
 from bemkit.arrays import FloatArray
 from bemkit.contact.condensation.dense_body import DenseBody, FollowingTangents
-from bemkit.contact.condensation.node_coupling import NodeCoupling
 from bemkit.contact.joined.coupled_members import CoupledMembers
 from bemkit.operators.linear.dense import DenseLU
-
-
-class DirectStiffness:
-    """Stiffness ``R^T K R`` of the contact nodes of one member between obstacles; see `NodeCoupling`.
-
-    Parameters
-    ----------
-    joined : CoupledMembers
-        Of one member.
-    coupling : NodeCoupling
-    """
-
-    def __init__(self, joined: CoupledMembers, coupling: NodeCoupling) -> None:
-        (shape,) = joined.shapes
-        self.coupling = coupling
-        self._motions = coupling.moved(shape.motions.T)
-        self._stiffness = coupling.stiffness(shape.member.stiffness, self._motions)
-
-    def body(self, joined: CoupledMembers) -> DenseBody:
-        """Return the body under the loads and offsets of `joined`."""
-        coupling, offset = self.coupling, joined.offset
-        return DenseBody(
-            stiffness=self._stiffness,
-            load=coupling.load(joined.load, self._stiffness, offset),
-            weights=joined.weights,
-            motions=self._motions,
-            following_tangents=coupling.following(offset),
-            modulus=joined.stiffness_scale * float(np.median(joined.weights)),
-        )
-
 
 _TIED = "the bodies tied to each other at all contact nodes (remove a tie that follows from the others)"
 

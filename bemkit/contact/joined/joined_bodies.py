@@ -11,11 +11,10 @@ import numpy as np
 from bemkit.arrays import FloatArray
 from bemkit.contact.body import ContactState, LinearBody, SingularResponse
 from bemkit.contact.condensation.dense_body import DenseBody
-from bemkit.contact.condensation.node_coupling import NodeCoupling
 from bemkit.contact.conditions import LinearConditions, RigidMotions
 from bemkit.contact.equilibrium import NOISE_FACTOR, Imbalance
 from bemkit.contact.joined.coupled_members import CoupledMembers
-from bemkit.contact.joined.dense_form import DirectStiffness, RelativeStiffness
+from bemkit.contact.joined.dense_form import RelativeStiffness
 from bemkit.contact.joined.sparse_form import Compliance, sparse_response
 
 LIGHTEST = 1e-3
@@ -35,7 +34,6 @@ _WITHOUT_LOAD = (
         "motions",
         "relative_motions",
         "is_symmetric",
-        "_node_coupling",
         "_compliance",
         "_relative_stiffness",
         "_motion_fit",
@@ -107,26 +105,16 @@ class JoinedBodies(CoupledMembers, LinearBody):
         is_small = 2 * self.n_contact + self.motions.shape[1] <= MOST_DENSE
         moduli = [member.modulus for member in self.members]
         is_alike = max(moduli, default=1.0) <= MOST_CONTRAST * min(moduli, default=1.0)
-        return not ((is_small and is_alike) or self._node_coupling is not None)
+        return not (is_small and is_alike)
 
     def respond(self, conditions: LinearConditions) -> ContactState:
         """Return relative displacements and tractions; see `LinearBody.respond`."""
-        if self._is_direct:
-            return self._dense.respond(conditions)
         if not self.responses_are_expensive:
             return self._refined(conditions, self._dense.respond(conditions))
         self.held_friction.check(conditions)
         if conditions.free_motions(self.rigid_motions()).shape[0]:
             raise SingularResponse("the contact conditions leave a rigid motion free")
         return sparse_response(self, self._compliance, conditions)
-
-    def recover(self, state: ContactState) -> tuple[FloatArray, FloatArray]:
-        """Return the displacements of the members, and what is missed; see `CoupledMembers.recover`."""
-        if not self._is_direct or self._node_coupling is None:
-            return super().recover(state)
-        relative = state.displacement.ravel() - self.offset
-        displacement = self._node_coupling.retained(relative[self._node_coupling.unknown_dofs])
-        return displacement, relative - self.relative @ displacement
 
     def _refined(self, conditions: LinearConditions, state: ContactState) -> ContactState:
         """Return a response after one step of iterative refinement, against the round-off of the dense stiffness.
@@ -173,8 +161,6 @@ class JoinedBodies(CoupledMembers, LinearBody):
             lightest loaded member there, the second to the sum of all forces on the member. Members that carry nothing
             are measured by a thousandth of the largest forces on any.
         """
-        if self._is_direct:
-            return self._dense.imbalance(state)
         displacement, missed = self.recover(state)
         terms = self._terms(displacement)
         largest, total = self._force_scales(state, terms)
@@ -238,17 +224,8 @@ class JoinedBodies(CoupledMembers, LinearBody):
         return Compliance.of(self)
 
     @cached_property
-    def _node_coupling(self) -> NodeCoupling | None:
-        """The coupling of a single member between obstacles, which its relative displacements determine."""
-        return NodeCoupling.from_matrix(self.relative, self.tangent_follows) if len(self.members) == 1 else None
-
-    @property
-    def _is_direct(self) -> bool:
-        return not self.responses_are_expensive and self._node_coupling is not None
-
-    @cached_property
-    def _relative_stiffness(self) -> RelativeStiffness | DirectStiffness:
-        return RelativeStiffness(self) if self._node_coupling is None else DirectStiffness(self, self._node_coupling)
+    def _relative_stiffness(self) -> RelativeStiffness:
+        return RelativeStiffness(self)
 
     @cached_property
     def _dense(self) -> DenseBody:

@@ -11,14 +11,13 @@ The border makes resultants of the tractions zero, and adds a reciprocity for ea
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
 from bemkit.arrays import ComplexArray, FloatArray, IntArray
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.operators.collocation.compiled import layer_for
-from bemkit.operators.collocation.curved_elements import CurvedElements
 from bemkit.operators.collocation.gradient_reconstruction import GradientReconstruction
 from bemkit.operators.collocation.layers import Constants, Layer, Unknowns, combined
 from bemkit.operators.collocation.reciprocity import Reciprocity
@@ -26,6 +25,9 @@ from bemkit.operators.hierarchy.equations import Border
 from bemkit.operators.integrals.panels import Panels
 from bemkit.operators.material import Material
 from bemkit.operators.rigid_modes import traction_free_modes
+
+if TYPE_CHECKING:
+    from bemkit.operators.collocation.curved_elements import CurvedElements
 
 _ELEMENTS = 512
 """Elements whose sums are evaluated at a time, so that they stay in the cache."""
@@ -104,7 +106,7 @@ class CollocationEquations:
             *_reconstruction(mesh, panels, order, takes_slopes=takes_slopes),
             border,
             layer or layer_for(mesh.n_elements),
-            None if panels.curved is None else CurvedElements.of(panels, material, order, log_length),
+            _curved(panels, material, order, log_length),
         )
 
     @property
@@ -234,6 +236,14 @@ def counted(places: IntArray, elements: IntArray) -> IntArray:
         return np.full_like(places, NOWHERE)
     found = np.searchsorted(elements, places)
     return np.where(elements[np.minimum(found, elements.size - 1)] == places, found, NOWHERE)
+
+
+def _curved(panels: Panels, material: Material, order: IntArray, log_length: float) -> CurvedElements | None:
+    if panels.curved is None:
+        return None
+    from bemkit.operators.collocation.curved_elements import CurvedElements
+
+    return CurvedElements.of(panels, material, order, log_length)
 
 
 def collocation_border(mesh: BoundaryMesh, material: Material, order: IntArray, *, takes_slopes: bool) -> Border:

@@ -21,11 +21,11 @@ from bemkit.operators.material import Material
 from bemkit.operators.pair_form import Tag
 from bemkit.operators.steklov_poincare.needs import BodyCase, BodyNeeds
 from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions
-from bemkit.operators.steklov_poincare.protocol import CondensedMap
+from bemkit.operators.steklov_poincare.protocol import BoundaryMap, CondensedMap
 
 
 @dataclass(frozen=True, eq=False)
-class SurfaceElasticity(ABC):
+class SurfaceElasticity(BoundaryMap, ABC):
     """Elasticity of a half-plane seen from elements of its surface; fulfils `SteklovPoincare`.
 
     Parameters
@@ -108,6 +108,10 @@ class SurfaceElasticity(ABC):
     def strain_displacement(self, force: FloatArray) -> FloatArray:
         """Return the displacements (n_nodes, 2) that nodal forces (n_nodes, 2) cause, without those of the drive."""
         return self.to_vectors(self.displaced(self.to_complex(force / self.mesh.lengths[:, None])))
+
+    def own_fields(self, displacement: FloatArray, force: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return displacement without that far away, and force."""
+        return self.strain_displacement(force), force
 
     @property
     @abstractmethod

@@ -18,11 +18,11 @@ from bemkit.operators.material import Material
 from bemkit.operators.pair_form import Tag
 from bemkit.operators.steklov_poincare.needs import CHUNK_PAIRS, BodyCase, BodyNeeds, collocation_needs
 from bemkit.operators.steklov_poincare.nodal_conditions import GivenData, NodalConditions, rotate_columns
-from bemkit.operators.steklov_poincare.protocol import CondensedMap
+from bemkit.operators.steklov_poincare.protocol import BoundaryMap, CondensedMap
 from bemkit.stopwatch import assembling
 
 
-class CollocationElasticity:
+class CollocationElasticity(BoundaryMap):
     """Elasticity of a body by direct collocation, (1/2 + T) u = U t, with tractions in equilibrium.
 
     Displacements and tractions are constant on elements; the equations hold at their midpoints.

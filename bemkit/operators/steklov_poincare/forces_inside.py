@@ -217,6 +217,10 @@ class HeavyElasticity:
     def _particular_energy(self) -> float:
         return self.inside.solution.energy(self.traction_space.mesh)
 
+    def own_fields(self, displacement: FloatArray, force: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return displacement and force less those of the particular solution."""
+        return displacement - self.inside.displacement, force - self.inside.force
+
     def energy_beyond(self, displacement: FloatArray, force: FloatArray) -> FloatArray:
         """Return the parts (4,) of the elastic energy [J/m] that a body has beyond the one of the map, f_h u_h / 2.
 
@@ -252,11 +256,6 @@ class HeavyElasticity:
         measure = space.mesh.jacobian(elements, xi) * weights
         of_heat = integrate_traction(moved_space, elements, inside.solution.expansions.traction)
         return at_nodes, np.einsum("eq,lq,eqc->elc", measure, space.basis(xi), rest, optimize=True), of_heat
-
-
-def under_forces_inside(elastic: SteklovPoincare, inside: ForcesInside | None) -> SteklovPoincare:
-    """Return a map under forces inside the body, the map itself if there are none."""
-    return elastic if inside is None else HeavyElasticity(elastic, inside)
 
 
 def projected_tractions(solution: ParticularSolution, space: BoundarySpace) -> FloatArray:

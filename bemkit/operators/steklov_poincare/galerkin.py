@@ -33,7 +33,7 @@ from bemkit.operators.rigid_modes import traction_free_modes
 from bemkit.operators.steklov_poincare.layer_operators import assemble_layers, dilatation_of
 from bemkit.operators.steklov_poincare.needs import BodyCase, BodyNeeds, galerkin_needs
 from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions, integrate_traction
-from bemkit.operators.steklov_poincare.protocol import CondensedMap
+from bemkit.operators.steklov_poincare.protocol import BoundaryMap, CondensedMap
 from bemkit.operators.steklov_poincare.schur import SchurCondensation
 from bemkit.operators.steklov_poincare.volume_constraint import Volume
 
@@ -67,7 +67,7 @@ class GalerkinFactors:
     work: OperationCounts = field(default_factory=OperationCounts)
 
 
-class GalerkinElasticity:
+class GalerkinElasticity(BoundaryMap):
     """Elasticity of a body by symmetric Galerkin, S = W + B^T V^-1 B with B = 1/2 M + K.
 
     Parameters

@@ -14,7 +14,6 @@ import numpy as np
 
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.operators.counts import Entries, Factorisation, FactorKind, OperationCounts
-from bemkit.operators.integrals.pairs import Degrees
 from bemkit.operators.linear.solvers import ChosenLinearSolver, DenseCholesky
 from bemkit.operators.linear.threads import n_threads
 from bemkit.operators.material import Material
@@ -154,6 +153,7 @@ def galerkin_needs(case: BodyCase, n_tractions: int, degree: int) -> BodyNeeds:
     degree : int
         Of the displacements.
     """
+    from bemkit.operators.integrals.pairs import Degrees
     from bemkit.operators.integrals.sweep import sweep_memory
 
     t, u, f, r = n_tractions, case.n_displacements, case.n_free, case.n_retained

@@ -6,6 +6,8 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Protocol
 
+import numpy as np
+
 from bemkit.arrays import FloatArray, IntArray
 from bemkit.geometry.spaces import BoundarySpace
 from bemkit.operators.counts import OperationCounts
@@ -74,6 +76,18 @@ class CondensedMap(ABC):
         """
 
 
+class BoundaryMap:
+    """Base of maps whose displacements all come from forces on the boundary of a body that ends somewhere."""
+
+    def own_fields(self, displacement: FloatArray, force: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return displacement and force."""
+        return displacement, force
+
+    def energy_beyond(self, displacement: FloatArray, force: FloatArray) -> FloatArray:
+        """Return nothing."""
+        return np.zeros(0)
+
+
 class SteklovPoincare(Protocol):
     """The elastic body seen from its boundary: nodal forces that go with displacements.
 
@@ -101,6 +115,12 @@ class SteklovPoincare(Protocol):
 
     def condense(self, conditions: NodalConditions, force: FloatArray) -> CondensedMap:
         """Eliminate every direction that is not retained, with the given nodal forces (n_nodes, 2) on the free ones."""
+
+    def own_fields(self, displacement: FloatArray, force: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return nodal displacements and forces (n_nodes, 2) less those of what acts inside the body or far away."""
+
+    def energy_beyond(self, displacement: FloatArray, force: FloatArray) -> FloatArray:
+        """Return the parts of the elastic energy [J/m] that what acts inside adds to that of `own_fields`."""
 
     def element_tractions(self, displacement: FloatArray, force: FloatArray) -> FloatArray:
         """Return the tractions [Pa] that belong to what `CondensedMap.recover` gives.
