@@ -61,7 +61,7 @@ def test_the_history_ends_with_the_certificate(solution: Solution) -> None:
 def test_unknown_tables_are_refused(solution: Solution) -> None:
     with pytest.raises(ValueError, match="table is 'inside': give one of contact, boundary, history"):
         to_csv(solution, "inside")
-    assert TABLES == ("contact", "boundary", "history", "steps", "forces")
+    assert TABLES == ("contact", "boundary", "history", "steps", "forces", "pressures")
 
 
 def test_json_has_null_for_what_is_not_finite(solution: Solution) -> None:
