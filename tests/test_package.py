@@ -33,7 +33,7 @@ NOT_NEEDED = (
 )
 """Of a scene with one body of straight sides on one obstacle, solved by collocation from a number of elements."""
 MOST_MODULES = 155
-"""Modules of the package, packages and command line counted, that may be loaded to solve a simple scene: a few more than are."""
+"""Modules of the package that may be loaded to solve a simple scene, packages and command line counted."""
 HEAVY = ("scipy.sparse.linalg", "h5py", "pyamg", "matplotlib", "meshio", "rich", "click")
 
 
