@@ -14,6 +14,7 @@ from bemkit.geometry.errors import GeometryError
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.placement import Placement
 from bemkit.geometry.spaces import BoundarySpace
+from bemkit.model.matched_sides import matching_densities
 from bemkit.model.units import Units, check_position
 from bemkit.operators.material import Material
 from bemkit.scene.body import Body
@@ -128,14 +129,10 @@ def place(scene: Scene, meshes: Meshes = None) -> tuple[PlacedBody, ...]:
         If a body lies more than 1e7 diameters from the origin.
     """
     given = _by_name(scene.placed_bodies, meshes)
-    divided: dict[int, BoundaryMesh] = {}
+    drawn_meshes = _drawn(scene, given)
     placed = []
     for body in scene.placed_bodies:
-        own_scene = scene.scene_of(body)
-        if body.name in given:
-            drawn = given[body.name]
-        else:
-            drawn = divided.setdefault(id(own_scene), divided.get(id(own_scene)) or _divided(own_scene, scene, body))
+        own_scene, drawn = scene.scene_of(body), drawn_meshes[body.name]
         check_body_symmetry(own_scene, drawn)
         mesh = body.placement.mesh(drawn)
         where = f"body {body.name!r}" if body.name else "the body"
@@ -164,10 +161,31 @@ def check_body_symmetry(scene: BodyScene, mesh: BoundaryMesh) -> None:
         check_symmetry(scene, mesh)
 
 
-def _divided(own_scene: BodyScene, scene: Scene, body: Body) -> BoundaryMesh:
+def _drawn(scene: Scene, given: Mapping[str, BoundaryMesh]) -> dict[str, BoundaryMesh]:
+    """Return the meshes of all bodies by name, where they are drawn; bodies that share a scene share one."""
+    divided = [body for body in scene.placed_bodies if body.name not in given]
+    own_scenes = {body.name: scene.scene_of(body) for body in scene.placed_bodies}
+    by_scene: dict[int, BoundaryMesh] = {}
+    for body in divided:
+        own_scene = own_scenes[body.name]
+        if id(own_scene) not in by_scene:
+            by_scene[id(own_scene)] = _divided(own_scene, scene, body)
+    meshes = {**given, **{body.name: by_scene[id(own_scenes[body.name])] for body in divided}}
+    densities = matching_densities(scene.elastic_contacts, own_scenes, meshes)
+    matched: dict[int, BoundaryMesh] = {}
+    for body in divided:
+        own_scene = own_scenes[body.name]
+        if body.name in densities and id(own_scene) not in matched:
+            matched[id(own_scene)] = _divided(own_scene, scene, body, densities[body.name])
+    return meshes | {b.name: matched[id(own)] for b in divided if id(own := own_scenes[b.name]) in matched}
+
+
+def _divided(
+    own_scene: BodyScene, scene: Scene, body: Body, part_density: Mapping[str, float] | None = None
+) -> BoundaryMesh:
     even = [*(part.name for part in own_scene.contact_parts), *scene.touching_parts(body)]
     try:
-        return own_scene.divided(even)
+        return own_scene.divided(even, part_density)
     except GeometryError as error:
         if not body.name:
             raise

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -188,8 +188,11 @@ class BodyScene:
 
         return first_partition(outline, self.selections, self.mesh.n_elements, even=contact, symmetry=self.symmetry)
 
-    def divided(self, contact: Collection[str]) -> BoundaryMesh:
-        """Return the mesh by number of elements, or the first mesh for an accuracy; see `first_partition`."""
+    def divided(self, contact: Collection[str], part_density: Mapping[str, float] | None = None) -> BoundaryMesh:
+        """Return the mesh by number of elements, or the first mesh for an accuracy; see `first_partition`.
+
+        A number of elements is shared by densities of the sides and, if given, of parts.
+        """
         if self.mesh.elements is None:
             return self.first_partition(contact).mesh
         return discretise(
@@ -198,6 +201,7 @@ class BodyScene:
             parts=self.selections,
             grading=self.mesh.grading,
             density=self.mesh.density,
+            part_density=part_density,
             symmetry=self.symmetry,
         )
 

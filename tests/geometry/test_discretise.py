@@ -118,6 +118,13 @@ def test_density_divides_a_side_more_finely() -> None:
     assert len(mesh.part("low")) == 40
 
 
+def test_part_density_divides_a_part_more_finely() -> None:
+    low = {"low": Selection(("bottom",), lambda x, y: x < 0.5)}
+    mesh = discretise(UNIT, n_elements=75, parts=low, density={"bottom": 2.0}, part_density={"low": 2.0})
+    assert mesh.part("low").size == 25  # lengths times densities: 2 of 6
+    assert discretise(UNIT, n_elements=75, parts=low, part_density={"other": 2.0}).part("low").size == 9
+
+
 class Backwards:
     """A grading that does not increase."""
 

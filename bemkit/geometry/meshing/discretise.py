@@ -126,6 +126,7 @@ def discretise(
     parts: Mapping[str, Selection] | None = None,
     grading: Grading | None = None,
     density: Mapping[str, float] | None = None,
+    part_density: Mapping[str, float] | None = None,
     symmetry: Symmetry | None = None,
 ) -> BoundaryMesh:
     """Divide an outline into elements.
@@ -145,6 +146,8 @@ def discretise(
     density : mapping of str to float, optional
         How densely sides are divided compared with the others, by the name of the side, or else of
         its group; by default 1.
+    part_density : mapping of str to float, optional
+        The same by the name of a part, positive; both count where both are given.
     symmetry : Symmetry, optional
         Lines of which only the side x <= a, y <= b is divided, into a half or a quarter of `n_elements`.
 
@@ -171,7 +174,8 @@ def discretise(
         _check_sides_divided(density, division)
     lengths = division.piece_lengths
     sides = [outline.sides[piece.side] for piece in division.pieces]
-    densities = [density.get(side.name, density.get(side.group, 1.0)) for side in sides]
+    densities = np.array([density.get(side.name, density.get(side.group, 1.0)) for side in sides])
+    densities *= [(part_density or {}).get(piece.part or "", 1.0) for piece in division.pieces]
     counts = share_elements(n_elements, lengths * densities)
     if isinstance(grading, Uniform):
         positions = _gradual(division, counts, lengths)

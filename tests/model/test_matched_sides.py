@@ -1,0 +1,77 @@
+"""Elements of equal lengths on curved sides that fit, so that a uniform pressure is uniform with linear elements."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import bemkit as bk
+from bemkit.model.placed import place
+
+MATERIAL = bk.Material(1.0, 0.3)
+
+
+def rings(law: bk.FrictionLaw, radius: float = 1.0, **options: object) -> bk.Scene:
+    """Two rings, one 1e-3 too large for the other, and an inner radius of the outer one."""
+    held = bk.PrescribedDisplacement(bk.Expression("3e-4 * x"), bk.Expression("3e-4 * y"))
+    inner = bk.Body(name="inner", shape=bk.Ring(0.5, 1.0), material=MATERIAL)
+    outer = bk.Body(name="outer", shape=bk.Ring(radius, 2.0), material=bk.Material(0.5, 0.2))
+    outer = replace(outer, parts=(bk.Part("rim", held, ("outer",)),))
+    settings = {"discretisation": bk.Galerkin(1), "mesh": bk.MeshOptions(elements=80)} | options
+    return bk.Scene(
+        title="press fit",
+        bodies=(inner, outer),
+        contacts=(bk.ContactPair(("inner.outer", "outer.inner"), gap=-1e-3),),
+        law=law,
+        **settings,  # type: ignore[arg-type]
+    )
+
+
+def sizes(scene: bk.Scene) -> list[int]:
+    """Return the elements of both sides in contact."""
+    sides = ("outer", "inner")
+    return [body.mesh.part(side).size for body, side in zip(place(scene), sides, strict=True)]
+
+
+@pytest.mark.parametrize("law", [bk.Frictionless(), bk.Coulomb(0.2)])
+def test_a_uniform_pressure_is_uniform(law: bk.FrictionLaw) -> None:
+    scene = rings(law)
+    assert sizes(scene) == [52, 52]
+    solution = bk.run(scene)
+    table = solution.contact
+    mean = np.average(table.sigma_n, weights=table.weight)
+    assert np.abs(table.sigma_n / mean - 1.0).max() < 1e-8  # round-off of solves; 4e-2 on elements of 1 to 2
+    # the pressure of quadratic elements on 320 elements; unmatched elements miss it by 1.3e-2 with friction
+    assert mean == pytest.approx(-1.8158e-4, rel=2e-3)
+
+
+def test_the_rest_of_a_boundary_keeps_half_of_its_elements() -> None:
+    large = rings(bk.Coulomb(0.2), mesh=bk.MeshOptions(elements=80))
+    inner, outer = large.bodies
+    fine = replace(large, bodies=(replace(inner, mesh=bk.MeshOptions(elements=200)), outer))
+    body = place(fine)[1]
+    assert body.mesh.n_elements == 80
+    assert [body.mesh.part(side).size for side in ("inner", "rim")] == [52, 28]  # 28 and 52 without the contact
+
+
+@pytest.mark.parametrize(
+    ("scene", "expected"),
+    [
+        (rings(bk.Coulomb(0.2), discretisation=bk.Galerkin(2)), [52, 28]),
+        (rings(bk.Coulomb(0.2), radius=1.05), [52, 28]),  # a gap: the sides do not fit
+        (rings(bk.Coulomb(0.2), mesh=bk.MeshOptions(elements=80, grading=bk.Algebraic(1.5))), [52, 28]),
+        (rings(bk.Coulomb(0.2), mesh=bk.MeshOptions(elements=80, density={"outer": 1.0})), [52, 28]),
+    ],
+)
+def test_lengths_are_matched_only_for_linear_elements_on_sides_that_fit(scene: bk.Scene, expected: list[int]) -> None:
+    assert sizes(scene) == expected
+
+
+def test_meshes_that_are_given_are_kept() -> None:
+    scene = rings(bk.Coulomb(0.2))
+    outer = scene.scene_of(scene.bodies[1]).divided(())
+    inner_body, outer_body = place(scene, {"outer": outer})
+    assert outer_body.own_mesh is outer
+    assert inner_body.mesh.n_elements == 80
