@@ -68,6 +68,7 @@ def find_warnings(solution: Solution) -> tuple[ResultWarning, ...]:
         *of_all,
         _large_of_tractions(solution.estimated_traction_error, remedy),
         *of_bodies,
+        _unbounded_tractions(solution),
         law_jumps(solution.contact, laws),
         _no_load(solution),
         _narrow_zones(solution.contact, smooth, remedy),
@@ -83,7 +84,6 @@ def _of_body(solution: Solution, body: SolvedBody) -> tuple[Iterator[ResultWarni
         _turned(body),
         _coarse_curves(body.mesh),
         _large_strains(body),
-        _unbounded_tractions(solution, body),
         _moved_contacts(body, solution.units),
     )
 
@@ -104,19 +104,26 @@ def _remedy(bodies: Iterable[SolvedBody]) -> str:
     return "use more elements, or give an accuracy"
 
 
-def _unbounded_tractions(solution: Solution, body: SolvedBody) -> Iterator[ResultWarning]:
-    """Warn of singular contact tractions, whose estimated error excludes the corner."""
-    if body.coefficient_errors is None:
-        return
-    for corner in solution.places.corners[body.name]:
-        length = amount(float(body.mesh.lengths[list(corner.elements)].sum()), "length", solution.units, 2)
-        point = f"({corner.x:.4g}, {corner.y:.4g})"
+def _unbounded_tractions(solution: Solution) -> Iterator[ResultWarning]:
+    """Warn of singular contact tractions, whose estimated error excludes the corner; once of one of two bodies."""
+    corners: dict[tuple[float, float, tuple[str, ...]], tuple[float, float]] = {}
+    for name, body in solution.bodies.items():
+        if body.coefficient_errors is None:
+            continue
+        for corner in solution.places.corners[name]:
+            key = (corner.x, corner.y, tuple(sorted(filter(None, (name, corner.partner)))))
+            length = float(body.mesh.lengths[list(corner.elements)].sum())
+            corners[key] = (corner.exponent - 1.0, length + corners.get(key, (0.0, 0.0))[1])
+    for (x, y, names), (power, length) in corners.items():
+        bodies = " and ".join(map(repr, names))
+        prefix = f"{'Bodies' if len(names) > 1 else 'Body'} {bodies}: " if names else ""
         yield ResultWarning(
             "singular contact traction",
-            f"({corner.x:.12g}, {corner.y:.12g})",
-            f"Contact tractions are singular at {point} (r^{corner.exponent - 1.0:.2g}). Use forces instead of peak "
-            f"values, or round the corner. The estimated error of tractions excludes {length} there.",
-            corner.exponent - 1.0,
+            f"{' '.join(names)} ({x:.12g}, {y:.12g})".strip(),
+            f"{prefix}Contact tractions are singular at ({x:.4g}, {y:.4g}) (r^{power:.2g}). Use forces instead of peak "
+            f"values, or round the corner. The estimated error of tractions excludes "
+            f"{amount(length, 'length', solution.units, 2)} there.",
+            power,
         )
 
 
