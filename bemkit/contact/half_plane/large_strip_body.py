@@ -70,7 +70,7 @@ class LargeStripBody(SurfaceBody):
         on_traction[node, row] = _along(reduced.on_traction * turn)
         on_displacement[node, row] = _along(reduced.on_displacement * turn)
         value[node, row] = right
-        local = NodeConditions(on_traction, on_displacement, value).solved(1.0 / self.stiffness_scale).in_full()
+        local = NodeConditions(on_traction, on_displacement, value).solved(1.0 / self.stiffness_scale)
         factors[self.acting], given[self.acting] = local.factors, local.given
         return ElementLaws(factors, given)
 

@@ -139,16 +139,26 @@ class CollocationEquations:
 
     def residual(self, elements: IntArray, traction: FloatArray, displacement: FloatArray) -> FloatArray:
         """Return (1/2 + T) u - U t, (n, 2), in the middle of some elements, from (n_elements, 2) arrays."""
-        x, densities = self.points[elements], self.densities(traction, displacement)
-        result = np.zeros(x.size, complex)
+        densities = self.densities(traction, displacement)
+        result = np.zeros(elements.size, complex)
         every = np.arange(self.start.size)
-        for some in (every[begin : begin + _ELEMENTS] for begin in range(0, every.size, _ELEMENTS)):
-            t, u, s = (each[some] for each in densities)
-            itself, one = np.arange(some.size)[None], np.zeros(1, np.intp)
-            weights = -t[None, :, None], np.stack([u, s], axis=1)[None]
-            for is_double, weight in enumerate(weights):
-                result += self._layer(bool(is_double), x, elements, some, Unknowns(itself, weight, one))[0]
+        for begin in range(0, every.size, _ELEMENTS):
+            result += self.potential(elements, every[begin : begin + _ELEMENTS], densities)
         return np.stack([result.real, result.imag], axis=1) + 0.5 * displacement[elements]
+
+    def potential(self, nodes: IntArray, elements: IntArray, densities: Densities) -> ComplexArray:
+        """Return T u - U t, complex (n_nodes,), in the middle of some nodes from densities on some elements, ascending.
+
+        On the element of a node T is a principal value.
+        """
+        t, u, s = (each[elements] for each in densities)
+        itself, one = np.arange(elements.size)[None], np.zeros(1, np.intp)
+        weights, x = (-t[None, :, None], np.stack([u, s], axis=1)[None]), self.points[nodes]
+        single, double = (
+            self._layer(is_double, x, nodes, elements, Unknowns(itself, weight, one))[0]
+            for is_double, weight in zip((False, True), weights, strict=True)
+        )
+        return np.asarray(single + double)
 
     def densities(self, traction: FloatArray, displacement: FloatArray) -> Densities:
         """Return complex tractions, constant parts and slopes of displacements, each (n,), from (n, 2) arrays."""

@@ -59,25 +59,7 @@ class GradientReconstruction:
         for loop in mesh.loops:
             neighbours[:, loop] = np.roll(loop, 1), loop, np.roll(loop, -1)
         is_corner = corner_nodes(mesh, CORNER_ANGLE)[mesh.elements].T
-        return cls.between(neighbours, panels.centre[neighbours], panels.half * panels.tangent, is_corner)
-
-    @classmethod
-    def between(
-        cls, neighbours: IntArray, centre: ComplexArray, half: ComplexArray, is_corner: BoolArray
-    ) -> GradientReconstruction:
-        """Return the slopes on some elements.
-
-        Parameters
-        ----------
-        neighbours : (3, n) array
-            The element before, the element itself, and the one after it.
-        centre : (3, n) complex array [m]
-            Of these three.
-        half : (n,) complex array [m]
-            From the centre of the element to its end.
-        is_corner : (2, n) bool array
-            Whether there is a corner where the element starts, and where it ends.
-        """
+        centre, half = panels.centre[neighbours], panels.half * panels.tangent
         counts = np.ones(neighbours.shape, bool)
         counts[0], counts[2] = ~is_corner
         is_smooth = counts.all(axis=0) & (neighbours[0] != neighbours[2])

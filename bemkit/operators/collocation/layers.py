@@ -265,19 +265,3 @@ class _Near:
         """Replace the values of these pairs in an array (n_elements, n_points)."""
         values[self.pairs] = of_pairs
         return values
-
-
-def displaced(
-    layer: Layer,
-    constants: Constants,
-    at: tuple[ComplexArray, IntArray],
-    elements: Elements,
-    densities: tuple[ComplexArray, ComplexArray, ComplexArray],
-) -> ComplexArray:
-    """Return T (u + s t) - U t, complex (n_points,), at points of tractions t, displacements u and slopes s."""
-    t, u, s = densities
-    every, one = np.arange(t.size)[None], np.zeros(1, np.intp)
-    single, double = Unknowns(every, -t[None, :, None], one), Unknowns(every, np.stack([u, s], axis=1)[None], one)
-    total: ComplexArray = layer(constants, False, *at, elements, single)[0]
-    total += layer(constants, True, *at, elements, double)[0]
-    return total

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 
@@ -12,9 +11,9 @@ from bemkit.arrays import BoolArray, FloatArray, IntArray
 
 _PREFERRED = 0.1
 """A condition is solved for a quantity of its own direction as long as the best choice is not ten times better."""
-KNOWN = np.array(list(itertools.combinations(range(4), 2)))
+_KNOWN = np.array(list(itertools.combinations(range(4), 2)))
 """(6, 2): the pairs of (t_1, t_2, u_1, u_2) for which two conditions can be solved."""
-UNKNOWN = np.array([sorted(set(range(4)) - set(pair), key=lambda k: k % 2) for pair in KNOWN.tolist()])
+_UNKNOWN = np.array([sorted(set(range(4)) - set(pair), key=lambda k: k % 2) for pair in _KNOWN.tolist()])
 """(6, 2): the others, those along the first direction before those along the second one."""
 
 
@@ -36,37 +35,9 @@ class ElementLaws:
         return ElementLaws(self.factors[rows], self.given[rows])
 
 
-class SolvedConditions(NamedTuple):
-    """Two quantities of each node that follow from the other two, z: ``coupling @ z + given``.
-
-    Parameters
-    ----------
-    choice : (n,) int8 array
-        Which two follow, a row of `KNOWN`; the others are those of `UNKNOWN`.
-    coupling : (n, 2, 2) array
-    given : (n, 2) array
-    is_determined : (n,) bool array
-        Whether the conditions are two.
-    """
-
-    choice: IntArray
-    coupling: FloatArray
-    given: FloatArray
-    is_determined: BoolArray
-
-    def in_full(self) -> ElementLaws:
-        """Return all four quantities; what the conditions were solved for follows exactly, the others are z."""
-        n = len(self.choice)
-        factors, given, nodes = np.zeros((n, 4, 2)), np.zeros((n, 4)), np.arange(n)[:, None]
-        factors[nodes, KNOWN[self.choice]] = self.coupling
-        factors[nodes, UNKNOWN[self.choice], [0, 1]] = self.is_determined[:, None]
-        given[nodes, KNOWN[self.choice]] = self.given
-        return ElementLaws(factors, given)
-
-
 def solve_for_two(
     on_traction: FloatArray, on_displacement: FloatArray, value: FloatArray, displacement_unit: float
-) -> SolvedConditions:
+) -> tuple[ElementLaws, BoolArray]:
     """Solve two conditions a node for two of its four quantities; the other two remain unknown.
 
     Parameters
@@ -76,26 +47,34 @@ def solve_for_two(
     value : (n, 2) array
     displacement_unit : float [m/Pa]
         Typical displacement per traction, by which the choice compares the two.
+
+    Returns
+    -------
+    laws : ElementLaws
+        What the conditions were solved for follows exactly, the others are z.
+    is_determined : (n,) bool array
+        Whether the conditions are two; the laws of other nodes are zero.
     """
     conditions = np.concatenate([on_traction, on_displacement], axis=2)
     scaled = conditions * np.array([1.0, 1.0, displacement_unit, displacement_unit])
     sizes = np.abs(scaled).max(axis=2, keepdims=True)
     scaled = scaled / np.where(sizes > 0.0, sizes, 1.0)
     determinants = np.stack(
-        [np.abs(scaled[:, 0, i] * scaled[:, 1, j] - scaled[:, 0, j] * scaled[:, 1, i]) for i, j in KNOWN], axis=1
+        [np.abs(scaled[:, 0, i] * scaled[:, 1, j] - scaled[:, 0, j] * scaled[:, 1, i]) for i, j in _KNOWN], axis=1
     )
     best = determinants.max(axis=1)
-    own = np.where(KNOWN[:, 0] % 2 != KNOWN[:, 1] % 2, determinants, 0.0)
+    own = np.where(_KNOWN[:, 0] % 2 != _KNOWN[:, 1] % 2, determinants, 0.0)
     choice = np.where(own.max(axis=1) >= _PREFERRED * best, own.argmax(axis=1), determinants.argmax(axis=1))
     nodes = np.flatnonzero(best > 0.0)
     of_known, of_unknown = (
-        np.take_along_axis(conditions[nodes], pairs[choice[nodes], None, :], axis=2) for pairs in (KNOWN, UNKNOWN)
+        np.take_along_axis(conditions[nodes], pairs[choice[nodes], None, :], axis=2) for pairs in (_KNOWN, _UNKNOWN)
     )
-    inverse = _inverse(of_known)
-    coupling, given = np.zeros((len(value), 2, 2)), np.zeros((len(value), 2))
-    coupling[nodes] = -inverse @ of_unknown
-    given[nodes] = (inverse @ value[nodes, :, None])[:, :, 0]
-    return SolvedConditions(choice.astype(np.int8), coupling, given, best > 0.0)
+    inverse, rows = _inverse(of_known), nodes[:, None]
+    known, unknown = _KNOWN[choice[nodes]], _UNKNOWN[choice[nodes]]
+    factors, given = np.zeros((len(value), 4, 2)), np.zeros((len(value), 4))
+    factors[rows, known], factors[rows, unknown, [0, 1]] = -inverse @ of_unknown, 1.0
+    given[rows, known] = (inverse @ value[nodes, :, None])[:, :, 0]
+    return ElementLaws(factors, given), best > 0.0
 
 
 def _inverse(matrices: FloatArray) -> FloatArray:

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from typing import Protocol
 
 import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray, IntArray
-from bemkit.operators.hierarchy.element_laws import ElementLaws, SolvedConditions, solve_for_two
-from bemkit.operators.hierarchy.factor import Factor
+from bemkit.operators.hierarchy.element_laws import ElementLaws, solve_for_two
+from bemkit.operators.hierarchy.equations import BoundaryEquations
+from bemkit.operators.hierarchy.tree import ClusterTree
 from bemkit.operators.linear.dense import SingularMatrixError
 
 
@@ -48,7 +50,7 @@ class NodeConditions:
         """Return those at some of the elements."""
         return NodeConditions(self.on_traction[elements], self.on_displacement[elements], self.value[elements])
 
-    def solved(self, displacement_unit: float) -> SolvedConditions:
+    def solved(self, displacement_unit: float) -> ElementLaws:
         """Return tractions and displacements under these conditions, in the frames of elements; see `solve_for_two`.
 
         Raises
@@ -56,14 +58,49 @@ class NodeConditions:
         UndeterminedError
             If the two conditions at an element are not independent.
         """
-        solved = solve_for_two(self.on_traction, self.on_displacement, self.value, displacement_unit)
-        if not solved.is_determined.all():
+        laws, is_determined = solve_for_two(self.on_traction, self.on_displacement, self.value, displacement_unit)
+        if not is_determined.all():
             raise UndeterminedError("the two conditions at a contact node are not independent")
-        return solved
+        return laws
 
 
 class UndeterminedError(SingularMatrixError):
     """Two conditions at an element that are only one."""
+
+
+class BodyFactor(Protocol):
+    """Solves boundary equations over a tree under conditions that may change; see `Factor`."""
+
+    @property
+    def tree(self) -> ClusterTree:
+        """Its order numbers everything else."""
+
+    @property
+    def equations(self) -> BoundaryEquations:
+        """The equations."""
+
+    @property
+    def laws(self) -> ElementLaws | None:
+        """The conditions on all elements."""
+
+    @property
+    def n_updates(self) -> int:
+        """How often conditions were taken over."""
+
+    def expect(self, given: Iterable[FloatArray]) -> None:
+        """Announce, before the first `update`, the loads of the laws."""
+
+    def update(self, laws: ElementLaws) -> None:
+        """Take over the conditions on all elements."""
+
+    def unknowns(self, leaves: IntArray) -> FloatArray:
+        """Return the unknowns z (n, 2) of the elements of some leaves."""
+
+    def responses(self, leaf: int, given: FloatArray, leaves: IntArray) -> FloatArray:
+        """Return the unknowns z (n, 2, k) of the elements of some leaves if nothing is given but in one leaf."""
+
+    def errors(self) -> FloatArray:
+        """Return the unknowns (n_border,) of the boundary as a whole."""
 
 
 class HierarchicalSystem:
@@ -71,14 +108,14 @@ class HierarchicalSystem:
 
     Parameters
     ----------
-    factor : Factor
+    factor : BodyFactor
     frame : (n_elements, 2, 2) array
         Rows are the directions of the conditions of each element.
     displacement_unit : float [m/Pa]
         Displacement by traction of a single element.
     """
 
-    def __init__(self, factor: Factor, frame: FloatArray, displacement_unit: float) -> None:
+    def __init__(self, factor: BodyFactor, frame: FloatArray, displacement_unit: float) -> None:
         self.factor, self._tree, self._order, self._unit = factor, factor.tree, factor.tree.order, displacement_unit
         self._place = np.empty_like(self._order)
         self._place[self._order] = np.arange(self._order.size)
@@ -113,7 +150,7 @@ class HierarchicalSystem:
         """
         factors, given = known.factors, known.given
         places = self._place[elements]
-        local = conditions.solved(self._unit).in_full()
+        local = conditions.solved(self._unit)
         if elements.size:
             own = turned(local, self._frame[elements])
             factors, given = factors.copy(), given.copy()
@@ -182,7 +219,7 @@ class HierarchicalSystem:
 
     def laws(self, conditions: NodeConditions) -> ElementLaws:
         """Return what conditions on all elements make of their tractions and displacements, by place, in x and y."""
-        return turned(conditions.solved(self._unit).in_full(), self._frame).take(self._order)
+        return turned(conditions.solved(self._unit), self._frame).take(self._order)
 
     def _places_in(self, leaves: IntArray) -> IntArray:
         return np.concatenate([np.zeros(0, np.intp), *(np.r_[self._tree.places(0, leaf)] for leaf in leaves.tolist())])

@@ -8,28 +8,18 @@ three times the larger radius and the smaller one together; then every power of 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, TypeAlias
+from typing import NamedTuple
 
 import numpy as np
-from scipy.sparse.linalg import LinearOperator
 
 from bemkit.arrays import ComplexArray, FloatArray, IntArray
 from bemkit.geometry.quadrature import gauss_legendre
-from bemkit.operators.collocation.compiled import layer_for
-from bemkit.operators.collocation.equations import Densities, counted
-from bemkit.operators.collocation.layers import displaced
+from bemkit.operators.collocation.equations import CollocationEquations, Densities
 from bemkit.operators.hierarchy.clusters import Clusters, Discs
 from bemkit.operators.hierarchy.tree import ClusterTree
 from bemkit.operators.linear.threads import for_each_chunk
-from bemkit.operators.matrix_free.straight_elements import StraightElements
 from bemkit.operators.somigliana.expansions import Expansions, Sources
 from bemkit.operators.somigliana.source_series import SEPARATION, SourceSeries, order_for
-
-if TYPE_CHECKING:
-    _LinearOperator: TypeAlias = LinearOperator[np.float64]
-else:
-    _LinearOperator = LinearOperator
 
 LEAF_SIZE = 40
 """Elements of a leaf: integrals nearby and series from afar then take about the same time."""
@@ -37,108 +27,71 @@ _CHUNK, _FEW = 128, 8
 """Clusters, or pairs of them, whose series are moved at a time; leaves whose elements are evaluated at a time."""
 
 
-@dataclass(frozen=True, eq=False)
-class _Level:
-    """Discs of a level, and pairs that are far from each other but whose parents are not.
-
-    Parameters
-    ----------
-    discs : Discs
-    target, source : (n_pairs,) arrays
-        Sorted by target.
-    """
+class _Level(NamedTuple):
+    """Discs of a level, and pairs of them, sorted by target, that are far from each other but whose parents are not."""
 
     discs: Discs
     target: IntArray
     source: IntArray
 
 
-@dataclass(frozen=True, eq=False)
-class _Near:
-    """Leaves that are near each leaf, itself among them, ascending.
-
-    Parameters
-    ----------
-    first : (n_leaves + 1,) array
-        Where those of each leaf begin in `source`.
-    source : (n_pairs,) array
-    """
+class _Near(NamedTuple):
+    """Leaves near each leaf, itself among them, ascending: source[first[leaf]] ... source[first[leaf + 1] - 1]."""
 
     first: IntArray
     source: IntArray
 
 
-class FastMultipole(_LinearOperator):
-    """(1/2 + T) u - U t in the middle of all straight elements, from their tractions t and displacements u.
-
-    As a linear operator it is (2 n_elements, 4 n_elements), numbered like `BoundaryEquations.block`, the order
-    of the elements being that of the mesh.
+class FastMultipole:
+    """The equations (1/2 + T) u - U t in the middle of all straight elements.
 
     Parameters
     ----------
-    elements : StraightElements
+    equations : CollocationEquations
+        In the order of the tree, whose elements are all straight.
+    tree : ClusterTree
     tolerance : float
         Of the series, by the largest displacement that comes from afar.
     """
 
-    def __init__(self, elements: StraightElements, tolerance: float) -> None:
-        n, constants = elements.mesh.n_elements, elements.constants
-        LinearOperator.__init__(self, np.dtype(float), (2 * n, 4 * n))  # type: ignore[call-arg]  # the stubs lack it
-        self.elements, self.tree = elements, ClusterTree.of(elements.mesh.centres, LEAF_SIZE)
+    def __init__(self, equations: CollocationEquations, tree: ClusterTree, tolerance: float) -> None:
+        constants = equations.constants
+        self.equations, self.tree = equations, tree
+        self._shear_modulus = 0.5 * constants.double / constants.single
         self._expansions = Expansions(order_for(tolerance), 3.0 - 4.0 * constants.poisson_ratio, constants.log_length)
-        ends = np.stack(elements.ends(self.tree.order))
-        clusters = Clusters.around(self.tree, ends)
+        clusters = Clusters.around(tree, np.stack([equations.start, equations.end]))
         self._levels, self._near = _interactions(clusters)
-        self._sources = SourceSeries(self._expansions, clusters, 0.5 * np.abs(ends[1] - ends[0]))
+        self._sources = SourceSeries(self._expansions, clusters, 0.5 * equations.lengths)
 
-    def _matvec(self, x: FloatArray) -> FloatArray:
-        t, u = (np.ascontiguousarray(each).view(complex)[:, 0] for each in np.hsplit(np.reshape(x, (-1, 4)), 2))
-        mean, slope = self.elements.reconstructed(u)
-        return self.applied(t, mean, slope, u.copy()).view(float)
-
-    def applied(
-        self, traction: ComplexArray, mean: ComplexArray, slope: ComplexArray, displacement: ComplexArray
-    ) -> ComplexArray:
-        """Return (1/2 + T) u - U t, complex (n_elements,).
-
-        Parameters
-        ----------
-        traction, mean, slope : (n_elements,) complex arrays
-            Tractions, constant parts and slopes of the displacements.
-        displacement : (n_elements,) complex array
-            In the middle of the elements; the result is written over it.
-        """
-        densities = traction, mean, slope
-        displacement *= 0.5
-        self._add_from_afar(self._locals(self._series(densities)), displacement)
-        self._add_nearby(densities, displacement)
-        return displacement
+    def product(self, traction: FloatArray, displacement: FloatArray) -> FloatArray:
+        """Return (1/2 + T) u - U t, (n, 2), of tractions and displacements (n, 2) in the order of the tree."""
+        densities = self.equations.densities(traction, displacement)
+        result = 0.5 * (displacement @ np.array([1.0, 1j]))
+        self._add_from_afar(self._locals(self._series(densities)), result)
+        self._add_nearby(densities, result)
+        return np.asarray(result.view(float).reshape(-1, 2))
 
     def _add_nearby(self, densities: Densities, result: ComplexArray) -> None:
         """Add what the elements of the leaves that are not far from each one cause there."""
-        elements, tree, near, first = self.elements, self.tree, self._near.source, self._near.first
-        layer = layer_for(elements.mesh.n_elements)
+        tree, near, first = self.tree, self._near.source, self._near.first
 
         def add_to_leaves(some: slice) -> None:
             for leaf in range(some.start, some.stop):
-                own = tree.order[tree.places(0, leaf)]
+                nodes = np.r_[tree.places(0, leaf)]
                 leaves = near[first[leaf] : first[leaf + 1]].tolist()
-                sources = np.sort(np.concatenate([tree.order[tree.places(0, number)] for number in leaves]))
-                at = elements.centres(own), counted(own, sources)
-                some_densities = densities[0][sources], densities[1][sources], densities[2][sources]
-                result[own] += displaced(layer, elements.constants, at, elements.ends(sources), some_densities)
+                elements = np.concatenate([np.r_[tree.places(0, number)] for number in leaves])
+                result[nodes] += self.equations.potential(nodes, elements, densities)
 
         chunks = [slice(i, min(i + _FEW, tree.n_leaves)) for i in range(0, tree.n_leaves, _FEW)]
         for_each_chunk(add_to_leaves, chunks, n_integrals=near.size * LEAF_SIZE**2)
 
     def _series(self, densities: Densities) -> list[ComplexArray]:
         """Return the series of the sources of all clusters that are far from others, level by level from the leaves."""
-        order, b, mu = self.tree.order, self.elements.constants.double, self._shear_modulus
+        b, mu = self.equations.constants.double, self._shear_modulus
 
-        def sources_of(places: IntArray, n_points: int) -> Sources:
+        def sources_of(elements: IntArray, n_points: int) -> Sources:
             xi, weights = gauss_legendre(n_points)
-            elements = order[places]
-            start, end = (each[:, None] for each in self.elements.ends(elements))
+            start, end = self.equations.start[elements, None], self.equations.end[elements, None]
             t, u, s = (each[elements, None] for each in densities)
             half = 0.5 * (end - start)
             w, density = np.abs(half) * weights, u + s * xi
@@ -148,11 +101,6 @@ class FastMultipole(_LinearOperator):
             return Sources(0.5 * (start + end) + half * xi, f, g, e)
 
         return self._sources.of(sources_of, len(self._levels))
-
-    @property
-    def _shear_modulus(self) -> float:
-        constants = self.elements.constants
-        return 0.5 * constants.double / constants.single
 
     def _locals(self, series: list[ComplexArray]) -> ComplexArray:
         """Return the series in the discs of all leaves of what comes from afar."""
@@ -188,11 +136,11 @@ class FastMultipole(_LinearOperator):
         leaves, bounds, n_leaves = self._levels[0].discs, self.tree.bounds, self.tree.n_leaves
         for begin in range(0, n_leaves, _FEW):
             end = min(begin + _FEW, n_leaves)
-            elements = self.tree.order[bounds[begin] : bounds[end]]
+            nodes = slice(bounds[begin], bounds[end])
             leaf = np.repeat(np.arange(begin, end), np.diff(bounds[begin : end + 1]))
-            arm = self.elements.centres(elements) - leaves.centre[leaf]
+            arm = self.equations.points[nodes] - leaves.centre[leaf]
             displacements = self._expansions.displacements(series[leaf], arm, leaves.radius[leaf])
-            result[elements] += displacements / (2.0 * self._shear_modulus)
+            result[nodes] += displacements / (2.0 * self._shear_modulus)
 
 
 def _interactions(clusters: Clusters) -> tuple[list[_Level], _Near]:

@@ -12,18 +12,19 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bemkit.arrays import BoolArray, FloatArray, IntArray
+from bemkit.arrays import BoolArray, FloatArray
+from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.operators.collocation.equations import CollocationEquations, collocation_border
-from bemkit.operators.hierarchy.system import turned
+from bemkit.operators.hierarchy.element_laws import ElementLaws
 from bemkit.operators.linear.dense import DenseLU
 from bemkit.operators.material import Material
 from bemkit.operators.matrix_free.coarse_equations import ElementGroups
-from bemkit.operators.matrix_free.compact_laws import CompactLaws
-from bemkit.operators.matrix_free.straight_elements import StraightElements
 from bemkit.operators.matrix_free.traction_hierarchy import TractionHierarchy
 
 _CHUNK = 16
 """Groups whose columns are evaluated at a time."""
+_COUPLED = 1e-6
+"""Cosine of the angle between the directions of two unknowns that are not perpendicular."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,85 +36,74 @@ class Preconditioner:
     groups : ElementGroups
     coarse : DenseLU
         Of their equations.
-    frame : (n_elements, 2, 2) array
-        Rows are the directions of the conditions of each element.
-    coupled : (n_coupled,) array
-        Elements on which unknowns do not act along these.
-    turn : (n_coupled, 2, 2) array
-        From these directions to those along which they do.
     is_traction : (n_elements, 2) bool array
-        The unknowns that are tractions.
+        The unknowns that act as tractions, the others as displacements.
+    units : (n_elements, 2) array
+        Those of the unknowns in the iteration.
+    inverse : (n_elements, 2, 2) array
+        From x and y to the directions along which they act.
     tractions : TractionHierarchy
     """
 
     groups: ElementGroups
     coarse: DenseLU
-    frame: FloatArray
-    coupled: IntArray
-    turn: FloatArray
     is_traction: BoolArray
+    units: FloatArray
+    inverse: FloatArray
     tractions: TractionHierarchy
 
     @classmethod
-    def of(cls, elements: StraightElements, material: Material, laws: CompactLaws, frame: FloatArray) -> Preconditioner:
-        """Return the inverse under laws.
-
-        Parameters
-        ----------
-        elements : StraightElements
-        material : Material
-        laws : CompactLaws
-            Given values are ignored.
-        frame : (n_elements, 2, 2) array
-            Rows are the directions of the conditions of each element.
+    def of(
+        cls,
+        mesh: BoundaryMesh,
+        material: Material,
+        equations: CollocationEquations,
+        laws: ElementLaws,
+        traction_unit: float,
+    ) -> Preconditioner:
+        """Return the inverse under conditions, whose given values are ignored.
 
         Raises
         ------
         SingularMatrixError
             If the conditions do not hold the body.
         """
-        mesh = elements.mesh
-        is_traction = laws.is_traction(np.arange(mesh.n_elements))
+        of_traction, of_displacement = laws.factors[:, :2], laws.factors[:, 2:]
+        compliance = (mesh.lengths / material.plane_modulus)[:, None]
+        is_traction = compliance * np.linalg.norm(of_traction, axis=1) > np.linalg.norm(of_displacement, axis=1)
+        along = np.where(is_traction[:, None], of_traction, of_displacement)
+        # unknowns of equal conditions, which also slip in one direction
+        cosine = np.einsum("ni,ni->n", along[:, :, 0], along[:, :, 1])
+        kind = is_traction @ np.array([1, 2]) + 4 * np.sign(np.where(np.abs(cosine) > _COUPLED, cosine, 0.0))
+        groups = ElementGroups.of(mesh, kind.astype(np.intp))
+        coarse = _coarse(groups.mesh, material, equations, laws.factors[groups.middle])
         following = mesh.node_elements[mesh.elements[:, 1], 1]
-        tractions = TractionHierarchy.of(is_traction, following, mesh.lengths, elements.constants)
-        groups = ElementGroups.of(mesh, _kinds(laws))
-        factors = turned(laws.take(groups.middle), frame[groups.middle]).factors
-        coarse = _coarse(groups, material, factors, elements)
-        coupled = laws.take(laws.coupled).factors
-        along = np.where(is_traction[laws.coupled, None], coupled[:, :2], coupled[:, 2:])
-        return cls(groups, coarse, frame, laws.coupled, np.linalg.inv(along), is_traction, tractions)
+        tractions = TractionHierarchy.of(is_traction, following, mesh.lengths, equations.constants)
+        units = np.where(is_traction, traction_unit, 1.0)
+        return cls(groups, coarse, is_traction, units, np.linalg.inv(along), tractions)
+
+    def unknowns(self, x: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return the unknowns of elements (n_elements, 2) and of the border (n_border,) from those of the iteration."""
+        n = self.units.size
+        return self.units * x[:n].reshape(-1, 2), x[n:]
 
     def apply(self, equations: FloatArray, balances: FloatArray) -> FloatArray:
-        """Return unknowns (2 n_elements + n_border,) for what equations (n_elements, 2) and balances leave."""
+        """Return the unknowns of the iteration for residuals (n_elements, 2) and (n_border,)."""
         means = self.groups.mean(equations)
         of_groups = self.coarse.solve(np.concatenate([means.ravel(), balances]))
-        result = np.empty(equations.size + balances.size)
-        result[equations.size :] = of_groups[means.size :]
-        rest = result[: equations.size].reshape(-1, 2)
-        np.einsum("nij,nj->ni", self.frame, equations - means[self.groups.group], out=rest)
-        rest[self.coupled] = np.einsum("nij,nj->ni", self.turn, rest[self.coupled])
-        of_tractions = self.tractions.apply(rest[self.is_traction])
-        rest *= 2.0
-        rest[self.is_traction] = -of_tractions
-        rest += of_groups[: means.size].reshape(-1, 2)[self.groups.group]
-        return result
+        z = np.einsum("nij,nj->ni", self.inverse, equations - means[self.groups.group])
+        of_tractions = self.tractions.apply(z[self.is_traction])
+        z *= 2.0
+        z[self.is_traction] = -of_tractions
+        z += of_groups[: means.size].reshape(-1, 2)[self.groups.group]
+        return np.concatenate([(z / self.units).ravel(), of_groups[means.size :]])
 
 
-def _kinds(laws: CompactLaws) -> IntArray:
-    """Return numbers of equal conditions: which quantities follow from others, and on which side slip acts."""
-    kinds = laws.choice.astype(np.intp)
-    kinds[laws.coupled] += 8 * np.sign(laws.coupling.sum(axis=(1, 2))).astype(np.intp)
-    return kinds
-
-
-def _coarse(groups: ElementGroups, material: Material, factors: FloatArray, elements: StraightElements) -> DenseLU:
-    """Factor the equations of the groups under laws (n_groups, 4, 2)."""
-    n, takes_slopes = len(factors), elements.takes_slopes
-    order = np.arange(n)
-    border = collocation_border(groups.mesh, material, order, takes_slopes=takes_slopes)
-    of_groups = CollocationEquations.of(
-        groups.mesh, material, order, border, takes_slopes=takes_slopes, log_length=elements.constants.log_length
-    )
+def _coarse(mesh: BoundaryMesh, material: Material, fine: CollocationEquations, factors: FloatArray) -> DenseLU:
+    """Factor the equations of groups whose tractions and displacements are factors (n_groups, 4, 2) of unknowns."""
+    order, takes_slopes, length = np.arange(n := len(factors)), fine.acted_on.shape[1] > 1, fine.constants.log_length
+    border = collocation_border(mesh, material, order, takes_slopes=takes_slopes)
+    of_groups = CollocationEquations.of(mesh, material, order, border, takes_slopes=takes_slopes, log_length=length)
     balances = border.balances.reshape(-1, n, 4)
     # by columns: the LU of what is stored by rows is that of the transpose, whose pivots grow on graded groups
     matrix = np.zeros((2 * n + len(balances), 2 * n + len(balances)), order="F")

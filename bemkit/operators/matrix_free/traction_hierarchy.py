@@ -35,7 +35,7 @@ _COARSEST = 10
 
 @dataclass(frozen=True, eq=False)
 class TractionHierarchy:
-    """The inverse for one set of unknown tractions, in single precision, enough for a preconditioner.
+    """The inverse for one set of unknown tractions.
 
     Parameters
     ----------
@@ -56,16 +56,7 @@ class TractionHierarchy:
     def of(
         cls, is_traction: BoolArray, following: IntArray, lengths: FloatArray, constants: Constants
     ) -> TractionHierarchy:
-        """Return the inverse for the unknowns that are tractions.
-
-        Parameters
-        ----------
-        is_traction : (n_elements, 2) bool array
-        following : (n_elements,) array
-            The place of the element after each one.
-        lengths : (n_elements,) array [m]
-        constants : Constants
-        """
+        """Return the inverse for the unknowns (n_elements, 2) that are tractions; `following` is the next element."""
         from pyamg import ruge_stuben_solver
         from scipy.sparse import csr_matrix, diags_array
 
@@ -82,21 +73,21 @@ class TractionHierarchy:
             string = (jumps @ diags_array(1.0 / lengths[place]) @ jumps.T).tocsr()
             string += diags_array(_HOLD * string.diagonal())
             hierarchy = ruge_stuben_solver(csr_matrix(string), max_coarse=_COARSEST, max_levels=40)
-            prolongations = tuple(_smoothed(level.P, level.A).astype(np.float32) for level in hierarchy.levels[:-1])
+            prolongations = tuple(_smoothed(level.P, level.A) for level in hierarchy.levels[:-1])
         kappa = 3.0 - 4.0 * constants.poisson_ratio
         return cls(
             unknowns,
-            jumps.astype(np.float32),
+            jumps,
             prolongations,
             1.0 / (_STRENGTH * np.pi * kappa * constants.single * lengths[place]),
         )
 
     def apply(self, displacement: FloatArray) -> FloatArray:
         """Return the tractions (k,) that cause displacements (k,) along them, as far as these oscillate."""
-        levels = [self.jumps @ displacement.astype(np.float32)]
+        levels = [self.jumps @ displacement]
         for prolongation in self.prolongations:
             levels.append(prolongation.T @ levels[-1])
-        levels[0] *= np.float32(_FINEST)
+        levels[0] *= _FINEST
         total = levels.pop()
         for prolongation in reversed(self.prolongations):
             total = levels.pop() + prolongation @ total

@@ -7,12 +7,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray, IntArray
-from bemkit.errors import InputError
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.operators.collocation.images import collocation_equations
 from bemkit.operators.hierarchy.element_laws import ElementLaws
 from bemkit.operators.hierarchy.factor import Factor
-from bemkit.operators.hierarchy.system import HierarchicalSystem, NodeConditions
+from bemkit.operators.hierarchy.system import BodyFactor, HierarchicalSystem, NodeConditions
 from bemkit.operators.hierarchy.tree import ClusterTree
 from bemkit.operators.linear.dense import SingularMatrixError
 from bemkit.operators.linear.solvers import Hierarchical, MatrixFree
@@ -113,21 +112,24 @@ class HierarchicalCollocation(CollocationElasticity):
         may_be_loaded, may_move : (n_elements,) bool arrays
             Elements whose traction, and whose displacement, may ever differ from zero.
         """
-        if isinstance(self.options, MatrixFree):
-            from bemkit.operators.matrix_free.system import MatrixFreeSystem
+        mesh, factor = self.mesh, self._factor(conditions, may_be_loaded, may_move)
+        unit = mesh.diameter / mesh.n_elements / self.material.plane_modulus
+        return HierarchicalSystem(factor, conditions.frame, unit)
 
-            return MatrixFreeSystem(self.mesh, self.material, conditions.frame, self.options, slopes=self.slopes)
+    def _factor(self, conditions: NodalConditions, may_be_loaded: BoolArray, may_move: BoolArray) -> BodyFactor:
+        if isinstance(self.options, MatrixFree):
+            from bemkit.operators.matrix_free.factor import IterativeFactor
+
+            return IterativeFactor(self.mesh, self.material, self.options, takes_slopes=self.slopes)
         mesh, may_differ = self.mesh, np.repeat(np.stack([may_be_loaded, may_move], axis=1), 2, axis=1)
         tree = ClusterTree.of(mesh.centres, LEAF_SIZE)
-        factor = Factor(
+        return Factor(
             collocation_equations(mesh, self.material, tree.order, takes_slopes=self.slopes),
             tree,
             self.options.tolerance,
             may_differ=may_differ[tree.order],
             may_change=np.any(conditions.is_retained, axis=1)[tree.order],
         )
-        unit = mesh.diameter / mesh.n_elements / self.material.plane_modulus
-        return HierarchicalSystem(factor, conditions.frame, unit)
 
     def condense(self, conditions: NodalConditions, force: FloatArray) -> CondensedMap:
         """Solve for a unit displacement of each retained direction; see `SteklovPoincare.condense`.
@@ -135,15 +137,11 @@ class HierarchicalCollocation(CollocationElasticity):
         Raises
         ------
         InputError
-            If the equations are solved without being stored: every column of the stiffness would be an iteration.
+            If the equations are solved without being stored.
         InexactEquationsError
             If the boundary equations, all integrals in closed form and none compressed, are not fulfilled by a sample
             of the solutions.
         """
-        if isinstance(self.options, MatrixFree):
-            raise InputError(
-                "the linear solver MatrixFree forms no stiffness: condense this body with Hierarchical() or densely"
-            )
         loaded = LoadedSystem.of(self, conditions, force)
         condensed = _EquationsMap.of(loaded, loaded.stiffness())
         residual = loaded.residual(np.cos(np.arange(loaded.retained.size)))
@@ -207,7 +205,7 @@ class LoadedSystem:
         at_rest = np.zeros(motions.shape[2])
         nothing = ElementLaws(np.zeros((0, 4, 2)), np.zeros((0, 4)))
         loaded = cls(map, conditions, system, nothing, may_be_loaded, may_move, force, motions, at_rest).moved(at_rest)
-        if conditions.later and isinstance(map.options, Hierarchical):
+        if conditions.later:
             later = (loaded.under(conditions.in_plane(given.force), given.displacement) for given in conditions.later)
             system.expect(each.known.given for each in (loaded, *later))
         return loaded
