@@ -29,8 +29,8 @@ from rich.table import Table
 import bemkit as bk
 from bemkit.contact.condensation.hierarchical_body import HierarchicalBody
 from bemkit.operators.collocation import compiled
-from bemkit.operators.hierarchy.compression import Compression
 from bemkit.operators.hierarchy.factor import Factor
+from bemkit.operators.hierarchy.skeletons import Compression
 from bemkit.runs.steps import run_on_mesh
 
 REFERENCE = (0.2575701, 0.4676382)

@@ -16,10 +16,9 @@ from bemkit.contact.problem import ContactProblem
 from bemkit.errors import InputError
 from bemkit.model.model import Model, build_model
 from bemkit.model.prepared import prepare
-from bemkit.operators.hierarchy.compression import Compression
-from bemkit.operators.hierarchy.element_laws import ElementLaws
 from bemkit.operators.hierarchy.factor import Factor
-from bemkit.operators.hierarchy.system import HierarchicalSystem
+from bemkit.operators.hierarchy.skeletons import Compression
+from bemkit.operators.hierarchy.system import ElementLaws, HierarchicalSystem
 from bemkit.operators.linear import threads
 from bemkit.operators.linear.solvers import DenseCholesky, Hierarchical
 from bemkit.operators.steklov_poincare.hierarchical import HierarchicalCollocation

@@ -14,6 +14,7 @@ from tests.docs.pages import DOCS, Row, section, table
 ROOT = DOCS.parent
 PAGE = (ROOT / "CONTRIBUTING.md").read_text("utf-8")
 FORMS, PLACES = table(section(PAGE, "The chain")), table(section(PAGE, "Where to put a new ..."))
+RESPONSE = table(section(PAGE, "A response of a compressed body"))
 
 
 def names_in_files(cell: str) -> list[tuple[str, str]]:
@@ -23,7 +24,7 @@ def names_in_files(cell: str) -> list[tuple[str, str]]:
     return [(each, file) for names, file in pairs for each in re.findall(r"\w+", names) if each not in ("and", "or")]
 
 
-@pytest.mark.parametrize("row", [*FORMS, *PLACES], ids=lambda row: row[0])
+@pytest.mark.parametrize("row", [*FORMS, *RESPONSE, *PLACES], ids=lambda row: row[0])
 def test_files_exist_and_hold_what_is_said_to_be_in_them(row: Row) -> None:
     for path in re.findall(r"`(\w+/[\w/.]+)`", " ".join(row)):
         assert (ROOT / path).exists(), path
@@ -37,6 +38,10 @@ def test_files_exist_and_hold_what_is_said_to_be_in_them(row: Row) -> None:
 def test_data_takes_nine_forms_in_this_order() -> None:
     names = "text Scene BoundaryMesh Prepared Plan LinearBody ContactProblem ContactSolution Solution"
     assert [row[0].strip("`") for row in FORMS] == names.split()
+
+
+def test_a_response_of_a_compressed_body_passes_through_seven_files() -> None:
+    assert len(RESPONSE) == 7
 
 
 def test_every_kind_of_addition_has_its_row() -> None:

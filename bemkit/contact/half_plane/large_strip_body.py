@@ -12,8 +12,7 @@ from bemkit.contact.body import SingularResponse
 from bemkit.contact.half_plane.surface_body import SurfaceBody
 from bemkit.contact.reduced_conditions import ReducedConditions, as_pairs
 from bemkit.operators.half_plane.large import LargeHalfPlane
-from bemkit.operators.hierarchy.element_laws import ElementLaws
-from bemkit.operators.hierarchy.system import NodeConditions
+from bemkit.operators.hierarchy.system import ElementLaws, NodeConditions
 from bemkit.operators.linear.dense import SingularMatrixError
 
 _SAMPLED = 24

@@ -13,10 +13,9 @@ import numpy as np
 
 from bemkit.arrays import ComplexArray, FloatArray, IntArray
 from bemkit.operators.half_plane.flexibility import logarithms_between
-from bemkit.operators.hierarchy.compression import Compression
 from bemkit.operators.hierarchy.equations import Border
 from bemkit.operators.hierarchy.interpolative import Block, Interpolation, sketched
-from bemkit.operators.hierarchy.skeletons import LevelView, Skeleton
+from bemkit.operators.hierarchy.skeletons import Compression, LevelView, Skeleton
 from bemkit.operators.material import Material
 
 

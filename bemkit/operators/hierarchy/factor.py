@@ -19,11 +19,10 @@ from functools import partial
 import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray, IntArray
-from bemkit.operators.hierarchy.compression import Compression
-from bemkit.operators.hierarchy.element_laws import ElementLaws
 from bemkit.operators.hierarchy.equations import BoundaryEquations
 from bemkit.operators.hierarchy.known_loads import KnownLoads
-from bemkit.operators.hierarchy.skeletons import LevelView, Skeleton
+from bemkit.operators.hierarchy.skeletons import Compression, LevelView, Skeleton
+from bemkit.operators.hierarchy.system import ElementLaws
 from bemkit.operators.hierarchy.tree import ClusterTree
 from bemkit.operators.linear.dense import SingularMatrixError, SmallLU
 from bemkit.operators.linear.threads import for_each_chunk

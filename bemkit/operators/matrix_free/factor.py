@@ -10,7 +10,7 @@ from bemkit.arrays import FloatArray, IntArray
 from bemkit.errors import InputError, NoResultError
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.operators.collocation.equations import CollocationEquations, collocation_border
-from bemkit.operators.hierarchy.element_laws import ElementLaws
+from bemkit.operators.hierarchy.system import ElementLaws
 from bemkit.operators.hierarchy.tree import ClusterTree
 from bemkit.operators.linear.solvers import MatrixFree
 from bemkit.operators.material import Material

@@ -15,8 +15,7 @@ import numpy as np
 from bemkit.arrays import ComplexArray, FloatArray, IntArray
 from bemkit.geometry.quadrature import gauss_legendre
 from bemkit.operators.collocation.equations import CollocationEquations, Densities
-from bemkit.operators.hierarchy.clusters import Clusters, Discs
-from bemkit.operators.hierarchy.tree import ClusterTree
+from bemkit.operators.hierarchy.tree import Clusters, ClusterTree, Discs
 from bemkit.operators.linear.threads import for_each_chunk
 from bemkit.operators.somigliana.expansions import Expansions, Sources
 from bemkit.operators.somigliana.source_series import SEPARATION, SourceSeries, order_for

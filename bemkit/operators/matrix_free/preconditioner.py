@@ -15,7 +15,7 @@ import numpy as np
 from bemkit.arrays import BoolArray, FloatArray
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.operators.collocation.equations import CollocationEquations, collocation_border
-from bemkit.operators.hierarchy.element_laws import ElementLaws
+from bemkit.operators.hierarchy.system import ElementLaws
 from bemkit.operators.linear.dense import DenseLU
 from bemkit.operators.material import Material
 from bemkit.operators.matrix_free.coarse_equations import ElementGroups

@@ -15,7 +15,7 @@ import numpy as np
 
 from bemkit.arrays import BoolArray, ComplexArray, IntArray
 from bemkit.geometry.quadrature import gauss_legendre
-from bemkit.operators.hierarchy.clusters import Clusters, Pairs
+from bemkit.operators.hierarchy.tree import Clusters, Pairs
 from bemkit.operators.integrals.panels import Panels
 from bemkit.operators.kernels import legendre_values
 from bemkit.operators.material import Material

@@ -26,7 +26,7 @@ from bemkit.geometry.errors import GeometryError
 from bemkit.geometry.local_values import values_on_elements
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.spaces import BoundarySpace, local_coefficients
-from bemkit.operators.hierarchy.clusters import Pairs
+from bemkit.operators.hierarchy.tree import Pairs
 from bemkit.operators.integrals.panels import Panels
 from bemkit.operators.kernels import legendre_of_monomials, legendre_values
 from bemkit.operators.linear.threads import for_each_chunk

@@ -10,8 +10,7 @@ from bemkit.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from bemkit.geometry.errors import GeometryError
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.pieces import RESOLUTION
-from bemkit.operators.hierarchy.clusters import Clusters, consecutive
-from bemkit.operators.hierarchy.tree import ClusterTree
+from bemkit.operators.hierarchy.tree import Clusters, ClusterTree, consecutive
 from bemkit.operators.somigliana.moments import ArcQuadrature
 
 LEAF_SIZE = 20

@@ -10,7 +10,7 @@ from typing import TypeAlias
 import numpy as np
 
 from bemkit.arrays import ComplexArray, FloatArray, IntArray
-from bemkit.operators.hierarchy.clusters import Clusters
+from bemkit.operators.hierarchy.tree import Clusters
 from bemkit.operators.linear.threads import for_each_chunk
 from bemkit.operators.somigliana.expansions import Expansions, Sources
 

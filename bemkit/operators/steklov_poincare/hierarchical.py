@@ -9,9 +9,8 @@ import numpy as np
 from bemkit.arrays import BoolArray, FloatArray, IntArray
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.operators.collocation.images import collocation_equations
-from bemkit.operators.hierarchy.element_laws import ElementLaws
 from bemkit.operators.hierarchy.factor import Factor
-from bemkit.operators.hierarchy.system import BodyFactor, HierarchicalSystem, NodeConditions
+from bemkit.operators.hierarchy.system import BodyFactor, ElementLaws, HierarchicalSystem, NodeConditions
 from bemkit.operators.hierarchy.tree import ClusterTree
 from bemkit.operators.linear.dense import SingularMatrixError
 from bemkit.operators.linear.solvers import Hierarchical, MatrixFree

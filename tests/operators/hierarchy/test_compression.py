@@ -7,10 +7,8 @@ import pytest
 
 from bemkit.geometry import BoundaryMesh, Polygon, Rectangle, discretise
 from bemkit.operators.collocation.images import collocation_equations
-from bemkit.operators.hierarchy.clusters import Discs
-from bemkit.operators.hierarchy.compression import Compression
-from bemkit.operators.hierarchy.proxies import PROXY_RATIO, n_proxies, near_clusters, proxy_points
-from bemkit.operators.hierarchy.tree import ClusterTree
+from bemkit.operators.hierarchy.skeletons import PROXY_RATIO, Compression, n_proxies, near_clusters, proxy_points
+from bemkit.operators.hierarchy.tree import ClusterTree, Discs
 from bemkit.operators.material import Material
 from tests.slow import slow_except
 

@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bemkit.contact.conditions import augmented, separated, slip, stick
-from bemkit.operators.hierarchy.element_laws import solve_for_two
+from bemkit.operators.hierarchy.system import solve_for_two
 
 
 @given(seed=st.integers(0, 10_000), unit=st.sampled_from([1e-6, 1.0, 1e3]))

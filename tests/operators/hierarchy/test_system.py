@@ -10,9 +10,8 @@ import pytest
 from bemkit.arrays import BoolArray, FloatArray
 from bemkit.geometry import BoundaryMesh, ExteriorOf, PlateWithHole, Polygon, Rectangle, discretise
 from bemkit.operators.collocation.images import collocation_equations
-from bemkit.operators.hierarchy.element_laws import ElementLaws
 from bemkit.operators.hierarchy.factor import Factor, SingularClusterError
-from bemkit.operators.hierarchy.system import HierarchicalSystem, NodeConditions, UndeterminedError
+from bemkit.operators.hierarchy.system import ElementLaws, HierarchicalSystem, NodeConditions, UndeterminedError
 from bemkit.operators.hierarchy.tree import ClusterTree
 from bemkit.operators.linear.dense import SingularMatrixError
 from bemkit.operators.material import Material
