@@ -222,14 +222,6 @@ class Arcs:
         z, dz = _plane(mesh.points(elements, xi)), _plane(mesh.derivatives(elements, xi)) * weights
         return cls(_plane(mesh.start), _plane(mesh.end), z, z - _plane(mesh.centres)[:, None], dz)
 
-    @classmethod
-    def straight(cls, start: ComplexArray, end: ComplexArray) -> Arcs:
-        """Return straight elements from their ends."""
-        xi, weights = gauss_legendre(_POINTS)
-        half = 0.5 * (end - start)[:, None]
-        arm = half * xi
-        return cls(start, end, (start + 0.5 * (end - start))[:, None] + arm, arm, half * weights)
-
 
 def _plane(vectors: FloatArray) -> ComplexArray:
     result: ComplexArray = vectors @ np.array([1.0, 1j])
