@@ -70,7 +70,7 @@ def product_seconds(n_elements: int) -> float:
     tree = ClusterTree.of(mesh.centres, LEAF_SIZE)
     equations = collocation_equations(mesh, scene.material, tree.order, takes_slopes=bk.ConstantCollocation().slopes)
     assert isinstance(equations, CollocationEquations)
-    layers = FastMultipole(equations, tree, 1e-13)  # what a tolerance of 1e-10 of the iteration takes
+    layers = FastMultipole(equations, scene.material, tree, 1e-13)  # what a tolerance of 1e-10 of the iteration takes
     state, seconds = np.random.default_rng(0).standard_normal((2, n_elements, 2)), []
     for _ in range(6):
         clock = time.process_time()

@@ -69,7 +69,7 @@ class IterativeFactor:
         every = np.arange(mesh.n_elements)
         border = collocation_border(self._mesh, material, every, takes_slopes=takes_slopes)
         self.equations = CollocationEquations.of(self._mesh, material, every, border, takes_slopes=takes_slopes)
-        self._layers = FastMultipole(self.equations, self.tree, max(_PRODUCTS * options.tolerance, _FINEST))
+        self._layers = FastMultipole(self.equations, material, self.tree, max(_PRODUCTS * options.tolerance, _FINEST))
         self._traction_unit = material.plane_modulus / mesh.diameter
         self._z, self._c = np.zeros((mesh.n_elements, 2)), np.zeros(len(border.own))
         self.laws: ElementLaws | None = None

@@ -17,7 +17,8 @@ from bemkit.geometry.quadrature import gauss_legendre
 from bemkit.operators.collocation.equations import CollocationEquations, Densities
 from bemkit.operators.hierarchy.tree import Clusters, ClusterTree, Discs
 from bemkit.operators.linear.threads import for_each_chunk
-from bemkit.operators.somigliana.expansions import Expansions, Sources
+from bemkit.operators.material import Material
+from bemkit.operators.somigliana.expansions import Expansions, Sources, layer_sources
 from bemkit.operators.somigliana.source_series import SEPARATION, SourceSeries, order_for
 
 LEAF_SIZE = 40
@@ -48,16 +49,17 @@ class FastMultipole:
     ----------
     equations : CollocationEquations
         In the order of the tree, whose elements are all straight.
+    material : Material
     tree : ClusterTree
     tolerance : float
         Of the series, by the largest displacement that comes from afar.
     """
 
-    def __init__(self, equations: CollocationEquations, tree: ClusterTree, tolerance: float) -> None:
-        constants = equations.constants
-        self.equations, self.tree = equations, tree
-        self._shear_modulus = 0.5 * constants.double / constants.single
-        self._expansions = Expansions(order_for(tolerance), 3.0 - 4.0 * constants.poisson_ratio, constants.log_length)
+    def __init__(
+        self, equations: CollocationEquations, material: Material, tree: ClusterTree, tolerance: float
+    ) -> None:
+        self.equations, self.tree, self._material = equations, tree, material
+        self._expansions = Expansions(order_for(tolerance), material.kappa, equations.constants.log_length)
         clusters = Clusters.around(tree, np.stack([equations.start, equations.end]))
         self._levels, self._near = _interactions(clusters)
         self._sources = SourceSeries(self._expansions, clusters, 0.5 * equations.lengths)
@@ -86,18 +88,16 @@ class FastMultipole:
 
     def _series(self, densities: Densities) -> list[ComplexArray]:
         """Return the series of the sources of all clusters that are far from others, level by level from the leaves."""
-        b, mu = self.equations.constants.double, self._shear_modulus
+        equations, material = self.equations, self._material
 
         def sources_of(elements: IntArray, n_points: int) -> Sources:
             xi, weights = gauss_legendre(n_points)
-            start, end = self.equations.start[elements, None], self.equations.end[elements, None]
+            half = 0.5 * (equations.end - equations.start)[elements, None]
             t, u, s = (each[elements, None] for each in densities)
-            half = 0.5 * (end - start)
-            w, density = np.abs(half) * weights, u + s * xi
-            normal = -1j * half / np.abs(half)
-            f = (0.5 * b) * w * t  # of -t: the single layer is subtracted
-            g, e = (b * mu * w) * normal * density, (-2.0 * b * mu * w) * (normal.conj() * density).real
-            return Sources(0.5 * (start + end) + half * xi, f, g, e)
+            # the double layer less the single layer
+            return layer_sources(
+                equations.points[elements, None] + half * xi, half * weights, -t, -u - s * xi, material
+            )
 
         return self._sources.of(sources_of, len(self._levels))
 
@@ -139,7 +139,7 @@ class FastMultipole:
             leaf = np.repeat(np.arange(begin, end), np.diff(bounds[begin : end + 1]))
             arm = self.equations.points[nodes] - leaves.centre[leaf]
             displacements = self._expansions.displacements(series[leaf], arm, leaves.radius[leaf])
-            result[nodes] += displacements / (2.0 * self._shear_modulus)
+            result[nodes] += displacements / (2.0 * self._material.shear_modulus)
 
 
 def _interactions(clusters: Clusters) -> tuple[list[_Level], _Near]:

@@ -26,6 +26,7 @@ import numpy as np
 from scipy.special import comb
 
 from bemkit.arrays import ComplexArray, FloatArray, IntArray
+from bemkit.operators.material import Material
 
 Numbers = TypeVar("Numbers", FloatArray, ComplexArray)
 
@@ -37,6 +38,25 @@ class Sources(NamedTuple):
     f: ComplexArray
     g: ComplexArray
     e: FloatArray
+
+
+def layer_sources(
+    y: ComplexArray, dy: ComplexArray, traction: ComplexArray, displacement: ComplexArray, material: Material
+) -> Sources:
+    """Return the sources of the single layer of tractions less the double layer of displacements.
+
+    Parameters
+    ----------
+    y, dy : complex arrays of one shape [m]
+        Gauss points on the boundary and the weighted steps along it.
+    traction, displacement : complex arrays of the same shape [Pa], [m]
+    material : Material
+    """
+    b = 1.0 / (np.pi * (material.kappa + 1.0))
+    double = (b * material.shear_modulus) * dy
+    return Sources(
+        y, (-0.5 * b) * np.abs(dy) * traction, 1j * double * displacement, -2.0 * (double.conj() * displacement).imag
+    )
 
 
 @dataclass(frozen=True)

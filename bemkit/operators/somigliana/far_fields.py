@@ -19,7 +19,7 @@ from bemkit.operators.hierarchy.tree import Clusters, Pairs
 from bemkit.operators.integrals.panels import Panels
 from bemkit.operators.kernels import legendre_values
 from bemkit.operators.material import Material
-from bemkit.operators.somigliana.expansions import Expansions, Sources
+from bemkit.operators.somigliana.expansions import Expansions, Sources, layer_sources
 from bemkit.operators.somigliana.moments import N_POINTS, ArcQuadrature
 from bemkit.operators.somigliana.source_series import SEPARATION, SourceSeries
 
@@ -55,7 +55,7 @@ class FarFields:
     ) -> None:
         self._panels, self._curved, self._clusters = panels, curved, clusters
         self._expansions = Expansions(ORDER, material.kappa, length)
-        self._two_mu = 2.0 * material.shear_modulus
+        self._material = material
         series = SourceSeries(self._expansions, clusters, panels.half[clusters.tree.order])
         none, one = np.zeros((traction.shape[0], 1), complex), np.ones((traction.shape[0], 1), complex)
         of_data = (
@@ -75,10 +75,8 @@ class FarFields:
 
     def displacements(self, x: ComplexArray, reference: ComplexArray, far: list[Pairs]) -> ComplexArray:
         """Return the displacements (1, n_points) of what is far, less that of constant displacements `reference`."""
-        expansions = self._expansions
-        return self._summed(
-            x, reference, far, 1, lambda *disc: expansions.outer_displacements(*disc)[None] / self._two_mu
-        )
+        expansions, two_mu = self._expansions, 2.0 * self._material.shear_modulus
+        return self._summed(x, reference, far, 1, lambda *disc: expansions.outer_displacements(*disc)[None] / two_mu)
 
     def gradients(self, x: ComplexArray, reference: ComplexArray, far: list[Pairs]) -> ComplexArray:
         """Return Phi and D (2, n_points); otherwise as `displacements`."""
@@ -114,11 +112,4 @@ class FarFields:
             each[elements] @ legendre_values(each.shape[1] - 1, xi).reshape(each.shape[1], -1)
             for each in (displacement, traction)
         )
-        factor = 1.0 / (np.pi * (self._expansions.kappa + 1.0))
-        double = 0.5 * self._two_mu * factor * weights
-        return Sources(
-            place,
-            (-0.5 * factor * weights) * np.abs(slope) * p,
-            1j * double * slope * v,
-            2.0 * double * (1j * slope.conj() * v).real,
-        )
+        return layer_sources(place, slope * weights, p, v, self._material)

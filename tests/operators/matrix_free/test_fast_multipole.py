@@ -20,9 +20,10 @@ def multipole_of(
     mesh: BoundaryMesh, *, tolerance: float = TINY, takes_slopes: bool = True, poisson_ratio: float = 0.3
 ) -> FastMultipole:
     tree = ClusterTree.of(mesh.centres, LEAF_SIZE)
-    equations = collocation_equations(mesh, Material(2.0, poisson_ratio), tree.order, takes_slopes=takes_slopes)
+    material = Material(2.0, poisson_ratio)
+    equations = collocation_equations(mesh, material, tree.order, takes_slopes=takes_slopes)
     assert isinstance(equations, CollocationEquations)
-    return FastMultipole(equations, tree, tolerance)
+    return FastMultipole(equations, material, tree, tolerance)
 
 
 def error_of(operator: FastMultipole) -> float:
