@@ -27,7 +27,7 @@ from scipy.linalg.lapack import dgetrf
 from threadpoolctl import threadpool_limits
 
 import bemkit as bk
-from bemkit.reference import Reference, answer_of, errors_of, find_reference
+from bemkit.reference import Reference, errors_of, find_reference, sampled_fields
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
 from tests.scenes import paper
@@ -109,7 +109,7 @@ def reference_of(example: int) -> Reference:
 def measured_errors(solution: bk.Solution, example: int) -> dict[str, float]:
     """Return all errors of a solution by bemkit that a target may name."""
     reference = reference_of(example)
-    return errors_of(answer_of(solution, reference.places), reference)
+    return errors_of(sampled_fields(solution, reference.places), reference)
 
 
 def time_once(work: Callable[[], object], clock: Clock = time.perf_counter) -> float:

@@ -40,7 +40,7 @@ import bemkit as bk
 from bemkit.geometry.meshing.division import divide
 from bemkit.geometry.meshing.layers import FACTOR, refined_partition
 from bemkit.geometry.meshing.partition import Partition
-from bemkit.reference import Answer, Zone, errors_of
+from bemkit.reference import SampledFields, ZoneEnd, errors_of
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
 from benchmarks.accuracy import TARGETS, Choice, Clock, Target, degree_of, measured_errors, reference_of
@@ -125,12 +125,12 @@ def finite_elements(
     seconds = clock() - begin
     table, x = solution.contact, reference.places[0].s
     fields = {name: solution.line.evaluated(getattr(table, name), x) for name in FIELDS}
-    answer = Answer(
+    answer = SampledFields(
         **fields,
         energy=solution.energy,
         force_normal=float(table.weight @ table.sigma_n),
         force_tangential=solution.force_tangential,
-        zones=tuple(Zone(t.part, t.s, t.from_status, t.to_status) for t in solution.transitions),
+        zones=tuple(ZoneEnd(t.part, t.s, t.from_status, t.to_status) for t in solution.transitions),
     )
     return Outcome(errors_of(answer, reference) | (NOT_FOUND if is_told else {}), seconds)
 
@@ -150,7 +150,9 @@ def getfem(example: int, x: Line, y: Line, clock: Clock) -> Outcome:
     answered = subprocess.run(command, input=json.dumps(request), capture_output=True, text=True, check=True)
     found = json.loads(answered.stdout.splitlines()[-1])
     fields = {name: np.array(found[name]) for name in FIELDS}
-    answer = Answer(**fields, energy=found["energy"], force_normal=np.nan, force_tangential=found["force"], zones=())
+    answer = SampledFields(
+        **fields, energy=found["energy"], force_normal=np.nan, force_tangential=found["force"], zones=()
+    )
     return Outcome(errors_of(answer, reference), found["seconds"])
 
 

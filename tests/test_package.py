@@ -23,7 +23,7 @@ NOT_NEEDED = (
     *("operators.particular_solutions", "model.particular", "model.free_motion", "model.contact_free_body"),
     *("geometry.drawn", "geometry.nurbs", "geometry.files", "geometry.arclength"),
     *("geometry.reflection", "geometry.meshing.partition", "geometry.meshing.layers"),
-    *("model.joined", "contact.joined", "scene.places", "scene.symmetry"),
+    *("model.joined", "contact.joined", "scene.keys", "scene.symmetry"),
     *("results.between_bodies", "results.contact_places", "results.zone_ends"),
     *("runs.warm_start", "solvers.homotopy", "solvers.multistart", "contact.further_laws", "contact.polygon"),
     "contact.rough_profile",

@@ -42,7 +42,7 @@ def collapse(
         raise click.UsageError("--plot draws the line of thrust: add --thrust CONTACT")
     with shown_progress(quiet=False), concerning(scene):
         from bemkit.runs.collapse import coulomb_load_factor, thrust
-        from bemkit.scene.places import with_settings
+        from bemkit.scene.keys import with_settings
         from bemkit.scene.toml import load_scene
 
         chosen = with_settings(load_scene(scene), settings)

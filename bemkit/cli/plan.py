@@ -36,7 +36,7 @@ def plan(
 ) -> None:
     """List what SCENE needs, what is skipped and why, without solving it."""
     with shown_progress(json_file is not None):
-        from bemkit.scene.places import with_settings
+        from bemkit.scene.keys import with_settings
         from bemkit.scene.toml import load_scene, with_overrides
 
         text = TextFile(json_file, _as_json)

@@ -17,7 +17,7 @@ _STYLES = {"right": "green", "coarse": "yellow", "ambiguous": "yellow", "named":
 def print_axis(axis: Axis, records: Sequence[StabilityRecord]) -> None:
     """Print the table of one axis, and the reasons of records that are not right."""
     console = stdout_console()
-    heads = ("value", "verdict", "solves", "cert.", "check", "Betti", "cond.", "drift", "twin", "s")
+    heads = ("value", "verdict", "solves", "cert.", "check", "Betti", "cond.", "dev.", "copy", "s")
     table = plain_table(right=heads)
     table.columns[1].justify = "left"
     for record in records:

@@ -65,7 +65,7 @@ def run(
     """Solve SCENE, a TOML file or the name of a shipped scene."""
     with ExitStack() as stack:
         callback = stack.enter_context(shown_progress(quiet))  # shown before anything is loaded
-        from bemkit.scene.places import with_settings
+        from bemkit.scene.keys import with_settings
         from bemkit.scene.toml import load_scene, with_overrides
 
         outputs = outputs_of(json_file, csv_file, folder, what=what)

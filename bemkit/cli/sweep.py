@@ -68,7 +68,7 @@ def sweep(
     if folder is None and (over is not None or show):
         raise click.UsageError("--over and --show go with figures: add --plot DIR")
     with StudyProgress(quiet) as progress:
-        from bemkit.scene.places import with_settings
+        from bemkit.scene.keys import with_settings
         from bemkit.scene.toml import load_scene, with_overrides
         from bemkit.studies.sweep.grid import read_variations
         from bemkit.studies.sweep.records import FILE

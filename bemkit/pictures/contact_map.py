@@ -14,7 +14,7 @@ from bemkit.pictures.drawing import VERMILION, Axes, legend_below
 from bemkit.pictures.magnification import magnification
 from bemkit.pictures.obstacles import draw_obstacles, draw_rigid_bodies
 from bemkit.pictures.plane import draw_arrows, draw_bodies, draw_initial, joined_frame, plane_axes, set_frame
-from bemkit.pictures.shown import Result, Shown, shown
+from bemkit.pictures.shown import DrawnScene, Result, shown
 from bemkit.results.contact_table import ContactTable
 from bemkit.scene.unit_names import UnitNames, amount
 
@@ -65,7 +65,7 @@ def draw_contact_map(solution: Result, axes: Axes | None = None, *, units: UnitN
     return axes
 
 
-def _longest_tooth(scene: Shown) -> float:
+def _longest_tooth(scene: DrawnScene) -> float:
     smallest = min((body.mesh.diameter for body in scene.bodies if not body.mesh.is_exterior), default=np.inf)
     return float(np.clip(_SHARE * smallest, _SHORTEST * scene.size, _TOOTH * scene.size))
 

@@ -10,7 +10,7 @@ from scipy.spatial import KDTree
 from bemkit.arrays import BoolArray, FloatArray
 from bemkit.contact.condensation.nodes import contact_frame
 from bemkit.geometry.spaces import dof_points
-from bemkit.pictures.shown import Result, Shown
+from bemkit.pictures.shown import DrawnScene, Result
 from bemkit.results.contact_table import ContactTable
 from bemkit.solvers.active_sets import NodeStatus
 
@@ -23,7 +23,7 @@ class Nodes(NamedTuple):
     tractions: FloatArray
 
 
-def contact_nodes(solution: Result, shown: Shown, factor: float) -> Nodes:
+def contact_nodes(solution: Result, shown: DrawnScene, factor: float) -> Nodes:
     """Return the contact nodes of a result, drawn with displacements times a factor."""
     table = solution.contact
     points = node_points(table)

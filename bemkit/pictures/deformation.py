@@ -9,7 +9,7 @@ from bemkit.pictures.loads import draw_loads
 from bemkit.pictures.magnification import magnification
 from bemkit.pictures.obstacles import draw_obstacles, draw_rigid_bodies, relief_frame
 from bemkit.pictures.plane import draw_bodies, draw_initial, draw_symmetry_lines, joined_frame, plane_axes, set_frame
-from bemkit.pictures.shown import Drawable, Result, Shown, shown
+from bemkit.pictures.shown import Drawable, DrawnScene, Result, shown
 from bemkit.pictures.supports import draw_supports
 from bemkit.scene.unit_names import UnitNames
 
@@ -52,7 +52,7 @@ def draw_scene(scene: Drawable, axes: Axes | None = None, *, units: UnitNames | 
     return axes
 
 
-def _complete(axes: Axes, scene: Shown, factor: float, loops: list[np.ndarray]) -> None:
+def _complete(axes: Axes, scene: DrawnScene, factor: float, loops: list[np.ndarray]) -> None:
     """Draw what is around bodies whose outlines are drawn, and choose the frame."""
     for body in scene.bodies[:1]:
         draw_symmetry_lines(axes, body.scene.symmetry)

@@ -6,8 +6,8 @@ import numpy as np
 
 from bemkit.arrays import FloatArray
 from bemkit.pictures.drawing import VERMILION, Axes
-from bemkit.pictures.plane import Stations, draw_arrows, stations
-from bemkit.pictures.shown import Shown, ShownBody
+from bemkit.pictures.plane import BoundaryPoints, draw_arrows, evenly_spaced
+from bemkit.pictures.shown import DrawnBody, DrawnScene
 from bemkit.scene.body_forces import Gravity
 from bemkit.scene.conditions import Load
 
@@ -19,7 +19,7 @@ _MANY = 12
 """Bodies from which on the weight is drawn once for all."""
 
 
-def draw_loads(axes: Axes, shown: Shown, factor: float) -> FloatArray:
+def draw_loads(axes: Axes, shown: DrawnScene, factor: float) -> FloatArray:
     """Draw what acts on the bodies where they are drawn, moved by a factor times their displacements.
 
     Returns
@@ -27,11 +27,11 @@ def draw_loads(axes: Axes, shown: Shown, factor: float) -> FloatArray:
     (n, 2) array [m]
         The ends of the arrows, which the frame should hold.
     """
-    loaded: list[tuple[Stations, FloatArray]] = []
+    loaded: list[tuple[BoundaryPoints, FloatArray]] = []
     for body in shown.bodies:
         for part, elements in body.parts:
             if isinstance(part.condition, Load):
-                places = stations(body, elements, _SPACING * shown.size, factor)
+                places = evenly_spaced(body, elements, _SPACING * shown.size, factor)
                 loaded.append((places, part.condition.at(places.points, places.normals)))
     largest = max((float(np.hypot(*load.T).max()) for _, load in loaded), default=0.0)
     ends = [np.zeros((0, 2))]
@@ -44,7 +44,7 @@ def draw_loads(axes: Axes, shown: Shown, factor: float) -> FloatArray:
 
 
 def _draw_load(
-    axes: Axes, places: Stations, arrows: FloatArray, least: float, size: float, label: str | None
+    axes: Axes, places: BoundaryPoints, arrows: FloatArray, least: float, size: float, label: str | None
 ) -> FloatArray:
     """Draw arrows whose heads are on the boundary where they press, their tails where they pull; return their ends."""
     seen = np.hypot(*arrows.T) > least * _LONGEST * size
@@ -55,7 +55,7 @@ def _draw_load(
     return np.concatenate([tails, tails + arrows])
 
 
-def _draw_weights(axes: Axes, shown: Shown, factor: float) -> FloatArray:
+def _draw_weights(axes: Axes, shown: DrawnScene, factor: float) -> FloatArray:
     """Draw the direction of gravity in the middle of each body, or beside many bodies once."""
     heavy = [
         (body, force)
@@ -78,13 +78,13 @@ def _draw_weights(axes: Axes, shown: Shown, factor: float) -> FloatArray:
     return np.concatenate([tails, tails + arrows])
 
 
-def _middle(body: ShownBody, factor: float) -> FloatArray:
+def _middle(body: DrawnBody, factor: float) -> FloatArray:
     """Return the middle of the bounding box of a body as it is drawn."""
     loop = body.outlines(factor)[0]
     return np.asarray(0.5 * (loop.min(axis=0) + loop.max(axis=0)))
 
 
-def _draw_forces(axes: Axes, shown: Shown, factor: float) -> FloatArray:
+def _draw_forces(axes: Axes, shown: DrawnScene, factor: float) -> FloatArray:
     """Draw the forces on rigid bodies at their centres."""
     driven = [
         (np.array(body.centre) + factor * np.array([result.x, result.y]), force)

@@ -10,7 +10,7 @@ import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray
 from bemkit.contact.obstacle import DirectedObstacle, Gap
-from bemkit.pictures.shown import Shown, ShownBody
+from bemkit.pictures.shown import DrawnBody, DrawnScene
 from bemkit.results.contact_table import ContactTable
 from bemkit.scene.conditions import Contact
 from bemkit.solvers.active_sets import NodeStatus
@@ -21,12 +21,12 @@ LINE = 0.003
 """Thickness of a line, in sizes of the picture."""
 
 
-def magnification(shown: Shown, size: float | None = None) -> float:
+def magnification(shown: DrawnScene, size: float | None = None) -> float:
     """Choose the factor by which displacements are drawn.
 
     Parameters
     ----------
-    shown : Shown
+    shown : DrawnScene
     size : float, optional [m]
         Of the picture; that of all bodies by default.
 
@@ -70,12 +70,12 @@ def _rounded(wanted: float) -> float:
     return power * max(step for step in (1.0, 2.0, 5.0) if step * power <= wanted or step == 1.0)
 
 
-def _sinks(shown: Shown, factor: float, tolerance: float) -> bool:
+def _sinks(shown: DrawnScene, factor: float, tolerance: float) -> bool:
     depths = (float(depth.max(initial=-np.inf)) for depth in drawn_depths(shown, factor))
     return any(depth > tolerance for depth in depths) or drawn_overlap(shown, factor) > tolerance
 
 
-def drawn_depths(shown: Shown, factor: float) -> Iterator[FloatArray]:
+def drawn_depths(shown: DrawnScene, factor: float) -> Iterator[FloatArray]:
     """Yield how deep [m] each contact part is drawn inside a rigid obstacle that knows its distance, at its corners."""
     xi = np.array([-1.0, 0.0])
     for body in shown.bodies:
@@ -89,14 +89,14 @@ def drawn_depths(shown: Shown, factor: float) -> Iterator[FloatArray]:
                 yield -condition.obstacle.gap(points.reshape(-1, 2), normals.reshape(-1, 2))
 
 
-def drawn_overlap(shown: Shown, factor: float) -> float:
+def drawn_overlap(shown: DrawnScene, factor: float) -> float:
     """Return how much deeper [m] bodies overlap as drawn than in their true positions.
 
     Sliding along curved sides brings that about.
 
     Parameters
     ----------
-    shown : Shown
+    shown : DrawnScene
     factor : float
         By which displacements are enlarged.
     """
@@ -122,7 +122,7 @@ def _near(boxes: FloatArray) -> list[tuple[int, int]]:
     return [(int(i), int(j)) for i, j in np.argwhere(np.triu(meet, 1))]
 
 
-def _depth(points: FloatArray, body: ShownBody, loops: list[FloatArray]) -> FloatArray:
+def _depth(points: FloatArray, body: DrawnBody, loops: list[FloatArray]) -> FloatArray:
     """Return how deep (n,) [m] points (n, 2) are inside a body with these loops, zero outside."""
     depth = np.zeros(len(points))
     inside = np.flatnonzero(_is_inside(points, body, loops))
@@ -135,7 +135,7 @@ def _depth(points: FloatArray, body: ShownBody, loops: list[FloatArray]) -> Floa
     return depth
 
 
-def _is_inside(points: FloatArray, body: ShownBody, loops: list[FloatArray]) -> BoolArray:
+def _is_inside(points: FloatArray, body: DrawnBody, loops: list[FloatArray]) -> BoolArray:
     from matplotlib.path import Path
 
     is_inside = np.full(len(points), body.mesh.is_exterior)

@@ -17,7 +17,7 @@ from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.neighbours import along_boundary
 from bemkit.pictures.drawing import GREY, Axes
 from bemkit.pictures.plane import set_frame
-from bemkit.pictures.shown import Shown
+from bemkit.pictures.shown import DrawnScene
 from bemkit.scene.conditions import Contact
 
 if TYPE_CHECKING:
@@ -33,7 +33,7 @@ _BAND = 0.04
 """Thickness of the hatched part of an obstacle along its surface, in sizes of the picture."""
 
 
-def draw_obstacles(axes: Axes, shown: Shown) -> None:
+def draw_obstacles(axes: Axes, shown: DrawnScene) -> None:
     """Draw the fixed obstacles of all contact parts, within the frame of the axes.
 
     One that is given by its gap is drawn where it faces the body: at the distance of the gap from each point.
@@ -78,7 +78,7 @@ def facing_bands(obstacle: Obstacle, mesh: BoundaryMesh, elements: IntArray, thi
     return bands
 
 
-def relief_frame(shown: Shown, factor: float) -> FloatArray | None:
+def relief_frame(shown: DrawnScene, factor: float) -> FloatArray | None:
     """Return the frame (2, 2) [m] of a horizontal surface whose relief is flat beside its length, None of others.
 
     It shows the surface, moved by a factor times its displacement, and what it faces, across the whole height: axes
@@ -100,7 +100,7 @@ def relief_frame(shown: Shown, factor: float) -> FloatArray | None:
     return np.array([shown.frame[0], [heights.min() - below * relief, heights.max() + above * relief]])
 
 
-def draw_rigid_bodies(axes: Axes, shown: Shown, factor: float) -> None:
+def draw_rigid_bodies(axes: Axes, shown: DrawnScene, factor: float) -> None:
     """Draw rigid bodies whose shape is known, before they move and after it, their motions times a factor.
 
     The frame grows to hold them, by half its size at most.

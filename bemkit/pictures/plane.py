@@ -10,7 +10,7 @@ from bemkit.arrays import FloatArray, IntArray
 from bemkit.geometry.neighbours import along_boundary
 from bemkit.geometry.symmetry import Symmetry
 from bemkit.pictures.drawing import BLUE, GREY, Axes, axes_or_new
-from bemkit.pictures.shown import Shown, ShownBody
+from bemkit.pictures.shown import DrawnBody, DrawnScene
 from bemkit.scene.unit_names import UnitNames, with_unit
 
 if TYPE_CHECKING:
@@ -40,7 +40,7 @@ def plane_axes(axes: Axes | None, frame: FloatArray, title: str, units: UnitName
     return axes
 
 
-def draw_bodies(axes: Axes, shown: Shown, factor: float) -> None:
+def draw_bodies(axes: Axes, shown: DrawnScene, factor: float) -> None:
     """Draw the outlines of bodies, dashed, and the bodies moved by a factor times their displacements."""
     for number, body in enumerate(shown.bodies):
         labels = ("initial", f"deformed, displacements \u00d7 {factor:g}") if number == 0 else (None, None)
@@ -52,7 +52,7 @@ def draw_bodies(axes: Axes, shown: Shown, factor: float) -> None:
         fill(axes, body, after, shown.frame)
 
 
-def draw_initial(axes: Axes, shown: Shown, *, is_filled: bool = False, factor: float = 0.0) -> None:
+def draw_initial(axes: Axes, shown: DrawnScene, *, is_filled: bool = False, factor: float = 0.0) -> None:
     """Draw the bodies where they are before they move, or after a multiple of their displacement."""
     for body in shown.bodies:
         loops = body.outlines(factor)
@@ -62,7 +62,7 @@ def draw_initial(axes: Axes, shown: Shown, *, is_filled: bool = False, factor: f
             fill(axes, body, loops, shown.frame)
 
 
-def fill(axes: Axes, body: ShownBody, loops: list[FloatArray], frame: FloatArray) -> None:
+def fill(axes: Axes, body: DrawnBody, loops: list[FloatArray], frame: FloatArray) -> None:
     """Fill the inside of a body; holes run the other way round and stay open."""
     from matplotlib.patches import PathPatch
 
@@ -70,7 +70,7 @@ def fill(axes: Axes, body: ShownBody, loops: list[FloatArray], frame: FloatArray
     axes.add_artist(PathPatch(inside(body, loops, frame), facecolor=BODY, edgecolor="none", zorder=1))
 
 
-def inside(body: ShownBody, loops: list[FloatArray], frame: FloatArray) -> Path:
+def inside(body: DrawnBody, loops: list[FloatArray], frame: FloatArray) -> Path:
     """Return the path around a body whose closed loops are given; an exterior ends far outside of the frame."""
     from matplotlib.path import Path
 
@@ -129,7 +129,7 @@ def joined_frame(*points: FloatArray) -> FloatArray:
     return np.stack([every.min(axis=0), every.max(axis=0)], axis=1)
 
 
-class Stations(NamedTuple):
+class BoundaryPoints(NamedTuple):
     """Points of the undeformed boundary, how they are drawn, and unit normals out of the body, all (n, 2)."""
 
     points: FloatArray
@@ -137,12 +137,12 @@ class Stations(NamedTuple):
     normals: FloatArray
 
 
-def stations(body: ShownBody, elements: IntArray, spacing: float, factor: float) -> Stations:
+def evenly_spaced(body: DrawnBody, elements: IntArray, spacing: float, factor: float) -> BoundaryPoints:
     """Return places about evenly spaced along elements, one at least.
 
     Parameters
     ----------
-    body : ShownBody
+    body : DrawnBody
     elements : (m,) array
     spacing, factor : float
         Distance [m] of neighbours, and by how much displacements are enlarged.
@@ -156,4 +156,4 @@ def stations(body: ShownBody, elements: IntArray, spacing: float, factor: float)
     xi = (1.0 - 2.0 * (ends[place] - s) / body.mesh.lengths[elements])[:, None]
     points = body.mesh.points(elements, xi)
     drawn = points + factor * body.displacement_at(elements, xi)
-    return Stations(points[:, 0], drawn[:, 0], body.mesh.normals_at(elements, xi)[:, 0])
+    return BoundaryPoints(points[:, 0], drawn[:, 0], body.mesh.normals_at(elements, xi)[:, 0])

@@ -34,7 +34,7 @@ _POINTS_OF_CURVE = 9
 
 
 @dataclass(frozen=True, eq=False)
-class ShownBody:
+class DrawnBody:
     """One body on its whole boundary, images by symmetry included.
 
     Parameters
@@ -84,14 +84,14 @@ class ShownBody:
 
 
 @dataclass(frozen=True, eq=False)
-class Shown:
+class DrawnScene:
     """All that a picture of bodies needs.
 
     Parameters
     ----------
     title : str
     units : UnitNames or None
-    bodies : tuple of ShownBody
+    bodies : tuple of DrawnBody
     rigid : tuple of (RigidBody, RigidResult)
     contact : ContactTable
         Without rows where nothing is solved.
@@ -99,7 +99,7 @@ class Shown:
 
     title: str
     units: UnitNames | None
-    bodies: tuple[ShownBody, ...]
+    bodies: tuple[DrawnBody, ...]
     rigid: tuple[tuple[RigidBody, RigidResult], ...]
     contact: ContactTable
 
@@ -128,25 +128,25 @@ class Shown:
         return np.concatenate([body.displacement for body in self.bodies])
 
 
-def shown(subject: Drawable) -> Shown:
+def shown(subject: Drawable) -> DrawnScene:
     """Collect what pictures show of a scene or a result."""
     match subject:
         case Solution():
             bodies = tuple(_body(body.scene, body.mesh, body.boundary.displacement) for body in subject.bodies.values())
             rigid = tuple((body, subject.rigid[body.name]) for body in subject.scene.rigid)
-            return Shown(subject.title, subject.units, bodies, rigid, subject.contact)
+            return DrawnScene(subject.title, subject.units, bodies, rigid, subject.contact)
         case Scene():
             bodies = tuple(_body(placed.scene, placed.mesh) for placed in place(load_steps(subject)[-1]))
             rigid = tuple((body, RigidResult(body.name, *(0.0,) * 6)) for body in subject.rigid)
-            return Shown(subject.title, subject.units, bodies, rigid, ContactTable.empty())
+            return DrawnScene(subject.title, subject.units, bodies, rigid, ContactTable.empty())
 
 
-def _body(scene: BodyScene, mesh: BoundaryMesh, displacement: FloatArray | None = None) -> ShownBody:
+def _body(scene: BodyScene, mesh: BoundaryMesh, displacement: FloatArray | None = None) -> DrawnBody:
     whole = on_whole_body(scene.discretisation, mesh)
     space, half = whole.displacement_space(mesh.whole), scene.discretisation.displacement_space(mesh)
     if displacement is None:
         displacement = np.zeros((half.n_dofs // 2, 2))
-    return ShownBody(scene, mesh.whole, space, reflected_to_whole(half, space, displacement))
+    return DrawnBody(scene, mesh.whole, space, reflected_to_whole(half, space, displacement))
 
 
 def at_mesh_nodes(space: BoundarySpace, displacement: FloatArray) -> FloatArray:

@@ -6,8 +6,8 @@ import numpy as np
 
 from bemkit.arrays import FloatArray
 from bemkit.pictures.drawing import GREEN, Axes
-from bemkit.pictures.plane import Stations, draw_arrows, stations
-from bemkit.pictures.shown import Shown
+from bemkit.pictures.plane import BoundaryPoints, draw_arrows, evenly_spaced
+from bemkit.pictures.shown import DrawnScene
 from bemkit.scene.conditions import Clamped, PrescribedDisplacement, Roller
 
 _SPACING, _SIZE = 0.035, 0.012
@@ -17,7 +17,7 @@ _ARROW, _LEAST = 0.06, 1e-9
 _COLOUR = "#333333"
 
 
-def draw_supports(axes: Axes, shown: Shown, factor: float) -> None:
+def draw_supports(axes: Axes, shown: DrawnScene, factor: float) -> None:
     """Draw the supports of all bodies where these are drawn, moved by a factor times their displacements."""
     size = shown.size
     labelled: set[str] = set()
@@ -25,13 +25,13 @@ def draw_supports(axes: Axes, shown: Shown, factor: float) -> None:
         for part, elements in body.parts:
             match part.condition:
                 case Clamped():
-                    places = stations(body, elements, 0.6 * _SPACING * size, factor)
+                    places = evenly_spaced(body, elements, 0.6 * _SPACING * size, factor)
                     _draw_clamped(axes, places, _SIZE * size, _new("clamped", labelled))
                 case Roller():
-                    places = stations(body, elements, _SPACING * size, factor)
+                    places = evenly_spaced(body, elements, _SPACING * size, factor)
                     _draw_rollers(axes, places, _SIZE * size, _new("roller", labelled))
                 case PrescribedDisplacement() as given:
-                    places = stations(body, elements, 2.0 * _SPACING * size, factor)
+                    places = evenly_spaced(body, elements, 2.0 * _SPACING * size, factor)
                     values = given.at(places.points)
                     _draw_given(axes, places, values, given.is_prescribed, size, _new("given displacement", labelled))
 
@@ -44,7 +44,7 @@ def _new(label: str, labelled: set[str]) -> str | None:
     return label
 
 
-def _draw_clamped(axes: Axes, places: Stations, size: float, label: str | None) -> None:
+def _draw_clamped(axes: Axes, places: BoundaryPoints, size: float, label: str | None) -> None:
     """Hatch the outside of the boundary."""
     from matplotlib.collections import LineCollection
 
@@ -55,7 +55,7 @@ def _draw_clamped(axes: Axes, places: Stations, size: float, label: str | None) 
     axes.plot([], [], linestyle="", marker=r"$/\!/\!/$", markersize=13, color=_COLOUR, label=label)
 
 
-def _draw_rollers(axes: Axes, places: Stations, size: float, label: str | None) -> None:
+def _draw_rollers(axes: Axes, places: BoundaryPoints, size: float, label: str | None) -> None:
     """Draw circles between the boundary and a line on which they roll."""
     from matplotlib.collections import EllipseCollection, LineCollection
 
@@ -82,7 +82,7 @@ def _draw_rollers(axes: Axes, places: Stations, size: float, label: str | None) 
 
 
 def _draw_given(
-    axes: Axes, places: Stations, values: FloatArray, is_given: tuple[bool, bool], size: float, label: str | None
+    axes: Axes, places: BoundaryPoints, values: FloatArray, is_given: tuple[bool, bool], size: float, label: str | None
 ) -> None:
     """Draw arrows along given displacements, with their heads on the boundary; bars along what must not move."""
     from matplotlib.collections import LineCollection

@@ -6,13 +6,13 @@ Each says where it holds and where it comes from; ``bemkit verify`` measures the
 from bemkit.reference.column import GravityColumn as GravityColumn
 from bemkit.reference.column import uniaxial_strain_modulus as uniaxial_strain_modulus
 from bemkit.reference.compare import MEASURES as MEASURES
-from bemkit.reference.compare import Answer as Answer
-from bemkit.reference.compare import Places as Places
 from bemkit.reference.compare import Reference as Reference
-from bemkit.reference.compare import Zone as Zone
-from bemkit.reference.compare import answer_of as answer_of
+from bemkit.reference.compare import SampledFields as SampledFields
+from bemkit.reference.compare import SamplePoints as SamplePoints
+from bemkit.reference.compare import ZoneEnd as ZoneEnd
 from bemkit.reference.compare import errors_of as errors_of
 from bemkit.reference.compare import over_resolved as over_resolved
+from bemkit.reference.compare import sampled_fields as sampled_fields
 from bemkit.reference.complete_contact import CompleteContact as CompleteContact
 from bemkit.reference.disc import DiscBetweenPlates as DiscBetweenPlates
 from bemkit.reference.elastic import BrazilianDisc as BrazilianDisc

@@ -42,7 +42,7 @@ COLUMNS = ("u_n", "u_t", "sigma_n", "sigma_t")
 
 
 @dataclass(frozen=True)
-class Zone:
+class ZoneEnd:
     """The end of a contact zone.
 
     Parameters
@@ -61,7 +61,7 @@ class Zone:
 
 
 @dataclass(frozen=True, eq=False)
-class Places:
+class SamplePoints:
     """Points at which fields are compared along one contact part.
 
     Parameters
@@ -83,7 +83,7 @@ class Places:
 
 
 @dataclass(frozen=True, eq=False)
-class Answer:
+class SampledFields:
     """Fields to compare; columns run over all points of all parts.
 
     Parameters
@@ -94,7 +94,7 @@ class Answer:
         1/2 a(u, u).
     force_normal, force_tangential : float [N/m]
         As in `bemkit.Solution`.
-    zones : tuple of Zone
+    zones : tuple of ZoneEnd
     """
 
     u_n: FloatArray
@@ -104,7 +104,7 @@ class Answer:
     energy: float
     force_normal: float
     force_tangential: float
-    zones: tuple[Zone, ...]
+    zones: tuple[ZoneEnd, ...]
 
     def __post_init__(self) -> None:
         for name in COLUMNS:
@@ -119,19 +119,19 @@ class Reference:
     ----------
     source : str
         Where it comes from, in a few words.
-    places : tuple of Places
-    answer : Answer
+    places : tuple of SamplePoints
+    answer : SampledFields
     own_errors : mapping of str to float
         How far it may itself be wrong, by the names of `MEASURES`; by default round-off.
     """
 
     source: str
-    places: tuple[Places, ...]
-    answer: Answer
+    places: tuple[SamplePoints, ...]
+    answer: SampledFields
     own_errors: Mapping[str, float] = field(default_factory=dict)
 
 
-def errors_of(answer: Answer, reference: Reference) -> dict[str, float]:
+def errors_of(answer: SampledFields, reference: Reference) -> dict[str, float]:
     """Return the relative errors of an answer at the places of a reference.
 
     Returns
@@ -164,7 +164,7 @@ def errors_of(answer: Answer, reference: Reference) -> dict[str, float]:
     }
 
 
-def _of_zones(answer: Answer, reference: Reference) -> float:
+def _of_zones(answer: SampledFields, reference: Reference) -> float:
     """Return the largest distance from an exact end of a zone to the nearest one of the same kind."""
     worst = float("nan")
     lengths = {places.part: float(places.weight.sum()) for places in reference.places}
@@ -180,26 +180,26 @@ class OverResolutionError(InputError):
     """A scene for which two fine solutions could not be made."""
 
 
-def answer_of(solution: Solution, places: Sequence[Places]) -> Answer:
+def sampled_fields(solution: Solution, places: Sequence[SamplePoints]) -> SampledFields:
     """Evaluate a solution as its elements represent it.
 
     Returns
     -------
-    Answer
+    SampledFields
         Of a frictionless scene every node in contact counts as slipping.
     """
     u_n, u_t, sigma_n, sigma_t = np.concatenate([_along(solution, each) for each in places], axis=1)
     is_frictionless = all(law.is_frictionless for law in solution.laws.values())
-    zones: list[Zone] = []
+    zones: list[ZoneEnd] = []
     for item in solution.transitions:
         words = (item.from_status, item.to_status)
         before, after = ("slip" if is_frictionless and word == "stick" else word for word in words)
         is_near = zones and zones[-1].part == item.part
         if is_near and item.s - zones[-1].s <= FLICKER * solution.part_length(item.part):
             before = zones.pop().before
-        zones.append(Zone(item.part, item.s, before, after))
+        zones.append(ZoneEnd(item.part, item.s, before, after))
     zones = [zone for zone in zones if zone.before != zone.after]
-    return Answer(
+    return SampledFields(
         u_n=u_n,
         u_t=u_t,
         sigma_n=sigma_n,
@@ -237,8 +237,8 @@ def over_resolved(scene: Scene, most_elements: int) -> Reference:
     degree = finest.scene.discretisation.displacement_space(finest.mesh).degree
     elements = f"{finest.mesh.n_elements} elements of degree {degree}"
     source = f"{elements}, estimated error {finest.estimated_error or 0.0:.1e}"
-    reference = Reference(f"over-resolved: {source}", places, answer_of(finest, places))
-    return replace(reference, own_errors=errors_of(answer_of(before, places), reference))
+    reference = Reference(f"over-resolved: {source}", places, sampled_fields(finest, places))
+    return replace(reference, own_errors=errors_of(sampled_fields(before, places), reference))
 
 
 def _fine_solutions(scene: Scene, most_elements: int) -> list[Solution]:
@@ -252,7 +252,7 @@ def _fine_solutions(scene: Scene, most_elements: int) -> list[Solution]:
     return [run(replace(scene, mesh=MeshOptions(elements=n, grading=Algebraic(3.0)))) for n in counts]
 
 
-def _along(solution: Solution, places: Places) -> FloatArray:
+def _along(solution: Solution, places: SamplePoints) -> FloatArray:
     """Evaluate u_n, u_t, sigma_n and sigma_t (rows) by the basis of the displacements."""
     mesh, table = solution.mesh, solution.contact
     space = solution.scene.discretisation.displacement_space(mesh)
@@ -267,10 +267,10 @@ def _along(solution: Solution, places: Places) -> FloatArray:
     return np.asarray(np.einsum("pn,npc->cn", basis, from_own_nodes(space, columns, elements)[own]))
 
 
-def _gauss_places(solution: Solution, part: str) -> Places:
+def _gauss_places(solution: Solution, part: str) -> SamplePoints:
     mesh = solution.mesh
     lengths = mesh.lengths[along_boundary(mesh, mesh.part(part))]
     space = solution.scene.discretisation.displacement_space(mesh)
     xi, weights = gauss_legendre(max(4, space.degree + 1))
     half = 0.5 * lengths[:, None]
-    return Places(part, (np.cumsum(lengths)[:, None] + half * (xi - 1.0)).ravel(), (half * weights).ravel())
+    return SamplePoints(part, (np.cumsum(lengths)[:, None] + half * (xi - 1.0)).ravel(), (half * weights).ravel())

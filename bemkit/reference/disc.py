@@ -10,7 +10,7 @@ import numpy as np
 from bemkit.arrays import FloatArray
 from bemkit.errors import InputError
 from bemkit.operators.material import Material
-from bemkit.reference.compare import Answer, Places, Reference, Zone, errors_of
+from bemkit.reference.compare import Reference, SampledFields, SamplePoints, ZoneEnd, errors_of
 from bemkit.reference.pressure import N_TERMS, EvenPressure, half_width_for, places_along, solve_pressure
 
 
@@ -74,12 +74,12 @@ class DiscBetweenPlates:
         length : float, optional [m]
             Length of the part; an arc of 90 degrees by default.
         """
-        answer, places = self._answer(part, length)
-        coarser, _ = replace(self, n_terms=self.n_terms * 2 // 3)._answer(part, length)
+        answer, places = self._fields_of(part, length)
+        coarser, _ = replace(self, n_terms=self.n_terms * 2 // 3)._fields_of(part, length)
         reference = Reference("disc between plates by Chebyshev polynomials", (places,), answer)
         return replace(reference, own_errors=errors_of(coarser, reference))
 
-    def _answer(self, part: str, length: float | None) -> tuple[Answer, Places]:
+    def _fields_of(self, part: str, length: float | None) -> tuple[SampledFields, SamplePoints]:
         e = self.half_angle
         pressure, _ = self._solved(e)
         length = 0.5 * np.pi * self.radius if length is None else length
@@ -88,7 +88,7 @@ class DiscBetweenPlates:
         u_n = np.where(angle < e, self._gap(angle), self.radius * pressure.displacement(self._towards, angle))
         force = self.radius * pressure.integral(np.ones_like)
         work = -self.radius * pressure.integral(self._gap)
-        answer = Answer(
+        answer = SampledFields(
             u_n=u_n,
             u_t=self.radius * pressure.displacement(lambda x: self._influence(x)[1], angle),
             sigma_n=-pressure.at(angle),
@@ -96,9 +96,9 @@ class DiscBetweenPlates:
             energy=0.25 * work,
             force_normal=0.5 * force,
             force_tangential=0.0,
-            zones=(Zone(part, e * self.radius, "slip", "separated"),),
+            zones=(ZoneEnd(part, e * self.radius, "slip", "separated"),),
         )
-        return answer, Places(part, s, weight)
+        return answer, SamplePoints(part, s, weight)
 
     def pressure(self, angle: FloatArray) -> FloatArray:
         """Return the contact pressure [Pa] at angles [rad]."""

@@ -17,7 +17,7 @@ import numpy as np
 
 from bemkit.operators.linear.solvers import Automatic
 from bemkit.reference.column import uniaxial_strain_modulus
-from bemkit.reference.compare import Answer, Places, Reference, Zone
+from bemkit.reference.compare import Reference, SampledFields, SamplePoints, ZoneEnd
 from bemkit.reference.disc import DiscBetweenPlates
 from bemkit.reference.pressure import places_along
 from bemkit.reference.wavy import WavyObstacle
@@ -67,8 +67,8 @@ def _uniform_slip(scene: Scene) -> Reference:
     s, weight = places_along(2.0, ())
     one = np.ones_like(s)
     energy = 0.5 * 2.0 * (-29.0 / 91.0 * 0.1 + 11.0 / 14.0 + 0.3 * 0.78) / 1000.0
-    answer = Answer(0.0 * one, (0.1 * s + 0.2) / 1000.0, -one, -0.3 * one, energy, 2.0, -0.6, ())
-    return Reference("a linear field", (Places("floor", s, weight),), answer)
+    answer = SampledFields(0.0 * one, (0.1 * s + 0.2) / 1000.0, -one, -0.3 * one, energy, 2.0, -0.6, ())
+    return Reference("a linear field", (SamplePoints("floor", s, weight),), answer)
 
 
 def _gravity_column(scene: Scene) -> Reference:
@@ -78,8 +78,8 @@ def _gravity_column(scene: Scene) -> Reference:
     s, length = places_along(width, ())
     one = np.ones_like(s)
     pressure = weight * height
-    answer = Answer(gap * one, 0.0 * one, -pressure * one, 0.0 * one, energy, pressure * width, 0.0, ())
-    return Reference("uniaxial strain", (Places("floor", s, length),), answer)
+    answer = SampledFields(gap * one, 0.0 * one, -pressure * one, 0.0 * one, energy, pressure * width, 0.0, ())
+    return Reference("uniaxial strain", (SamplePoints("floor", s, length),), answer)
 
 
 _REFERENCES: Mapping[str, Callable[[Scene], Reference]] = MappingProxyType(
@@ -102,7 +102,7 @@ def paper_reference(number: int) -> Reference:
     table = (folder / f"paper-{number}.csv").read_text("utf-8")
     s, weight, u_n, u_t, sigma_n, sigma_t = np.loadtxt(io.StringIO(table), delimiter=",", skiprows=1, unpack=True)
     record = json.loads((folder / f"paper-{number}.json").read_text("utf-8"))
-    zones = tuple(Zone(record["part"], **zone) for zone in record["zones"])
+    zones = tuple(ZoneEnd(record["part"], **zone) for zone in record["zones"])
     energy, force_normal, force_tangential = (record[name] for name in ("energy", "force_normal", "force_tangential"))
-    answer = Answer(u_n, u_t, sigma_n, sigma_t, energy, force_normal, force_tangential, zones)
-    return Reference(record["source"], (Places(record["part"], s, weight),), answer, record["own_errors"])
+    answer = SampledFields(u_n, u_t, sigma_n, sigma_t, energy, force_normal, force_tangential, zones)
+    return Reference(record["source"], (SamplePoints(record["part"], s, weight),), answer, record["own_errors"])

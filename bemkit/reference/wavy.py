@@ -10,7 +10,7 @@ import numpy as np
 from bemkit.arrays import FloatArray
 from bemkit.errors import InputError
 from bemkit.operators.material import Material
-from bemkit.reference.compare import Answer, Places, Reference, Zone
+from bemkit.reference.compare import Reference, SampledFields, SamplePoints, ZoneEnd
 from bemkit.reference.pressure import N_TERMS, EvenPressure, half_width_for, places_along, solve_pressure
 
 _N_MODES = 4
@@ -114,7 +114,7 @@ class WavyObstacle:
         values = pressure.at(s)
         far_shift = shift - self.mean_pressure * self.height * (1.0 - self._ratio**2) / modulus
         work = -0.5 * pressure.integral(self._wave) - 0.5 * self.mean_pressure * self.wavelength * far_shift
-        answer = Answer(
+        answer = SampledFields(
             u_n=-u_y,
             u_t=pressure.displacement(self._tangential_kernel, s),
             sigma_n=-values,
@@ -122,9 +122,9 @@ class WavyObstacle:
             energy=0.5 * work,
             force_normal=0.5 * pressure.integral(np.ones_like),
             force_tangential=0.0,
-            zones=(Zone("wave", a, "slip", "separated"),),
+            zones=(ZoneEnd("wave", a, "slip", "separated"),),
         )
-        return Reference("Westergaard's problem by Chebyshev polynomials", (Places("wave", s, weight),), answer)
+        return Reference("Westergaard's problem by Chebyshev polynomials", (SamplePoints("wave", s, weight),), answer)
 
     @property
     def _ratio(self) -> float:

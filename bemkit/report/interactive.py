@@ -19,7 +19,7 @@ from bemkit.pictures.abscissa import Abscissa
 from bemkit.pictures.contact_axes import STATUS_COLOURS
 from bemkit.pictures.drawing import BLUE, GREY, VERMILION
 from bemkit.pictures.magnification import magnification
-from bemkit.pictures.shown import Result, Shown, shown
+from bemkit.pictures.shown import DrawnScene, Result, shown
 from bemkit.pictures.traction_curves import traction_curve
 from bemkit.report.html import Element, element
 from bemkit.results.tables import table_of
@@ -117,7 +117,7 @@ def _slider(count: int) -> dict[str, Any]:
     return {"active": count - 1, "currentvalue": {"prefix": "load step "}, "steps": entries, "pad": {"t": 50}}
 
 
-def _traces(step: Result, bodies: Shown, factor: float, parts: Sequence[str]) -> list[dict[str, Any]]:
+def _traces(step: Result, bodies: DrawnScene, factor: float, parts: Sequence[str]) -> list[dict[str, Any]]:
     """Return outlines, centres of elements and, for each contact, its tractions: as many for each step."""
     boundary = table_of(step, "boundary")
     at = np.array([boundary.values("x"), boundary.values("y")])

@@ -152,9 +152,9 @@ def _of_contact(stated: Scene, messages: list[str]) -> Iterator[Method]:
     own = [law for body in stated.placed_bodies for law in stated.scene_of(body).laws.values()]
     own += [each.law for each in (*stated.contacts, stated.touching) if each is not None and each.law is not None]
     for law in (stated.law, *own):
-        if keys := LAW_WORKS.get(LAWS.word_of(law)):
-            yield Method(f"law {LAWS.word_of(law)}", keys)
-    for word in map(SOLVERS.word_of, drivers_at_work(stated.solver, messages)):
+        if keys := LAW_WORKS.get(LAWS.name_of(law)):
+            yield Method(f"law {LAWS.name_of(law)}", keys)
+    for word in map(SOLVERS.name_of, drivers_at_work(stated.solver, messages)):
         yield Method(f"driver {word}", DRIVERS.get(word, ()))
 
 

@@ -140,7 +140,7 @@ class ContactPlaces:
         By the coefficients of elements of degree 3 and more, without those that `elements` excludes; None if a body has
         lower degrees.
         """
-        from bemkit.results.error_indicators import place_error
+        from bemkit.results.error_indicators import transition_error
 
         solution, squared = self.solution, 0.0
         elements = {name: self.elements(name) for name in solution.bodies}
@@ -152,5 +152,5 @@ class ContactPlaces:
             for side in self.sides(transition.part):
                 end = side.near(np.array([transition.x, transition.y]))
                 if end.element in elements[side.body]:
-                    squared += place_error(solution.contact, transition, solution.transitions, end)
+                    squared += transition_error(solution.contact, transition, solution.transitions, end)
         return squared

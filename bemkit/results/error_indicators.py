@@ -44,7 +44,7 @@ MEAN_CALIBRATION = 1.25
 on uniform, graded and adaptive meshes are 0.85 to 1.6 times the error."""
 LOCAL_CALIBRATION = 1.6
 """Further factor of the same error element by element: errors of single elements are larger by up to so much."""
-PLACE_CALIBRATION = 0.03
+TRANSITION_CALIBRATION = 0.03
 """The square of the 0.17 in the error of elements that end beside a place of change."""
 STEEPEST = 6.0
 """Largest ratio of successive steps towards a corner: that of tractions like d**-0.5 on equal elements."""
@@ -138,12 +138,12 @@ def traction_errors(mesh: BoundaryMesh, traction: FloatArray, degree: int, plane
     where tractions may be singular, steps and bends are continued as a geometric sequence into the last element.
     """
     if degree == 0:
-        steps = _steps(mesh, traction)
+        steps = _jumps(mesh, traction)
         at_nodes = 0.5 * (_node_lengths(mesh) * np.nan_to_num(steps)) ** 2
-        inside, last = at_nodes[mesh.elements].sum(axis=1), _into_the_last(mesh, steps, of_nodes=True)
+        inside, last = at_nodes[mesh.elements].sum(axis=1), _extrapolated_to_ends(mesh, steps, of_nodes=True)
     else:
-        bends = _bends(mesh, traction)
-        inside, last = (mesh.lengths * np.nan_to_num(bends)) ** 2, _into_the_last(mesh, bends, of_nodes=False)
+        bends = _second_differences(mesh, traction)
+        inside, last = (mesh.lengths * np.nan_to_num(bends)) ** 2, _extrapolated_to_ends(mesh, bends, of_nodes=False)
     return np.asarray(TRACTION_CALIBRATION[degree] / plane_modulus * (inside + (mesh.lengths * last) ** 2))
 
 
@@ -233,11 +233,11 @@ def mean_traction_errors(mesh: BoundaryMesh, traction: FloatArray) -> FloatArray
     n_slopes = np.maximum((~is_break)[mesh.elements].sum(axis=1), 1)
     moments = (lengths**2 / 12.0 / n_slopes)[:, None] * slopes[mesh.elements].sum(axis=1)
     jumps = np.where(is_break, 0.0, np.linalg.norm(moments[after] - moments[before], axis=1))
-    at_centres = lengths * np.nan_to_num(_bends(mesh, traction)) / 24.0
+    at_centres = lengths * np.nan_to_num(_second_differences(mesh, traction)) / 24.0
     return np.asarray(MEAN_CALIBRATION * (0.5 * jumps[mesh.elements].sum(axis=1) + at_centres))
 
 
-def largest_but_a_share(errors: FloatArray, lengths: FloatArray) -> float:
+def ky_fan_distance(errors: FloatArray, lengths: FloatArray) -> float:
     """Return the smallest number that errors exceed only on that share of the length of elements with an error.
 
     Parameters
@@ -254,7 +254,7 @@ def largest_but_a_share(errors: FloatArray, lengths: FloatArray) -> float:
     return float(np.maximum(np.append(errors[order], 0.0), worse).min())
 
 
-def place_error(
+def transition_error(
     contact: ContactTable, transition: Transition, transitions: Sequence[Transition], end: ZoneEnd
 ) -> float:
     """Estimate the squared L2 error [Pa^2 m] of contact tractions where a transition lies inside an element.
@@ -275,7 +275,7 @@ def place_error(
             at_transition, at_reach = np.interp(places, contact.s[rows], traction[rows])
             steepest = max(steepest, (at_reach - at_transition) ** 2 / reach)
         squared += steepest
-    return float(PLACE_CALIBRATION * squared * end.distance**2)
+    return float(TRANSITION_CALIBRATION * squared * end.distance**2)
 
 
 def blind_elements(mesh: BoundaryMesh, degree: int) -> BoolArray:
@@ -296,8 +296,8 @@ def blind_elements(mesh: BoundaryMesh, degree: int) -> BoolArray:
     if degree == 0:
         is_blind = np.asarray(break_nodes(whole)[whole.elements].all(axis=1))
     else:
-        ones = 1.0 + _bends(whole, np.zeros((whole.n_elements, 2)))
-        is_blind = np.isnan(ones) & (_into_the_last(whole, ones, of_nodes=False) == 0.0)
+        ones = 1.0 + _second_differences(whole, np.zeros((whole.n_elements, 2)))
+        is_blind = np.isnan(ones) & (_extrapolated_to_ends(whole, ones, of_nodes=False) == 0.0)
     return is_blind[: mesh.n_elements]
 
 
@@ -308,14 +308,14 @@ def _node_lengths(mesh: BoundaryMesh) -> FloatArray:
     return lengths
 
 
-def _steps(mesh: BoundaryMesh, traction: FloatArray) -> FloatArray:
+def _jumps(mesh: BoundaryMesh, traction: FloatArray) -> FloatArray:
     """Return the sizes (n_nodes,) of the steps from element to element; NaN at corners and ends of parts."""
     before, after = mesh.node_elements.T
     steps = np.linalg.norm(traction[after] - traction[before], axis=1)
     return np.where(break_nodes(mesh), np.nan, steps)
 
 
-def _bends(mesh: BoundaryMesh, traction: FloatArray) -> FloatArray:
+def _second_differences(mesh: BoundaryMesh, traction: FloatArray) -> FloatArray:
     """Return the second differences (n_elements,) at each element; NaN at corners and ends of parts."""
     before, after = mesh.node_elements.T
     distance = 0.5 * (mesh.lengths[before] + mesh.lengths[after])
@@ -326,7 +326,7 @@ def _bends(mesh: BoundaryMesh, traction: FloatArray) -> FloatArray:
     return np.where(is_break[start] | is_break[end], np.nan, mesh.lengths**2 * curvature)
 
 
-def _into_the_last(mesh: BoundaryMesh, sizes: FloatArray, *, of_nodes: bool) -> FloatArray:
+def _extrapolated_to_ends(mesh: BoundaryMesh, sizes: FloatArray, *, of_nodes: bool) -> FloatArray:
     """Continue sizes of nodes or of elements into the last elements before corners and ends of parts; else zero."""
     squares = np.zeros(mesh.n_elements)
     is_break = break_nodes(mesh)
@@ -336,11 +336,11 @@ def _into_the_last(mesh: BoundaryMesh, sizes: FloatArray, *, of_nodes: bool) -> 
         neighbour = mesh.node_elements[node, far]
         next_node = mesh.elements[neighbour, far]
         places = (node, next_node) if of_nodes else (neighbour, mesh.node_elements[next_node, far])
-        squares[last] += _continued(*(sizes[place] for place in places)) ** 2
+        squares[last] += _extrapolated(*(sizes[place] for place in places)) ** 2
     return np.sqrt(squares)
 
 
-def _continued(first: FloatArray, second: FloatArray) -> FloatArray:
+def _extrapolated(first: FloatArray, second: FloatArray) -> FloatArray:
     """Return the size before two sizes of a geometric sequence; the first again if the second is NaN."""
     divisor = np.fmax(second, first / STEEPEST)
     return np.nan_to_num(np.divide(first**2, divisor, out=np.zeros_like(first), where=divisor > 0.0))

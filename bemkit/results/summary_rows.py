@@ -53,7 +53,7 @@ def summary_rows(solution: Solution) -> Iterator[tuple[str, str]]:
     if has_contact:
         yield "transitions", "\n".join(_transition_lines(solution))
         drivers = drivers_at_work(solution.scene.solver, (record.message for record in solution.history))
-        words = ", ".join(dict.fromkeys(map(SOLVERS.word_of, drivers)))
+        words = ", ".join(dict.fromkeys(map(SOLVERS.name_of, drivers)))
         yield "linear solves", f"{solution.linear_solves} in {solution.outer_steps} steps ({words})"
     yield from _violation_rows(solution)
     yield "time", _time(solution)
@@ -68,7 +68,7 @@ def _bodies_rows(solution: Solution) -> Iterator[tuple[str, str]]:
         return
     body = solution.body
     mesh, discretisation = body.mesh, body.scene.discretisation
-    words = DISCRETISATIONS.word_of(discretisation)
+    words = DISCRETISATIONS.name_of(discretisation)
     if (degree := discretisation.displacement_space(mesh).degree) > 2:
         words += f", degree {degree}"
     yield "elements", f"{mesh.n_elements} ({words})"

@@ -10,7 +10,7 @@ import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray
 from bemkit.geometry.mesh import BoundaryMesh
-from bemkit.results.error_indicators import LOCAL_CALIBRATION, largest_but_a_share, mean_traction_errors
+from bemkit.results.error_indicators import LOCAL_CALIBRATION, ky_fan_distance, mean_traction_errors
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,4 +63,4 @@ class SurfaceErrors:
     @property
     def largest(self) -> float | None:
         """The largest local error but on an equally small share of the length that has one; None without tractions."""
-        return largest_but_a_share(self.local, self.lengths) if self.total > 0.0 else None
+        return ky_fan_distance(self.local, self.lengths) if self.total > 0.0 else None

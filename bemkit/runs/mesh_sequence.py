@@ -71,7 +71,7 @@ class Level:
         """Divide outlines of whose solution nothing is known."""
         keys, scenes, touching = _divided_bodies(asked)
         partitions = tuple(scene.first_partition(parts) for scene, parts in zip(scenes, touching, strict=True))
-        return cls(asked, partitions, keys, touching, all(scene.takes_layers for scene in scenes))
+        return cls(asked, partitions, keys, touching, all(scene.takes_graded_layers for scene in scenes))
 
     @property
     def partition(self) -> Partition:
@@ -89,14 +89,14 @@ class Level:
         bodies = (body if d is None else replace(body, discretisation=self._discretisation(d)) for body, d in own)
         return replace(scene, bodies=tuple(bodies))
 
-    def _discretisation(self, stated: Discretisation) -> Discretisation:
-        return Galerkin(self.degrees) if self.degrees else self.with_degree(stated, self.degree)
+    def _discretisation(self, scene: Discretisation) -> Discretisation:
+        return Galerkin(self.degrees) if self.degrees else self.with_degree(scene, self.degree)
 
-    def with_degree(self, stated: Discretisation, degree: int) -> Discretisation:
+    def with_degree(self, scene: Discretisation, degree: int) -> Discretisation:
         """Return the discretisation of layered meshes of a degree; the one stated unless degrees rise."""
         if self.asked.mesh.rising_degrees:
             return Galerkin(min(degree, LARGEST_DEGREE))
-        return Galerkin(2) if degree == 2 else stated
+        return Galerkin(2) if degree == 2 else scene
 
     @property
     def n_elements(self) -> int:

@@ -163,7 +163,7 @@ class BodyScene:
         return PiecewiseLaw(laws, nodes)
 
     @property
-    def takes_layers(self) -> bool:
+    def takes_graded_layers(self) -> bool:
         """Whether meshes that follow an accuracy are few elements of high degree in geometric layers."""
         degree = self.discretisation.largest_degree if isinstance(self.discretisation, Galerkin) else 0
         return self.n_steps == 1 and self.mesh.accuracy is not None and (self.mesh.rising_degrees or degree > 2)
@@ -178,12 +178,12 @@ class BodyScene:
             layers, this one only looks for places where their status changes.
         """
         outline = self.shape.outline()
-        if self.takes_layers and contact:
-            from bemkit.geometry.meshing.layers import looking_partition
+        if self.takes_graded_layers and contact:
+            from bemkit.geometry.meshing.layers import probing_partition
 
             base = divide(outline, self.selections)
             base = base if self.symmetry is None else base.half(self.symmetry)
-            return looking_partition(base, contact, self.mesh.n_elements)
+            return probing_partition(base, contact, self.mesh.n_elements)
         from bemkit.geometry.meshing.partition import first_partition
 
         return first_partition(outline, self.selections, self.mesh.n_elements, even=contact, symmetry=self.symmetry)

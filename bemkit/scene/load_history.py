@@ -38,7 +38,7 @@ def load_steps(scene: Scene) -> tuple[Scene, ...]:
 
     Raises
     ------
-    PlaceError
+    SceneKeyError
         If a step names a place that the scene does not have, or a value that does not fit there.
     """
     if not scene.steps and len(scene.load_factors) == 1:
@@ -96,10 +96,10 @@ def with_changed_steps(scene: Scene, change: Callable[[Scene], Scene]) -> Scene:
 
 def _at_time(scene: Scene, changes: Mapping[str, Any], factor: TimeValue, time: float) -> Scene:
     """Return a scene at a time of its history, under the changes that hold there."""
-    from bemkit.scene.places import Place, with_value
+    from bemkit.scene.keys import Key, with_value
 
     for place, value in changes.items():
-        scene = with_value(scene, Place(place), _value(value, time))
+        scene = with_value(scene, Key(place), _value(value, time))
     scaled = _value(factor, time)
     if not isinstance(scaled, int | float) or not math.isfinite(scaled):
         raise InputError(f"load_factor is {scaled!r} at t = {time:g}: give a number, or a formula of t only")

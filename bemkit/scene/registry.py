@@ -96,11 +96,11 @@ class Registry:
             return self._load(installed[kind])
         if kind in self.hints:
             raise InputError(f"the {self.role} {kind!r} {self.hints[kind]}")
-        known = self.words()
+        known = self.names()
         hint = closest(kind, known, SYNONYMS)
         raise InputError(f"unknown {self.role} {shorten(kind)}: the known ones are {', '.join(known)}{hint}")
 
-    def words(self) -> tuple[str, ...]:
+    def names(self) -> tuple[str, ...]:
         """Return all words: the built-in ones, then those that installed packages add."""
         return tuple(dict.fromkeys([*self.presets, *self.built_in, *self._installed()]))
 
@@ -122,7 +122,7 @@ class Registry:
         hint = f"register it under the entry-point group '{self.group}'" if self.group else "use a built-in one"
         raise InputError(f"the {self.role} {type(value).__name__} has no name in scene files: {hint}")
 
-    def word_of(self, value: object) -> str:
+    def name_of(self, value: object) -> str:
         """Return the word for a value or its class, or the name of its class if that has no name in scene files."""
         try:
             kind = self.kind_of(value)

@@ -135,7 +135,7 @@ class _Definitions:
 
     def _kinds(self, registry: Registry) -> Schema:
         """Return the schema of a single word, or a table with a kind: errors in it are reported for its kind only."""
-        tables = {word: self._kind(registry, word) for word in registry.words() if _can_be_loaded(registry, word)}
+        tables = {word: self._kind(registry, word) for word in registry.names() if _can_be_loaded(registry, word)}
         without_keys = [word for word, table in tables.items() if not table["required"]]
         role, listed = f"{registry.role[0].upper()}{registry.role[1:]}", {}
         if registry.listed:

@@ -250,7 +250,7 @@ def _tagged(value: object, declared: Any, at: _Place) -> Any:
     table = {"kind": value} if isinstance(value, str) else value
     table = registry.with_options(_exactly(table, dict, f"a {registry.role} as a word or as a table with its kind"))
     if "kind" not in table:
-        raise InputError(f"kind is missing: add kind = one of {', '.join(registry.words())}")
+        raise InputError(f"kind is missing: add kind = one of {', '.join(registry.names())}")
     of_kind = at.key("kind")
     named_class = _made(of_kind, registry.find, _structured(table.pop("kind"), str, of_kind))
     return _structured(table, named_class, at)

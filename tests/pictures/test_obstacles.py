@@ -13,7 +13,7 @@ from matplotlib.path import Path
 import bemkit as bk
 from bemkit.pictures import draw_deformation
 from bemkit.pictures.obstacles import draw_obstacles, draw_rigid_bodies, outline_of
-from bemkit.pictures.shown import Shown, shown
+from bemkit.pictures.shown import DrawnScene, shown
 from bemkit.results.part_forces import RigidResult
 
 FRAME = np.array([[-3.0, 3.0], [-2.0, 2.0]])
@@ -46,7 +46,7 @@ def block(obstacle: bk.Obstacle) -> bk.Scene:
     )
 
 
-def with_rigid(body: bk.RigidBody, result: RigidResult) -> Shown:
+def with_rigid(body: bk.RigidBody, result: RigidResult) -> DrawnScene:
     """A picture of a block and a rigid body."""
     return replace(shown(block(bk.RigidHalfPlane())), rigid=((body, result),))
 

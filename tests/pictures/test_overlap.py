@@ -10,11 +10,11 @@ import pytest
 import bemkit as bk
 from bemkit.geometry.spaces import dof_points
 from bemkit.pictures.magnification import LINE, drawn_overlap, magnification
-from bemkit.pictures.shown import Shown, shown
+from bemkit.pictures.shown import DrawnScene, shown
 from bemkit.results.contact_table import ContactTable
 
 
-def moved(shapes: tuple[bk.Shape, bk.Shape], placement: bk.Placement, motion: tuple[float, float]) -> Shown:
+def moved(shapes: tuple[bk.Shape, bk.Shape], placement: bk.Placement, motion: tuple[float, float]) -> DrawnScene:
     """Return two bodies, the second one placed and moved as a whole."""
     steel, mesh = bk.Material(1.0, 0.3), bk.MeshOptions(elements=64)
     placements = (bk.Placement(), placement)
@@ -27,7 +27,7 @@ def moved(shapes: tuple[bk.Shape, bk.Shape], placement: bk.Placement, motion: tu
     ).bodies
     displacement = np.broadcast_to(np.array(motion), second.displacement.shape)
     pair = (first, replace(second, displacement=displacement))
-    return Shown("two", None, pair, (), ContactTable.empty())
+    return DrawnScene("two", None, pair, (), ContactTable.empty())
 
 
 @pytest.mark.parametrize(("motion", "overlap"), [((0.0, -0.1), 0.1), ((0.3, 0.0), 0.0), ((0.0, 0.1), 0.0)])

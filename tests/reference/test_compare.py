@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import bemkit as bk
-from bemkit.reference import MEASURES, Reference, Zone, answer_of, errors_of, find_reference, over_resolved
+from bemkit.reference import MEASURES, Reference, ZoneEnd, errors_of, find_reference, over_resolved, sampled_fields
 from bemkit.reference.compare import OverResolutionError
 from tests.slow import slow_only
 
@@ -49,7 +49,7 @@ def test_errors_are_relative_and_zero_for_the_exact_answer() -> None:
 
 def test_missing_and_meaningless_errors() -> None:
     exact = known("wavy-obstacle")
-    errors = errors_of(dataclasses.replace(exact.answer, zones=(Zone("wave", 0.25, "stick", "separated"),)), exact)
+    errors = errors_of(dataclasses.replace(exact.answer, zones=(ZoneEnd("wave", 0.25, "stick", "separated"),)), exact)
     assert math.isinf(errors["transitions"])
     assert math.isnan(errors["sigma_t"])  # a frictionless reference has none
     assert math.isnan(errors["force_tangential"])
@@ -62,10 +62,10 @@ def test_statuses_that_flicker_are_one_end_of_a_zone() -> None:
     back = dataclasses.replace(first, s=first.s + 1e-9, from_status=first.to_status, to_status=first.from_status)
     again = dataclasses.replace(first, s=first.s + 2e-9)
     flickering = dataclasses.replace(solution, transitions=(first, back, again, last))
-    kinds = [(zone.before, zone.after) for zone in answer_of(flickering, places).zones]
+    kinds = [(zone.before, zone.after) for zone in sampled_fields(flickering, places).zones]
     assert kinds == [("separated", "slip"), ("slip", "stick")]
     apart = dataclasses.replace(solution, transitions=(first, dataclasses.replace(back, s=first.s + 1e-3), last))
-    assert len(answer_of(apart, places).zones) == 3
+    assert len(sampled_fields(apart, places).zones) == 3
 
 
 @pytest.mark.parametrize("name", slow_only(WITH_REFERENCE, "paper-2", "disc-between-plates", "wavy-obstacle"))
@@ -76,7 +76,7 @@ def test_computed_solutions_approach_the_references(name: str) -> None:
     if name in ("uniform-slip", "gravity-column"):  # exact on any mesh
         meshes = (bk.MeshOptions(elements=12), bk.MeshOptions(elements=24))
     coarse, fine = (
-        errors_of(answer_of(solution, reference.places), reference)
+        errors_of(sampled_fields(solution, reference.places), reference)
         for solution in (bk.run(dataclasses.replace(scene, discretisation=bk.Galerkin(2), mesh=m)) for m in meshes)
     )
     limits = {"energy": 1e-6, "sigma_n": 2e-3, "sigma_t": 4e-3, "displacement": 2e-4, "transitions": 3e-3}
@@ -93,11 +93,11 @@ def test_fields_are_those_of_the_elements() -> None:
     reference = known("paper-1")
     (places,) = reference.places
     constant = bk.run(dataclasses.replace(scene, mesh=bk.MeshOptions(elements=16)))
-    steps = answer_of(constant, reference.places).sigma_n
+    steps = sampled_fields(constant, reference.places).sigma_n
     assert len(set(steps.tolist())) == constant.contact.n_contact
     linear = bk.run(dataclasses.replace(scene, mesh=bk.MeshOptions(elements=16), discretisation=bk.Galerkin(1)))
     expected = np.interp(places.s, linear.contact.s, linear.contact.u_n)
-    np.testing.assert_allclose(answer_of(linear, reference.places).u_n, expected, rtol=1e-12)
+    np.testing.assert_allclose(sampled_fields(linear, reference.places).u_n, expected, rtol=1e-12)
 
 
 def test_a_reference_belongs_to_its_problem_alone() -> None:

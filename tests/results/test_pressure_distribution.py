@@ -9,7 +9,7 @@ import pytest
 
 import bemkit as bk
 from bemkit.results.tables import table_of
-from bemkit.scene.places import with_settings
+from bemkit.scene.keys import with_settings
 
 
 @pytest.fixture(scope="module")

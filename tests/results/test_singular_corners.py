@@ -10,8 +10,8 @@ import pytest
 
 import bemkit as bk
 from bemkit.arrays import FloatArray
-from bemkit.reference import answer_of
-from bemkit.reference.compare import Places
+from bemkit.reference import sampled_fields
+from bemkit.reference.compare import SamplePoints
 from bemkit.results.solution import Solution
 from bemkit.results.wedge import FREE, HELD, ROLLER, JoinedWedge, WedgeSide, joined_exponent, leading_exponent
 from bemkit.solvers.active_sets import NodeStatus
@@ -116,7 +116,7 @@ def test_displacements_at_an_angle_to_the_boundary_are_not_judged() -> None:
 
 
 def pressures(solution: bk.Solution, s: FloatArray) -> FloatArray:
-    return answer_of(solution, [Places("floor", s, np.ones_like(s))]).sigma_n
+    return sampled_fields(solution, [SamplePoints("floor", s, np.ones_like(s))]).sigma_n
 
 
 @pytest.mark.parametrize("coefficient", slow_except([0.3, 2.0], 2.0))
@@ -135,8 +135,8 @@ def l2_errors(solution: bk.Solution, exact: bk.Solution) -> tuple[float, float]:
     ends = np.geomspace(1e-10, 0.5, 400)
     edges = np.unique(np.concatenate([[0.0], ends, 1.0 - ends, *(t.s + 0.1 * ends for t in exact.transitions), [1.0]]))
     weight = np.diff(edges[edges <= 1.0])
-    places = [Places("floor", edges[edges <= 1.0][:-1] + 0.5 * weight, weight)]
-    mine, true = answer_of(solution, places), answer_of(exact, places)
+    places = [SamplePoints("floor", edges[edges <= 1.0][:-1] + 0.5 * weight, weight)]
+    mine, true = sampled_fields(solution, places), sampled_fields(exact, places)
     squared = weight * ((mine.sigma_n - true.sigma_n) ** 2 + (mine.sigma_t - true.sigma_t) ** 2)
     size = float(weight @ (true.sigma_n**2 + true.sigma_t**2))
     counts = np.isin(solution.mesh.part("floor"), solution.places.elements(""))

@@ -16,13 +16,13 @@ from bemkit.geometry.meshing.layers import (
     FACTOR,
     STEEPEST,
     layered_partition,
-    looking_partition,
     origins,
+    probing_partition,
     refined_partition,
     shortest_length,
 )
 from bemkit.geometry.outline import Selection
-from bemkit.reference import answer_of, errors_of, find_reference
+from bemkit.reference import errors_of, find_reference, sampled_fields
 from bemkit.runs.adaptive import run_adaptive
 from bemkit.runs.hp import LayeredMeshes, _settled
 from bemkit.scene.toml import SceneError, scene_from_toml, scene_to_toml, with_overrides
@@ -48,7 +48,7 @@ def traction_error(solution: bk.Solution) -> float:
     reference = find_reference(solution.scene)
     assert reference is not None
     weight = np.concatenate([places.weight for places in reference.places])
-    mine, exact = answer_of(solution, reference.places), reference.answer
+    mine, exact = sampled_fields(solution, reference.places), reference.answer
     miss = (mine.sigma_n - exact.sigma_n) ** 2 + (mine.sigma_t - exact.sigma_t) ** 2
     return float(np.sqrt(weight @ miss / (weight @ (exact.sigma_n**2 + exact.sigma_t**2))))
 
@@ -64,7 +64,7 @@ def test_few_meshes_lead_to_five_digits(name: str) -> None:
     assert len(solutions) <= 5
     assert last.mesh.n_elements <= 100
     assert last.certificate.worst <= 1e-9
-    errors = errors_of(answer_of(last, reference.places), reference)
+    errors = errors_of(sampled_fields(last, reference.places), reference)
     assert traction_error(last) <= 6e-5
     assert errors["energy"] <= 1e-7
     assert errors["transitions"] <= 3e-5
@@ -187,7 +187,7 @@ def test_the_last_mesh_has_no_layers_for_another_one() -> None:
     assert last.mesh.n_elements <= 50
     reference = find_reference(last.scene)
     assert reference is not None
-    assert errors_of(answer_of(last, reference.places), reference)["transitions"] <= 3e-7
+    assert errors_of(sampled_fields(last, reference.places), reference)["transitions"] <= 3e-7
 
 
 def test_what_is_smooth_takes_one_mesh() -> None:
@@ -226,13 +226,13 @@ def test_layers_stand_at_ends_and_not_on_symmetry_lines() -> None:
 
 def test_the_first_look_is_even_on_contact_parts_and_has_layers_at_their_ends() -> None:
     base = divide(bk.Rectangle(2.0, 1.0).outline(), {"floor": Selection(("bottom",))})
-    floor, *others = looking_partition(base, {"floor"}, 40).parameters
+    floor, *others = probing_partition(base, {"floor"}, 40).parameters
     lengths = np.diff(floor)
     np.testing.assert_allclose(lengths[2:-2], lengths[2], rtol=1e-12)
     np.testing.assert_allclose(lengths[[0, -1]], FACTOR * lengths[2], rtol=1e-12)
     assert lengths.size == 14  # a share of 40 by the roots of lengths, and two layers
     assert [len(s) - 1 for s in others] == [4, 4, 4]
-    floor = looking_partition(base.half(bk.Symmetry(x=1.0)), {"floor"}, 40).parameters[0]
+    floor = probing_partition(base.half(bk.Symmetry(x=1.0)), {"floor"}, 40).parameters[0]
     lengths = np.diff(floor)
     np.testing.assert_allclose(lengths[2:], lengths[2], rtol=1e-12)  # no layer on the symmetry line
     assert lengths[0] < lengths[1] < lengths[2]

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import bemkit as bk
-from bemkit.scene.places import Place, with_value
+from bemkit.scene.keys import Key, with_value
 from bemkit.scene.quantities import in_units_of_scene
 from bemkit.scene.toml import SceneError
 from bemkit.scene.unit_names import read_unit
@@ -71,12 +71,12 @@ def test_mistakes_name_key_value_and_remedy() -> None:
 
 def test_values_set_at_a_place_may_have_units() -> None:
     scene = bk.scene_from_toml(BLOCK.format(units=UNITS, **PLAIN))
-    assert with_value(scene, Place("material.youngs_modulus"), "70 GPa").material.youngs_modulus == pytest.approx(70e3)
-    load = with_value(scene, Place("parts.load.condition"), {"kind": "pressure", "pressure": "2 kN/mm^2"}).parts[1]
+    assert with_value(scene, Key("material.youngs_modulus"), "70 GPa").material.youngs_modulus == pytest.approx(70e3)
+    load = with_value(scene, Key("parts.load.condition"), {"kind": "pressure", "pressure": "2 kN/mm^2"}).parts[1]
     assert load.condition.pressure == pytest.approx(2000.0)
-    assert with_value(scene, Place("shape.corner[0]"), "-1 cm").shape.corner == pytest.approx((-10.0, 0.0))
+    assert with_value(scene, Key("shape.corner[0]"), "-1 cm").shape.corner == pytest.approx((-10.0, 0.0))
     with pytest.raises(bk.BemkitError, match=r"material.youngs_modulus: '7 kg' has a unit of another kind"):
-        with_value(scene, Place("material.youngs_modulus"), "7 kg")
+        with_value(scene, Key("material.youngs_modulus"), "7 kg")
 
 
 @pytest.mark.parametrize(

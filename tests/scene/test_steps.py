@@ -11,8 +11,8 @@ import pytest
 
 import bemkit as bk
 from bemkit.formulas import ExpressionError
+from bemkit.scene.keys import SceneKeyError
 from bemkit.scene.load_history import load_steps
-from bemkit.scene.places import PlaceError
 from bemkit.scene.toml import SceneError, scene_from_toml, scene_to_toml
 from tests.runs.test_rigid_bodies import driven
 
@@ -101,7 +101,7 @@ def test_steps_in_scene_files() -> None:
         ((bk.Step(1.0, {LOAD: "sqrt(t - 2)"}),), r"steps\[0\]: expression 'sqrt\(\(1\.0\) - 2\)' is nan"),
         ((bk.Step(1.0, {"law.friction_coefficient": "-t"}),), r"steps\[0\]: law: friction_coefficient = -1"),
         ((bk.Step(1.0, {"mesh.elements": 0.5}),), r"steps\[0\]: mesh\.elements: 0\.5 does not fit"),
-        ((bk.Step(1.0, {"law..x": 1.0}),), r"steps\[0\]: key 'law\.\.x': give a place in a scene file"),
+        ((bk.Step(1.0, {"law..x": 1.0}),), r"steps\[0\]: key 'law\.\.x': give a key of a scene file"),
         ((bk.Step(1.0, load_factor="x"), bk.Step(2.0)), r"steps\[0\]: load_factor is 'x' at t = 1: give a number"),
     ],
 )
@@ -163,6 +163,6 @@ def test_times_of_scenes_that_follow_each_other_increase() -> None:
 
 def test_places_name_what_does_not_fit() -> None:
     with pytest.raises(
-        PlaceError, match=r"steps\[0\]: parts\.foundation\.condition\.obstacle\.point\[2\]: unknown entry"
+        SceneKeyError, match=r"steps\[0\]: parts\.foundation\.condition\.obstacle\.point\[2\]: unknown entry"
     ):
         load_steps(replace(SCENE, steps=(bk.Step(1.0, {"parts.foundation.condition.obstacle.point[2]": 1.0}),)))

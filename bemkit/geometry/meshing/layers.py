@@ -36,7 +36,7 @@ LARGEST_TURN = np.pi / 4.0
 """Angle by which a curve may turn on one element."""
 
 
-def looking_partition(base: Division, even: Collection[str], n_elements: int) -> Partition:
+def probing_partition(base: Division, even: Collection[str], n_elements: int) -> Partition:
     """Divide an outline of whose solution nothing is known, to find where the contact status changes.
 
     Parameters

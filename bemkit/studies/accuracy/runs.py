@@ -15,7 +15,7 @@ import numpy as np
 
 from bemkit.errors import InputError
 from bemkit.geometry.meshing.discretise import Algebraic, Grading, Uniform
-from bemkit.reference.compare import MEASURES, Reference, answer_of, errors_of
+from bemkit.reference.compare import MEASURES, Reference, errors_of, sampled_fields
 from bemkit.runs.run import run as solve
 from bemkit.scene.discretisation import Discretisation, Galerkin
 from bemkit.scene.mesh_options import MeshOptions
@@ -165,14 +165,14 @@ def _run(
     if isinstance(element, str):
         word, element, options = element, Galerkin(2), replace(options, rising_degrees=True)
     else:
-        word = _word_of(element)
+        word = _name_of(element)
     changes = {"discretisation": element, "mesh": options, "solver": solver}
-    return Run(word, element.method, sequence.name, SOLVERS.word_of(solver), float(size), scene, changes)
+    return Run(word, element.method, sequence.name, SOLVERS.name_of(solver), float(size), scene, changes)
 
 
-def _word_of(element: Discretisation) -> str:
+def _name_of(element: Discretisation) -> str:
     """Return what names an element type in a study: its word in scene files, or its degree where that says more."""
-    word = DISCRETISATIONS.word_of(element)
+    word = DISCRETISATIONS.name_of(element)
     return f"degree {element.degree}" if word == "galerkin" and isinstance(element, Galerkin) else word
 
 
@@ -229,7 +229,7 @@ def _record(run: Run, found: Attempt, reference: Reference, measured: Mapping[st
     solution = found.solution
     errors: dict[str, Any] = dict.fromkeys(MEASURES, _NAN)
     if solution is not None and solution.is_certified:
-        errors = errors_of(answer_of(solution, reference.places), reference)
+        errors = errors_of(sampled_fields(solution, reference.places), reference)
     return ErrorRecord(
         discretisation=run.discretisation,
         map=run.map,

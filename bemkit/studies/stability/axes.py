@@ -109,7 +109,7 @@ def _similar_case(
 ) -> Case:
     keeps_steps = not baseline.scene.bodies and precision == PRECISION
     scene = changed(baseline, similarity.apply)
-    return Case(value, scene, similarity, precision=precision, drift_limit=precision, keeps_steps=keeps_steps)
+    return Case(value, scene, similarity, precision=precision, deviation_limit=precision, keeps_steps=keeps_steps)
 
 
 def similar(kind: type[Similarity | BodiesSimilarity], factor: str) -> Callable[[Solution, float], Case]:
@@ -207,7 +207,7 @@ def _stretched(baseline: Solution, value: float) -> Case:
 
 def _penalised(solver: Callable[[float], ContactSolver]) -> Callable[[Solution, float], Case]:
     # answers with a certificate of 1e-9 differ by that times the compliance of what is certified
-    return lambda baseline, rho: Case(rho, replace(baseline.scene, solver=solver(rho)), drift_limit=1e-6)
+    return lambda baseline, rho: Case(rho, replace(baseline.scene, solver=solver(rho)), deviation_limit=1e-6)
 
 
 def _elements(baseline: Solution, value: float) -> Case:
@@ -225,7 +225,7 @@ def _graded(baseline: Solution, value: float) -> Case:
         baseline.scene,
         levels=levels,
         precision=1e-6,
-        drift_limit=1e-6 if value >= _REFERENCE_GRADING else np.inf,
+        deviation_limit=1e-6 if value >= _REFERENCE_GRADING else np.inf,
     )
 
 

@@ -92,8 +92,8 @@ class Case:
     levels : int
         How often the elements at corners and ends of parts are halved, after the scene's own mesh is made.
     precision : float
-        Agreement owed by the similar twin of this case.
-    drift_limit : float
+        Agreement owed by the scaled copy of this case.
+    deviation_limit : float
         Agreement owed to the reference; infinite if the answer may change along the axis.
     keeps_steps : bool
         Whether active sets and the number of linear solves must be those of the reference as well.
@@ -106,7 +106,7 @@ class Case:
     similarity: Similarity | BodiesSimilarity = Similarity()
     levels: int = 0
     precision: float = PRECISION
-    drift_limit: float = float("inf")
+    deviation_limit: float = float("inf")
     keeps_steps: bool = False
     is_solvable: bool | None = None
 

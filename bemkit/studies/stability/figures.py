@@ -13,8 +13,8 @@ from bemkit.studies.stability.records import StabilityRecord, Verdict
 _SERIES = (
     ("certificate", "certificate of the driver", BLUE, "o"),
     ("check", "independent check", GREEN, "s"),
-    ("twin", "difference to the similar twin", ORANGE, "^"),
-    ("drift", "drift from the reference", GREY, "x"),
+    ("scaled_copy", "difference to the scaled copy", ORANGE, "^"),
+    ("deviation", "deviation from the reference", GREY, "x"),
 )
 _FLOOR = 1e-18
 

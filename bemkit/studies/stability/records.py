@@ -15,15 +15,15 @@ class Verdict(Enum):
     """Verdict on a record."""
 
     RIGHT = "right"
-    """Called converged; the independent check and the similar twin agree, and so does the reference where it must."""
+    """Called converged; the independent check and the scaled copy agree, and so does the reference where it must."""
     COARSE = "coarse"
     """The same, but the mesh is so coarse that tractions and displacements hardly belong together."""
     AMBIGUOUS = "ambiguous"
-    """The case and its twin each pass the independent check, and differ: nothing decides between several solutions."""
+    """The case and its scaled copy differ, and both pass the independent check: the problem has several solutions."""
     NAMED = "named"
-    """No answer, but a named status or error, and the same for the twin."""
+    """No answer, but a named status or error, and the same for the scaled copy."""
     WRONG = "wrong"
-    """Called converged against the evidence, refused although solvable, or an answer that the twin does not share."""
+    """Called converged against the evidence, refused although solvable, or different from the scaled copy."""
 
 
 @dataclass(frozen=True)
@@ -39,8 +39,8 @@ class StabilityRecord:
     check: float = column("largest entry of the independent check", format=".0e")
     reciprocity: float = column("error of Betti's theorem, up to the discretisation error", format=".0e")
     condition: float = column("condition of the contact stiffness with unit diagonal", format=".0e")
-    drift: float = column("largest difference from the reference, scaled back", format=".0e")
-    twin: float = column("largest difference from the scaled copy", format=".0e")
+    deviation: float = column("largest difference from the reference, scaled back", format=".0e")
+    scaled_copy: float = column("largest difference from the scaled copy", format=".0e")
     seconds: float = column("run time", "s", ".2f")
     message: str = column("of the solver or the error, or why the row is wrong")
 
@@ -50,8 +50,8 @@ class StabilityRecord:
         return self.axis, self.value
 
 
-FILE = RowFile("bemkit-stability 2", StabilityRecord, ("scene",))
-_HEADS = ("verdict", "status", "solves", "certificate", "check", "Betti", "condition", "drift", "twin")
+FILE = RowFile("bemkit-stability 3", StabilityRecord, ("scene",))
+_HEADS = ("verdict", "status", "solves", "certificate", "check", "Betti", "condition", "deviation", "copy")
 
 
 def table_of(records: Sequence[StabilityRecord]) -> Table:
@@ -73,7 +73,7 @@ def cells(record: StabilityRecord) -> list[str]:
     """Return the entries of a record as short texts: value, verdict, status, linear solves, then the numbers."""
     row = dict(zip(StabilityRecord.__dataclass_fields__, table_of([record]).cells()[0], strict=True))
     solves = row["linear_solves"] if record.linear_solves else ""
-    numbers = (row[name] for name in ("certificate", "check", "reciprocity", "condition", "drift", "twin"))
+    numbers = (row[name] for name in ("certificate", "check", "reciprocity", "condition", "deviation", "scaled_copy"))
     return [row["value"], record.verdict, record.status.replace("_", " "), solves, *numbers]
 
 

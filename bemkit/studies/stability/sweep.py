@@ -81,22 +81,22 @@ def _tasks(axis: Axis, baseline: Solution) -> list[Task[StabilityRecord]]:
 def solve_and_judge(
     axis: str, case: Case, reference: Solution | None, solve: Callable[..., Any] = run
 ) -> StabilityRecord:
-    """Solve a case of an axis and its twin, and judge them.
+    """Solve a case of an axis and its scaled copy, and judge them.
 
-    The drift is measured against the reference, which is None if it has no solution itself.
+    The deviation is measured against the reference, which is None if it has no solution itself.
     """
-    factors, twin_scene = _twin(case.scene)
-    first, second = _attempt(case.scene, case, solve), _attempt(twin_scene, case, solve)
+    factors, copied_scene = _scaled_copy(case.scene)
+    first, second = _attempt(case.scene, case, solve), _attempt(copied_scene, case, solve)
     solution = first.solution
-    drift = twin = math.nan
+    deviation = scaled_copy = math.nan
     check = None
     if solution is not None:
         check = _checked(solution)
         if reference is not None:
-            drift = difference(reference, solution, case.similarity)
+            deviation = difference(reference, solution, case.similarity)
         if second.solution is not None:
-            twin = difference(solution, second.solution, factors, in_mean=case.levels > 0)
-    verdict, objection = _judge(case, reference, first, second, check, drift, twin)
+            scaled_copy = difference(solution, second.solution, factors, in_mean=case.levels > 0)
+    verdict, objection = _judge(case, reference, first, second, check, deviation, scaled_copy)
     return StabilityRecord(
         axis=axis,
         value=case.value,
@@ -106,15 +106,15 @@ def solve_and_judge(
         certificate=math.nan if solution is None else solution.certificate.worst,
         check=math.nan if check is None else check.worst,
         reciprocity=math.nan if check is None else check.reciprocity,
-        condition=math.nan if solution is None else condition_number(twin_scene, case),
-        drift=drift,
-        twin=twin,
+        condition=math.nan if solution is None else condition_number(copied_scene, case),
+        deviation=deviation,
+        scaled_copy=scaled_copy,
         seconds=first.seconds,
         message=objection or ("" if first.is_converged else first.message),
     )
 
 
-def _twin(scene: Scene) -> tuple[Similarity | BodiesSimilarity, Scene]:
+def _scaled_copy(scene: Scene) -> tuple[Similarity | BodiesSimilarity, Scene]:
     """Return the similar scene, and how it is similar."""
     if scene.bodies:
         return TWIN_OF_BODIES, TWIN_OF_BODIES.apply(scene)
@@ -219,12 +219,12 @@ def _judge(
     first: Attempt,
     second: Attempt,
     check: Violations | None,
-    drift: float,
-    twin: float,
+    deviation: float,
+    scaled_copy: float,
 ) -> tuple[Verdict, str]:
     """Return the verdict and what speaks against the record, if anything does."""
     if first.status != second.status:
-        return Verdict.WRONG, f"{first.status}, but its similar twin: {second.status} ({second.message})"
+        return Verdict.WRONG, f"{first.status}, but its scaled copy: {second.status} ({second.message})"
     if not first.is_converged or first.solution is None or second.solution is None or check is None:
         if case.is_solvable or case.keeps_steps:
             return Verdict.WRONG, f"solvable, but: {first.message}"
@@ -232,19 +232,19 @@ def _judge(
     objections = {
         "no solution exists": case.is_solvable is False,
         f"the independent check finds {check.worst:.1e}": not check.is_good,
-        "drifts from the reference": math.isfinite(case.drift_limit) and not drift <= case.drift_limit,
+        "deviates from the reference": math.isfinite(case.deviation_limit) and not deviation <= case.deviation_limit,
     }
     if case.keeps_steps and reference is not None:
         objections["other active sets"] = not np.array_equal(first.solution.contact.status, reference.contact.status)
         objections["other linear solves"] = first.solution.linear_solves != reference.linear_solves
-    differs = not twin <= case.precision
-    is_another = differs and math.isinf(case.drift_limit) and _checked(second.solution).is_good
-    objections["the similar twin differs"] = differs and not is_another
+    differs = not scaled_copy <= case.precision
+    is_another = differs and math.isinf(case.deviation_limit) and _checked(second.solution).is_good
+    objections["the scaled copy differs"] = differs and not is_another
     found = [text for text, speaks_against in objections.items() if speaks_against]
     if found:
         return Verdict.WRONG, "; ".join(found)
     if differs:
-        return Verdict.AMBIGUOUS, "the similar twin is another solution by the independent check"
+        return Verdict.AMBIGUOUS, "the scaled copy is another solution by the independent check"
     if check.is_coarse:
         return Verdict.COARSE, f"Betti's theorem is missed by {check.reciprocity:.0%}: use more elements"
     return Verdict.RIGHT, ""

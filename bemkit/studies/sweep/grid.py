@@ -1,4 +1,4 @@
-"""Numbers of a scene by their places in scene files, the values that a sweep takes, and the scene with other ones."""
+"""Numbers of a scene by their keys, the values of a sweep, and the scene with other values."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from itertools import product
 
 import numpy as np
 
-from bemkit.scene.places import Place, PlaceError, value_at, with_value
+from bemkit.scene.keys import Key, SceneKeyError, value_at, with_value
 from bemkit.scene.scene import Scene
 from bemkit.studies.engine import StudyError
 
@@ -22,8 +22,8 @@ _DECIMAL = 12
 
 
 @dataclass(frozen=True)
-class Key(Place):
-    """The place of a number in a scene file; see `Place`."""
+class SweepKey(Key):
+    """The key of a number that a sweep varies."""
 
     @property
     def is_of_law(self) -> bool:
@@ -85,7 +85,7 @@ def _without_noise(value: float) -> float:
     return rounded if len(repr(rounded)) <= _DECIMAL else value
 
 
-def all_rows(vary: Mapping[str, Sequence[float]]) -> tuple[tuple[Key, ...], list[tuple[float, ...]]]:
+def all_rows(vary: Mapping[str, Sequence[float]]) -> tuple[tuple[SweepKey, ...], list[tuple[float, ...]]]:
     """Return the keys, and every combination of their values; that of the first key changes last.
 
     Raises
@@ -107,7 +107,7 @@ def all_rows(vary: Mapping[str, Sequence[float]]) -> tuple[tuple[Key, ...], list
     n_rows = math.prod(map(len, columns))
     if n_rows > MOST_ROWS:
         raise StudyError(f"there are {n_rows} rows: give fewer values, {MOST_ROWS} rows at most")
-    return tuple(Key(name) for name in vary), list(product(*columns))
+    return tuple(SweepKey(name) for name in vary), list(product(*columns))
 
 
 def _finite(value: object, name: str) -> float:
@@ -123,12 +123,12 @@ def _number(text: str, whole: str) -> float:
         raise StudyError(f"vary is {whole!r}: {text.strip()!r} is not a number: give numbers such as 0.5") from None
 
 
-def with_values(scene: Scene, values: Mapping[Key, float]) -> Scene:
+def with_values(scene: Scene, values: Mapping[SweepKey, float]) -> Scene:
     """Return a scene with other numbers at some places.
 
     Raises
     ------
-    PlaceError
+    SceneKeyError
         If a place does not exist in the scene, holds no number, or refuses a value; the message names the key.
     """
     for key, value in values.items():
@@ -138,14 +138,16 @@ def with_values(scene: Scene, values: Mapping[Key, float]) -> Scene:
     return scene
 
 
-def check_number(scene: Scene, key: Key) -> None:
+def check_number(scene: Scene, key: SweepKey) -> None:
     """Refuse a key that leads neither to a number nor to a formula that a number can replace; see `with_values`."""
     value = value_at(scene, key)
     if isinstance(value, tuple | list | np.ndarray):
-        raise PlaceError(f"{key.text} is a list: vary one number of it, such as {key.text}[0]")
+        raise SceneKeyError(f"{key.text} is a list: vary one number of it, such as {key.text}[0]")
     if isinstance(value, bool | str | Enum):
-        raise PlaceError(f"{key.text} is not a number; only numbers can be varied: write a scene file for each value")
+        raise SceneKeyError(
+            f"{key.text} is not a number; only numbers can be varied: write a scene file for each value"
+        )
     if is_dataclass(value) and not callable(value):
         names = [entry.name for entry in fields(value) if entry.init]
         remedy = f"vary one number of it, such as {key.text}.{names[0]}" if names else "there is no number in it"
-        raise PlaceError(f"{key.text} is a table: {remedy}")
+        raise SceneKeyError(f"{key.text} is a table: {remedy}")

@@ -18,7 +18,7 @@ from bemkit.runs.shared_body import SharedBody
 from bemkit.scene.scene import Scene, check_scene
 from bemkit.scene.toml import scene_to_toml
 from bemkit.studies.engine import Attempt, StudyError, Task, attempt, compute
-from bemkit.studies.sweep.grid import Key, all_rows, check_number, with_values
+from bemkit.studies.sweep.grid import SweepKey, all_rows, check_number, with_values
 from bemkit.studies.sweep.records import FILE, SweepRow, row_of
 from bemkit.studies.sweep.table import Sweep
 
@@ -101,7 +101,7 @@ def run_sweep(
 
 def sweep_tasks(
     scene: Scene,
-    keys: Sequence[Key],
+    keys: Sequence[SweepKey],
     grid: Sequence[Values],
     *,
     finished: Collection[object] = (),
@@ -152,5 +152,5 @@ def _solved_row(values: Values, solve: Callable[[], Solution], done: Callable[[]
     return row
 
 
-def _label(keys: Sequence[Key], values: Values) -> str:
+def _label(keys: Sequence[SweepKey], values: Values) -> str:
     return ", ".join(f"{key.text} = {value:g}" for key, value in zip(keys, values, strict=True))

@@ -26,7 +26,7 @@ from bemkit.testing.independent_check.views import BodyView, freed, obstacles_of
 
 
 @dataclass(frozen=True, eq=False)
-class MeasuredBody:
+class BodyMeasurements:
     """A body and what is measured again of it.
 
     Parameters
@@ -43,7 +43,7 @@ class MeasuredBody:
     is_touched: BoolArray
 
     @classmethod
-    def of(cls, result: SolvedBody, touched: tuple[str, ...], before: SolvedBody | None = None) -> MeasuredBody:
+    def of(cls, result: SolvedBody, touched: tuple[str, ...], before: SolvedBody | None = None) -> BodyMeasurements:
         """Measure a body with the names of its sides in contact, and what it was after the load step before."""
         view, earlier = freed(result), None if before is None else freed(before)
         mesh, boundary = result.mesh, boundary_of(view)
@@ -66,7 +66,7 @@ class MeasuredBody:
         strain = float(np.abs(strained_displacement(view)).max()) / self.result.mesh.diameter
         return max(self.scales.stress, strain * view.scene.material.plane_modulus)
 
-    def measured_by(self, least: float) -> MeasuredBody:
+    def measured_by(self, least: float) -> BodyMeasurements:
         """Return the body with units of a stress [Pa] at least, and of the displacement that it causes."""
         scales = self.scales
         length = least * self.result.mesh.diameter / self.result.scene.material.plane_modulus

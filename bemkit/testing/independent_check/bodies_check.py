@@ -12,7 +12,7 @@ from bemkit.results.solved_body import SideName
 from bemkit.testing.independent_check.balance import trusted_work
 from bemkit.testing.independent_check.check import contact_violations, is_finite, violations_of_body
 from bemkit.testing.independent_check.distances import gap_mismatch, hidden_overlaps, mean_mismatch
-from bemkit.testing.independent_check.joints import Joints
+from bemkit.testing.independent_check.interfaces import Interfaces
 from bemkit.testing.independent_check.verdict import COARSE_LIMIT, COARSE_SHARE, Violations
 
 
@@ -59,7 +59,7 @@ def violations_of_bodies(solution: Solution, before: Solution | None = None) -> 
     """
     if not is_finite(solution):
         return BodiesCheck.not_finite()
-    joints = Joints.of(solution, before)
+    joints = Interfaces.of(solution, before)
     bodies = joints.bodies.values()
     deepest, unsaid = hidden_overlaps(joints)
     return BodiesCheck(
@@ -93,7 +93,7 @@ def violations_of(step: Solution, before: Solution | None) -> Violations:
     return violations_of_body(step, before)
 
 
-def forces(joints: Joints) -> dict[SideName, tuple[FloatArray, float]]:
+def forces(joints: Interfaces) -> dict[SideName, tuple[FloatArray, float]]:
     """Return the resultant (2,) and size [N/m] of the forces on each side of the table."""
     table, found = joints.solution.contact, dict[SideName, tuple[FloatArray, float]]()
     acting = _nodal(joints)
@@ -106,14 +106,14 @@ def forces(joints: Joints) -> dict[SideName, tuple[FloatArray, float]]:
     return found
 
 
-def _nodal(joints: Joints) -> FloatArray:
+def _nodal(joints: Interfaces) -> FloatArray:
     """Return the forces (n_contact, 2) [N/m] on the bodies with the nodes."""
     table, normal = joints.solution.contact, joints.solution.contact_directions
     tangent = np.column_stack([-normal[:, 1], normal[:, 0]])
     return np.asarray(table.weight[:, None] * (table.sigma_n[:, None] * normal + table.sigma_t[:, None] * tangent))
 
 
-def rigid_mismatch(joints: Joints) -> float:
+def rigid_mismatch(joints: Interfaces) -> float:
     """Return how far rigid bodies are from moving, and being loaded, as prescribed [-].
 
     What acts on each besides its contacts balances these, at the points that the nodes may touch.
@@ -140,7 +140,7 @@ def rigid_mismatch(joints: Joints) -> float:
     return float(np.max(worst))
 
 
-def reaction_mismatch(joints: Joints) -> float:
+def reaction_mismatch(joints: Interfaces) -> float:
     """Return the largest difference [-] of what the elements of a side feel from what its contacts transmit."""
     worst = [0.0]
     for name, (force, size) in forces(joints).items():
@@ -152,7 +152,7 @@ def reaction_mismatch(joints: Joints) -> float:
     return float(np.max(worst))
 
 
-def largest_imbalance(joints: Joints) -> float:
+def largest_imbalance(joints: Interfaces) -> float:
     """Return the largest resultant on a body [-], of its loads, contacts and forces inside."""
     total = {name: (np.zeros(2), 0.0) for name in joints.bodies}
     for name, (force, size) in forces(joints).items():
@@ -160,7 +160,7 @@ def largest_imbalance(joints: Joints) -> float:
     return max(body.imbalance(*total[name]) for name, body in joints.bodies.items())
 
 
-def energy_mismatch(joints: Joints) -> float:
+def energy_mismatch(joints: Interfaces) -> float:
     """Return the difference [-] of the elastic energy from half the work of loads and contacts.
 
     As for one body nothing is compared where displacements are given or forces act inside, nor where half-planes move

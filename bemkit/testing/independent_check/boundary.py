@@ -23,7 +23,7 @@ _N_FITTED = 14
 """Points whose polynomial is differentiated: on an arc of 90 degrees 8 of them leave 1e-6, 14 of them round-off."""
 
 
-class Held(NamedTuple):
+class Support(NamedTuple):
     """A direction in which a support holds the nodes of its elements.
 
     Parameters
@@ -57,7 +57,7 @@ class Boundary:
         Lagrange polynomials at the quadrature points; zero for rows that an element of a lower degree repeats.
     traction : (n_elements, n_places, 2) array [Pa]
         Loads as they are given, reactions of supports as means of elements; none of contact, which is known at nodes.
-    held : tuple of Held
+    held : tuple of Support
     """
 
     points: FloatArray
@@ -68,7 +68,7 @@ class Boundary:
     node_normals: FloatArray
     basis: FloatArray
     traction: FloatArray
-    held: tuple[Held, ...]
+    held: tuple[Support, ...]
 
     @property
     def lengths(self) -> FloatArray:
@@ -142,7 +142,7 @@ def _tractions(solution: BodyView, points: FloatArray, normals: FloatArray) -> F
     return traction
 
 
-def _held(solution: BodyView, node_points: FloatArray, node_normals: FloatArray) -> Iterator[Held]:
+def _held(solution: BodyView, node_points: FloatArray, node_normals: FloatArray) -> Iterator[Support]:
     """Yield the directions in which the supports hold the body."""
     for part in solution.scene.parts:
         elements = solution.mesh.part(part.name)
@@ -154,12 +154,12 @@ def _held(solution: BodyView, node_points: FloatArray, node_normals: FloatArray)
                 given = condition.at(points.reshape(-1, 2)).reshape(points.shape)
                 components = np.flatnonzero(is_prescribed).tolist()
             case Roller():
-                yield Held(elements, node_normals[elements], np.zeros(points.shape[:2]))
+                yield Support(elements, node_normals[elements], np.zeros(points.shape[:2]))
                 continue
             case _:
                 continue
         for component in components:
-            yield Held(elements, np.broadcast_to(np.eye(2)[component], points.shape), given[:, :, component])
+            yield Support(elements, np.broadcast_to(np.eye(2)[component], points.shape), given[:, :, component])
 
 
 class Scales(NamedTuple):

@@ -27,7 +27,7 @@ from bemkit.testing.independent_check.views import BodyView, view_of
 
 
 @dataclass(frozen=True, eq=False)
-class Measured:
+class ContactMeasurements:
     """Dimensionless contact quantities at each node, all (n_contact,) arrays.
 
     Parameters
@@ -49,7 +49,7 @@ class Measured:
     obeys_friction: BoolArray
 
 
-def measured_contact(fields: Fields) -> Measured:
+def measured_contact(fields: Fields) -> ContactMeasurements:
     """Return the contact quantities that the laws speak of.
 
     Displacements are those of the boundary field, tractions those of the table. Slip counts from the load step before,
@@ -78,7 +78,7 @@ def measure(
     slip: FloatArray,
     is_supported: BoolArray,
     units: tuple[FloatArray, FloatArray],
-) -> Measured:
+) -> ContactMeasurements:
     """Return the quantities in the friction laws.
 
     Parameters
@@ -101,7 +101,7 @@ def measure(
     # cohesion acts shall not depend on a traction of 1e-16.
     acts = (held > np.abs(clearance)) | acts_across_gap
     bound = np.where(acts, law.bound(np.minimum(table.sigma_n, 0.0)), 0.0) / stress
-    return Measured(pressure, shear, clearance, slip / length, held, bound, ~is_supported)
+    return ContactMeasurements(pressure, shear, clearance, slip / length, held, bound, ~is_supported)
 
 
 def obstacle_mismatch(fields: Fields) -> float:
@@ -169,13 +169,13 @@ def resultant_mismatch(solution: Solution) -> float:
     return max(normal, tangential) / size
 
 
-def slip_opposition(measured: Measured) -> float:
+def slip_opposition(measured: ContactMeasurements) -> float:
     """Return the largest slip [-] that friction does not fully oppose: the smaller of slip and missing traction."""
     missing = np.abs(measured.shear + np.sign(measured.slip) * measured.bound)
     return largest(np.minimum(np.abs(measured.slip), missing)[measured.obeys_friction])
 
 
-def status_mismatch(status: IntArray, measured: Measured) -> float:
+def status_mismatch(status: IntArray, measured: ContactMeasurements) -> float:
     """Return the largest violation [-] of what the status of a node claims."""
     direction = np.select([status == NodeStatus.SLIP_FORWARD, status == NodeStatus.SLIP_BACKWARD], [1.0, -1.0])
     slides_freely = measured.bound <= CONTACT_LIMIT
@@ -187,7 +187,7 @@ def status_mismatch(status: IntArray, measured: Measured) -> float:
     return max(largest(measured.held[is_open]), largest(np.abs(measured.clearance)[~is_open]), largest(friction))
 
 
-def contact_violations(measured: Measured, solution: Solution, *, knows_slip: bool) -> dict[str, float]:
+def contact_violations(measured: ContactMeasurements, solution: Solution, *, knows_slip: bool) -> dict[str, float]:
     """Return the violations of the conditions of contact; see `Violations`.
 
     At the end of a load history slip that counts from the step before is not known without that step: `knows_slip`.

@@ -7,7 +7,7 @@ import numpy as np
 from bemkit.arrays import FloatArray
 from bemkit.scene.conditions import Contact
 from bemkit.testing.independent_check.boundary import EPSILON, beyond, largest
-from bemkit.testing.independent_check.joints import Joints
+from bemkit.testing.independent_check.interfaces import Interfaces
 from bemkit.testing.independent_check.nodes import distance_to, mean_normals
 from bemkit.testing.independent_check.sides import measure_flat, sampled_overlap
 
@@ -20,7 +20,7 @@ _DIRECTIONS = 1e-2
 that parabolas interpolate on an element which turns by t differ by t^3 / 125: 3e-2 of 90 degrees."""
 
 
-def gap_mismatch(joints: Joints) -> float:
+def gap_mismatch(joints: Interfaces) -> float:
     """Return the largest difference [-] of gaps from distances measured again."""
     table, worst = joints.solution.contact, [0.0]
     length, _ = joints.units()
@@ -43,7 +43,7 @@ def gap_mismatch(joints: Joints) -> float:
     return float(np.max(worst))
 
 
-def _from_obstacle(joints: Joints, name: str) -> FloatArray:
+def _from_obstacle(joints: Interfaces, name: str) -> FloatArray:
     """Return differences [m] of gaps from the distances of a rigid obstacle, in its position before it moves."""
     table, rows = joints.solution.contact, joints.solution.contact.rows(name)
     points = np.column_stack([table.x, table.y])[rows]
@@ -63,7 +63,7 @@ def _from_obstacle(joints: Joints, name: str) -> FloatArray:
     return np.abs(table.gap[rows][known] - distance[known] - added[known])
 
 
-def mean_mismatch(joints: Joints) -> float:
+def mean_mismatch(joints: Interfaces) -> float:
     """Return the largest difference [-] of relative displacements of flat sides from their means in the table."""
     table, worst = joints.solution.contact, [0.0]
     lengths, _ = joints.units()
@@ -84,7 +84,7 @@ def mean_mismatch(joints: Joints) -> float:
     return float(np.max(worst))
 
 
-def hidden_overlaps(joints: Joints) -> tuple[float, float]:
+def hidden_overlaps(joints: Interfaces) -> tuple[float, float]:
     """Return how deep points of one side are in the other one, over the displacement that strains the bodies.
 
     Returns

@@ -14,7 +14,7 @@ from scipy.spatial import cKDTree
 from bemkit.arrays import FloatArray, IntArray
 from bemkit.geometry.local_values import values_on_elements
 from bemkit.scene.contacts import ContactPair
-from bemkit.testing.independent_check.bodies import MeasuredBody
+from bemkit.testing.independent_check.bodies import BodyMeasurements
 
 _PARALLEL = 1e-9
 _SLIVER = 1e-9
@@ -33,7 +33,7 @@ _BESIDE = 1e-6
 class Side:
     """Elements of one body in a contact."""
 
-    body: MeasuredBody
+    body: BodyMeasurements
     elements: IntArray
 
     @property

@@ -52,7 +52,7 @@ def test_the_ends_of_every_axis_are_right_or_named(pin, name):
         assert verdict in (Verdict.RIGHT, Verdict.NAMED), row
         if name in SIMILAR:
             assert verdict is Verdict.RIGHT
-            assert row.drift < 1e-10  # 1e-12 found: round-off of coordinates
+            assert row.deviation < 1e-10  # 1e-12 found: round-off of coordinates
 
 
 @pytest.mark.parametrize("name", slow_except(SIMILAR, "turn"))
@@ -63,7 +63,7 @@ def test_parts_chosen_by_a_region_follow_the_body(name):
     (axis,) = find_axes([name], AXES_OF_BODIES)
     (row,) = sweep(cylinders, [dataclasses.replace(axis, values=EXTREMES[name][-1:])])
     assert Verdict(row.verdict) is Verdict.RIGHT
-    assert row.drift < 1e-10
+    assert row.deviation < 1e-10
 
 
 def test_curved_bodies_far_away_are_what_they_are_at_home():
@@ -79,7 +79,7 @@ def test_curved_bodies_far_away_are_what_they_are_at_home():
         run(dataclasses.replace(cylinders, bodies=(upper, *others), contacts=(), law=Frictionless()))
 
 
-def test_a_twin_that_is_not_similar_is_seen(pin):
+def test_a_copy_that_is_not_similar_is_seen(pin):
     one, other = run(pin), run(dataclasses.replace(TWIN_OF_BODIES, stress=1.0).apply(pin))
     assert difference(one, other, TWIN_OF_BODIES) > 0.1
     assert difference(one, other, dataclasses.replace(TWIN_OF_BODIES, stress=1.0)) < 1e-9
@@ -117,7 +117,7 @@ def test_rigid_bodies_and_load_steps_have_similar_ones(sheared, name):
     (row,) = sweep(sheared, [dataclasses.replace(axis, values=values)])
     assert Verdict(row.verdict) is Verdict.RIGHT, row
     if name in SIMILAR:
-        assert row.drift < 1e-8  # the certificate of a press by forces, 1e-9, in displacements of a soft half-space
+        assert row.deviation < 1e-8  # the certificate of a press by forces, 1e-9, in displacements of a soft half-space
 
 
 def test_steps_count_in_similar_assemblies(sheared):

@@ -85,7 +85,7 @@ def test_curved_bodies_far_away_are_what_they_are_at_home(elements: int) -> None
     axis = dataclasses.replace(shortened("position"), values=(1.0, 1e6, 1e8))
     rows = list(sweep(disc, [axis]))
     assert [row.verdict for row in rows] == ["right"] * 2 + ["named"]
-    assert rows[0].drift <= 1e-12
+    assert rows[0].deviation <= 1e-12
     assert "times its size from the origin" in rows[-1].message
 
 
@@ -101,9 +101,9 @@ def test_a_case_that_cannot_be_made_is_a_named_row_and_the_sweep_goes_on() -> No
 
 def test_answers_approach_the_incompressible_one_smoothly() -> None:
     axis = dataclasses.replace(shortened("poisson-ratio"), values=(0.49, 0.499, 0.4999, 0.49999))
-    drifts = [row.drift for row in sweep(small_paper_scene(1), [axis])]
+    deviations = [row.deviation for row in sweep(small_paper_scene(1), [axis])]
     # proportional to 1/2 - nu; sets change on the way, so the first ratio is not exact
-    np.testing.assert_allclose(np.array(drifts[:-1]) / drifts[1:], 10.0, rtol=0.2)
+    np.testing.assert_allclose(np.array(deviations[:-1]) / deviations[1:], 10.0, rtol=0.2)
 
 
 def altered(solution: bk.Solution) -> bk.Solution:
@@ -133,16 +133,16 @@ def test_an_answer_that_depends_on_the_units_is_found_out() -> None:
         return bk.run(dataclasses.replace(scene, law=bk.Coulomb(0.4)) if stiff else scene)
 
     assert row_of(Case(1.0, scene), reference, unit_bound).verdict == "ambiguous"
-    held_to_it = row_of(Case(1.0, scene, drift_limit=1e-6), reference, unit_bound)
+    held_to_it = row_of(Case(1.0, scene, deviation_limit=1e-6), reference, unit_bound)
     assert held_to_it.verdict == "wrong"
-    assert "similar twin differs" in held_to_it.message
+    assert "scaled copy differs" in held_to_it.message
 
 
-def test_drift_unsolvable_claims_and_other_statuses_are_found_out() -> None:
+def test_deviation_unsolvable_claims_and_other_statuses_are_found_out() -> None:
     scene = small_paper_scene(1)
     reference = bk.run(scene)
     other = dataclasses.replace(scene, law=bk.Coulomb(0.4))
-    assert "drifts" in row_of(Case(1.0, other, drift_limit=1e-6), reference).message
+    assert "deviates" in row_of(Case(1.0, other, deviation_limit=1e-6), reference).message
     assert "other" in row_of(Case(1.0, other, keeps_steps=True), reference).message
     assert "no solution exists" in row_of(Case(1.0, scene, is_solvable=False), reference).message
     few = dataclasses.replace(scene, solver=bk.SemismoothNewton(max_steps=1))
@@ -150,7 +150,7 @@ def test_drift_unsolvable_claims_and_other_statuses_are_found_out() -> None:
     assert (named.verdict, named.status) == ("named", "max_steps")
     assert row_of(Case(1.0, few, is_solvable=True), reference).verdict == "wrong"
     stiff_fails = lambda scene, mesh=None: bk.run(few if scene.material.youngs_modulus > 1e6 else scene)  # noqa: E731
-    assert "but its similar twin: max_steps" in row_of(Case(1.0, scene), reference, stiff_fails).message
+    assert "but its scaled copy: max_steps" in row_of(Case(1.0, scene), reference, stiff_fails).message
 
 
 def test_an_error_without_a_name_is_not_hidden() -> None:

@@ -8,16 +8,16 @@ import numpy as np
 import pytest
 
 import bemkit as bk
-from bemkit.scene.places import PlaceError
+from bemkit.scene.keys import SceneKeyError
 from bemkit.studies.engine import StudyError
-from bemkit.studies.sweep.grid import Key, all_rows, check_number, read_variation, with_values
+from bemkit.studies.sweep.grid import SweepKey, all_rows, check_number, read_variation, with_values
 
 SCENE = bk.load_scene("paper-1")
 BODIES = bk.load_scene("two-cylinders")
 
 
 def changed(scene: bk.Scene | bk.Scene, key: str, value: float) -> bk.Scene | bk.Scene:
-    return with_values(scene, {Key(key): value})
+    return with_values(scene, {SweepKey(key): value})
 
 
 def test_numbers_of_a_scene_are_changed_and_nothing_else() -> None:
@@ -54,21 +54,21 @@ def test_numbers_of_several_bodies_are_changed() -> None:
         (SCENE, "law[0]", r"law is not a list: remove \[0\]"),
         (SCENE, "material.plane", "material.plane is not a number; only numbers can be varied"),
         (SCENE, "symmetry.x", "symmetry is not given in the scene: write it there first"),
-        (SCENE, "law..x", "give a place in a scene file, such as law.friction_coefficient"),
+        (SCENE, "law..x", "give a key of a scene file, such as law.friction_coefficient"),
         (BODIES, "bodies.uper.material.youngs_modulus", "bodies.uper: unknown key: .*did you mean 'upper'"),
         (BODIES, "contacts[1].gap", r"contacts\[1\]: unknown entry: contacts has 1"),
         (BODIES, "contacts[0].law.friction_coefficient", "law is not given in the scene"),
     ],
 )
 def test_keys_that_lead_to_no_number_are_named(scene: bk.Scene | bk.Scene, key: str, message: str) -> None:
-    with pytest.raises(PlaceError, match=message):
-        check_number(scene, Key(key))
+    with pytest.raises(SceneKeyError, match=message):
+        check_number(scene, SweepKey(key))
 
 
 def test_values_that_a_scene_refuses_are_named_with_their_key() -> None:
-    with pytest.raises(PlaceError, match=r"^material: poisson_ratio is 0\.7"):
+    with pytest.raises(SceneKeyError, match=r"^material: poisson_ratio is 0\.7"):
         changed(SCENE, "material.poisson_ratio", 0.7)
-    with pytest.raises(PlaceError, match=r"^mesh\.elements: 40\.5 does not fit: give a whole number"):
+    with pytest.raises(SceneKeyError, match=r"^mesh\.elements: 40\.5 does not fit: give a whole number"):
         changed(SCENE, "mesh.elements", 40.5)
 
 
@@ -89,11 +89,11 @@ def test_values_that_a_scene_refuses_are_named_with_their_key() -> None:
     ],
 )
 def test_which_keys_keep_the_bodies(key: str, keeps: bool) -> None:
-    assert Key(key).keeps_bodies == keeps
+    assert SweepKey(key).keeps_bodies == keeps
 
 
 def test_names_with_dots_stand_in_quotation_marks() -> None:
-    assert Key('parts."a.b".condition.y').names == ("parts", "a.b", "condition", "y")
+    assert SweepKey('parts."a.b".condition.y').names == ("parts", "a.b", "condition", "y")
 
 
 def test_words_of_the_command_line() -> None:

@@ -10,7 +10,7 @@ from bemkit.contact.obstacle import Gap
 from bemkit.errors import InputError
 from bemkit.geometry.shapes import Ring
 from bemkit.operators.material import Material
-from bemkit.reference import LameRing, RecedingLayer, answer_of, errors_of, find_reference
+from bemkit.reference import LameRing, RecedingLayer, errors_of, find_reference, sampled_fields
 from bemkit.results.solution import Solution
 from bemkit.runs.run import run
 from bemkit.scene.conditions import Contact, Part, Pressure
@@ -139,6 +139,6 @@ def _errors(scene: str, bounds: Mapping[str, tuple[float, ...]]) -> tuple[Quanti
         raise InputError(f"scene {scene!r} has no reference: give it one in bemkit.reference.shipped")
 
     def error(name: str) -> Measure:
-        return lambda solution: errors_of(answer_of(solution, reference.places), reference)[name]
+        return lambda solution: errors_of(sampled_fields(solution, reference.places), reference)[name]
 
     return tuple(Quantity(_NAMES.get(name, name), error(name), bound) for name, bound in bounds.items())

@@ -1,4 +1,4 @@
-"""Places in scenes by the keys of scene files, and scenes with other values there."""
+"""Keys of scene files: the value of a scene at a key, and the scene with another value there."""
 
 from __future__ import annotations
 
@@ -27,45 +27,45 @@ _STEP = re.compile(rf"{_NAME}|\[\d+\]")
 Node = TypeVar("Node")
 
 
-class PlaceError(InputError):
+class SceneKeyError(InputError):
     """A key that a scene does not have, or a value that does not fit there; the message names the key."""
 
 
 @dataclass(frozen=True)
-class Place:
-    """A place in a scene file.
+class Key:
+    """The path of a value in a scene file.
 
     Parameters
     ----------
     text : str
-        Names with dots between them, and numbers of list entries from 0 on in brackets:
+        Names with dots between them, and indices of list entries from 0 on in brackets:
         ``bodies.punch.placement.shift[0]``. Quote a name with a dot.
 
     Raises
     ------
-    PlaceError
-        If the text is no such place.
+    SceneKeyError
+        If the text has another form.
     """
 
     text: str
 
     def __post_init__(self) -> None:
         if not _PLACE.fullmatch(self.text):
-            raise PlaceError(f"key {self.text!r}: give a place in a scene file, such as law.friction_coefficient")
+            raise SceneKeyError(f"key {self.text!r}: give a key of a scene file, such as law.friction_coefficient")
 
     @property
     def names(self) -> tuple[str | int, ...]:
-        """The names and numbers of the path, from the outside in."""
+        """The names and indices of the path, from the outside in."""
         steps = _STEP.findall(self.text)
         return tuple(int(name[1:-1]) if name.startswith("[") else name.strip('"') for name in steps)
 
 
-def read_setting(text: str) -> tuple[Place, object]:
-    """Return place and value of ``KEY=VALUE``, the value as in scene files; a word needs no quotation marks.
+def read_setting(text: str) -> tuple[Key, object]:
+    """Return key and value of ``KEY=VALUE``, the value as in scene files; a word needs no quotation marks.
 
     Raises
     ------
-    PlaceError
+    SceneKeyError
         If the text has another form.
     """
     import tomllib
@@ -73,63 +73,63 @@ def read_setting(text: str) -> tuple[Place, object]:
     # the key of a scene file may hold an equals sign only inside quotation marks
     found = re.fullmatch(r'\s*((?:"[^"]*"|[^"=])+?)\s*=\s*(.+?)\s*', text, re.DOTALL)
     if not found:
-        raise PlaceError(f"set is {text!r}: give KEY=VALUE, such as law.friction_coefficient=0.3")
-    place, value = Place(found[1]), found[2]
+        raise SceneKeyError(f"set is {text!r}: give KEY=VALUE, such as law.friction_coefficient=0.3")
+    key, value = Key(found[1]), found[2]
     try:
-        return place, tomllib.loads(f"value = {value}")["value"]
+        return key, tomllib.loads(f"value = {value}")["value"]
     except (tomllib.TOMLDecodeError, KeyError, ValueError, RecursionError):
         if value[0] in "[{\"'":
-            raise PlaceError(
-                f"{place.text}: {value!r} is not a value of a scene file: check brackets and quotes"
+            raise SceneKeyError(
+                f"{key.text}: {value!r} is not a value of a scene file: check brackets and quotes"
             ) from None
-        return place, value
+        return key, value
 
 
 def with_settings(scene: Node, texts: Sequence[str]) -> Node:
-    """Return a scene with other values at some places, each given as ``KEY=VALUE``; see `with_value`.
+    """Return a scene with other values at some keys, each given as ``KEY=VALUE``; see `with_value`.
 
     Raises
     ------
-    PlaceError
-        If a text has another form, there is no such place, or its value does not fit there.
+    SceneKeyError
+        If a text has another form, there is no such key, or its value does not fit there.
     """
     for text in texts:
         scene = with_value(scene, *read_setting(text))
     return scene
 
 
-def value_at(scene: object, place: Place) -> Any:
-    """Return the value at a place of a scene.
+def value_at(scene: object, key: Key) -> Any:
+    """Return the value at a key of a scene.
 
     Raises
     ------
-    PlaceError
-        If there is no such place.
+    SceneKeyError
+        If there is no such key.
     """
     node, declared, path = scene, cast(Any, type(scene)), ""
-    for name in place.names:
+    for name in key.names:
         node, declared, path = _inside(node, declared, name, path)
     return node
 
 
-def with_value(scene: Node, place: Place, value: object) -> Node:
-    """Return a scene with another value at a place; all else are the same objects.
+def with_value(scene: Node, key: Key, value: object) -> Node:
+    """Return a scene with another value at a key; all else are the same objects.
 
     Parameters
     ----------
     scene : Scene
-    place : Place
+    key : Key
     value : object
         As scene files state it (a number, also with a unit, a formula, a word, a list or a table), or an object of
         Python.
 
     Raises
     ------
-    PlaceError
-        If there is no such place, or the value does not fit there.
+    SceneKeyError
+        If there is no such key, or the value does not fit there.
     """
     fitting = partial(_fitting, value, cast(Any, scene).units)
-    changed: Node = _replaced(scene, type(scene), place.names, fitting, "", None)
+    changed: Node = _replaced(scene, type(scene), key.names, fitting, "", None)
     return changed
 
 
@@ -141,7 +141,7 @@ def _replaced(
     path: str,
     field: tuple[type, str] | None,
 ) -> Any:
-    """Return an object with another value at a place inside; `field`: class and name of the field it is in."""
+    """Return an object with another value at a key inside; `field`: class and name of the field it is in."""
     if not names:
         return fitting(declared, path, field)
     name, rest = names[0], names[1:]
@@ -158,14 +158,14 @@ def _replaced(
         return (*node[:number], changed, *node[number + 1 :])
     try:
         return replace(node, **{str(name): changed})
-    except PlaceError:
+    except SceneKeyError:
         raise
     except ValueError as error:
-        raise PlaceError(f"{path}: {error}" if path else str(error)) from error
+        raise SceneKeyError(f"{path}: {error}" if path else str(error)) from error
 
 
 def _fitting(value: object, units: UnitNames | None, declared: Any, path: str, field: tuple[type, str] | None) -> Any:
-    """Return a value in the type that the place has, a number with a unit in the units of the scene."""
+    """Return a value in the type at the key, a number with a unit in the units of the scene."""
     if not isinstance(value, bool | int | float | str | list | dict):
         return value
     from bemkit.scene.serialisation import StructureError, structure  # heavy, and only for scenes that change
@@ -173,19 +173,19 @@ def _fitting(value: object, units: UnitNames | None, declared: Any, path: str, f
     try:
         return structure(value, declared, units, field)
     except StructureError as error:
-        raise PlaceError(f"{path}: {error}") from error
+        raise SceneKeyError(f"{path}: {error}") from error
 
 
 def _inside(node: Any, declared: Any, name: str | int, path: str) -> tuple[Any, Any, str]:
     """Return the entry of an object under a name or number, its declared type, and its path."""
     if node is None:
-        raise PlaceError(f"{path} is not given in the scene: write it there first")
+        raise SceneKeyError(f"{path} is not given in the scene: write it there first")
     inner_path = f"{path}[{name}]" if isinstance(name, int) else f"{path}.{name}".lstrip(".")
     if isinstance(name, int):
         if not isinstance(node, tuple | list | np.ndarray):
-            raise PlaceError(f"{inner_path}: {path} is not a list: remove [{name}]")
+            raise SceneKeyError(f"{inner_path}: {path} is not a list: remove [{name}]")
         if name >= len(node):
-            raise PlaceError(f"{inner_path}: unknown entry: {path} has {len(node)}, counted from 0")
+            raise SceneKeyError(f"{inner_path}: unknown entry: {path} has {len(node)}, counted from 0")
         return node[name], _entry_type(declared, name, node[name]), inner_path
     if isinstance(node, tuple | list) and node and isinstance(node[0], Part | Body | RigidBody):
         named = {entry.name: entry for entry in node}
@@ -196,7 +196,7 @@ def _inside(node: Any, declared: Any, name: str | int, path: str) -> tuple[Any, 
         _known(name, [entry.name for entry in fields(node) if entry.init and entry.name != "name"], path)
         return getattr(node, name), hints_of(cast(type, type(node)))[name], inner_path
     kind = "a list: give the number of an entry, such as [0]" if isinstance(node, tuple | list) else "not a table"
-    raise PlaceError(f"{path}.{name}: unknown key: {path} is {kind}")
+    raise SceneKeyError(f"{path}.{name}: unknown key: {path} is {kind}")
 
 
 def _entry_type(declared: Any, number: int, entry: object) -> Any:
@@ -213,4 +213,4 @@ def _known(name: str, names: list[str], path: str) -> str:
     if name in names:
         return name
     known = f"the keys are {', '.join(names)}" if names else "there are no keys here"
-    raise PlaceError(f"{f'{path}.{name}'.lstrip('.')}: unknown key: {known}{closest(name, names, SYNONYMS)}")
+    raise SceneKeyError(f"{f'{path}.{name}'.lstrip('.')}: unknown key: {known}{closest(name, names, SYNONYMS)}")

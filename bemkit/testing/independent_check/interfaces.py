@@ -14,9 +14,9 @@ from bemkit.results.contact_table import ContactTable
 from bemkit.results.solution import Solution
 from bemkit.results.solved_body import SideName
 from bemkit.scene.contacts import ContactPair
-from bemkit.testing.independent_check.bodies import MeasuredBody
+from bemkit.testing.independent_check.bodies import BodyMeasurements
 from bemkit.testing.independent_check.boundary import trusted_stress
-from bemkit.testing.independent_check.check import Measured, measure
+from bemkit.testing.independent_check.check import ContactMeasurements, measure
 from bemkit.testing.independent_check.sides import Side
 
 LIGHTEST = 1e-3
@@ -24,13 +24,13 @@ LIGHTEST = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
-class Joints:
+class Interfaces:
     """The contacts of a scene and the bodies that they join.
 
     Parameters
     ----------
     solution : Solution
-    bodies : mapping of str to MeasuredBody
+    bodies : mapping of str to BodyMeasurements
     pairs : mapping of str to ContactPair
         By name, those between elastic bodies.
     moving : mapping of str to ContactPair
@@ -38,12 +38,12 @@ class Joints:
     """
 
     solution: Solution
-    bodies: Mapping[str, MeasuredBody]
+    bodies: Mapping[str, BodyMeasurements]
     pairs: Mapping[str, ContactPair]
     moving: Mapping[str, ContactPair]
 
     @classmethod
-    def of(cls, solution: Solution, before: Solution | None = None) -> Joints:
+    def of(cls, solution: Solution, before: Solution | None = None) -> Interfaces:
         """Measure the bodies of a solution, and find whose nodes the rows of its table are.
 
         What is left of the load step `before` is known no better than that was.
@@ -57,7 +57,7 @@ class Joints:
                 touched[body].append(part)
         earlier = {} if before is None else before.bodies
         views = {
-            name: MeasuredBody.of(body, tuple(touched[name]), earlier.get(name))
+            name: BodyMeasurements.of(body, tuple(touched[name]), earlier.get(name))
             for name, body in solution.bodies.items()
         }
         most = max(body.largest_stress for body in views.values())
@@ -96,7 +96,7 @@ class Joints:
             stress[rows] = max(min(each.stress for each in scales), trusted)
         return length, stress
 
-    def measured(self, before: Solution | None) -> Measured:
+    def measured(self, before: Solution | None) -> ContactMeasurements:
         """Return the contact quantities that the laws speak of."""
         table, units = self.solution.contact, self.units()
         points = np.column_stack([table.x, table.y])
@@ -111,8 +111,8 @@ class Joints:
             supported = self._is_supported(name)
             parts.append(measure(own, law, own.u_n, slip[rows], supported, (units[0][rows], units[1][rows])))
         order = np.argsort(np.concatenate([np.flatnonzero(table.rows(name)) for name in table.parts]))
-        entries = ([getattr(part, entry.name) for part in parts] for entry in fields(Measured))
-        return Measured(*(np.concatenate(entry)[order] for entry in entries))
+        entries = ([getattr(part, entry.name) for part in parts] for entry in fields(ContactMeasurements))
+        return ContactMeasurements(*(np.concatenate(entry)[order] for entry in entries))
 
     def _is_supported(self, name: str) -> BoolArray:
         """Return which nodes of a contact a support holds, or another obstacle of the body shares."""
