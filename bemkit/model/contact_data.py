@@ -108,26 +108,45 @@ def find_contact(
     parts, sides = _nearest_of_each_part(
         parts, [_Side.of(one.obstacle, mesh.part(one.part), mesh, space) for one in parts]
     )
+    # each node belongs to the nearest obstacle, in whose direction it touches
     owner = _owners(sides, space.n_dofs // 2, GAP_TOLERANCE * mesh.diameter)
-    directions = np.zeros((owner.size, 2))
-    for number, side in enumerate(sides):
-        is_owned = owner[side.nodes] == number
-        directions[side.nodes[is_owned]] = side.directions[is_owned]
-    is_smooth = np.array([one.is_frictionless for one in parts])
-    seconds = [
-        is_smooth[number] & is_smooth[owner[side.nodes]] & side.crosses(directions) & (owner[side.nodes] != number)
-        for number, side in enumerate(sides)
-    ]
+    directions = _directions_of_owners(sides, owner)
+    # a node in a corner without friction touches the other obstacle, too: a second row
+    is_second = _second_rows(parts, sides, owner, directions)
+    # second rows keep the length of their part; all other length goes to the owner's row of a node
     weights = np.zeros(owner.size)
-    for side, is_second in zip(sides, seconds, strict=True):
-        np.add.at(weights, side.receivers(directions)[~is_second], side.weights[~is_second])
+    for side, second in zip(sides, is_second, strict=True):
+        np.add.at(weights, side.receivers(directions)[~second], side.weights[~second])
     kept = [
-        replace(side, weights=np.where(is_second, side.weights, weights[side.nodes])).take(
-            is_second | (owner[side.nodes] == number)
+        replace(side, weights=np.where(second, side.weights, weights[side.nodes])).take(
+            second | (owner[side.nodes] == index)
         )
-        for number, (side, is_second) in enumerate(zip(sides, seconds, strict=True))
+        for index, (side, second) in enumerate(zip(sides, is_second, strict=True))
     ]
     return _joined(parts, kept, space)
+
+
+def _directions_of_owners(sides: Sequence[_Side], owner: IntArray) -> FloatArray:
+    """Return the direction of contact (n_nodes, 2) of each node on the side that owns it; zero without an owner."""
+    directions = np.zeros((owner.size, 2))
+    for index, side in enumerate(sides):
+        is_owned = owner[side.nodes] == index
+        directions[side.nodes[is_owned]] = side.directions[is_owned]
+    return directions
+
+
+def _second_rows(
+    parts: Sequence[FacingPart], sides: Sequence[_Side], owner: IntArray, directions: FloatArray
+) -> list[BoolArray]:
+    """Return for each side which of its nodes have a second row there: both parts frictionless, directions apart."""
+    is_frictionless = np.array([part.is_frictionless for part in parts])
+    return [
+        is_frictionless[index]
+        & is_frictionless[owner[side.nodes]]
+        & side.crosses(directions)
+        & (owner[side.nodes] != index)
+        for index, side in enumerate(sides)
+    ]
 
 
 @dataclass(frozen=True, eq=False)

@@ -256,6 +256,7 @@ def advance(path: Path, guess: ContactState | None = None, callback: Callback = 
     dilate, the programme gives an upper bound: bodies may give way below it, and this function does not decide which of
     the two has happened.
     """
+    # The first step from rest has no load to begin at: it is one jump.
     is_first, smallest = path.before is None, 0.5**MOST_HALVINGS
     increments = _Increments(path, callback)
     reached, increment, end = 0.0, 1.0, path.start
@@ -266,7 +267,7 @@ def advance(path: Path, guess: ContactState | None = None, callback: Callback = 
             target, end, guess if is_first else end.state, is_last=is_first or increment <= smallest
         )
         result = attempt.result
-        if result.is_converged:
+        if result.is_converged:  # go on from there, faster or slower by the number of steps
             end = path.end_of(attempt, target, end)
             reached, ends = target, (*ends, end)
             if reached == 1.0:
@@ -277,22 +278,27 @@ def advance(path: Path, guess: ContactState | None = None, callback: Callback = 
             announce(f"{path.name_of(reached)} reached")
         elif is_first or result.status in _NOT_RETRIED or target - reached <= smallest:
             break
-        else:
+        else:  # try half of the way
             increment = 0.5 * (target - reached)
             announce(f"{path.name_of(target)} failed, {path.name_of(reached + increment)} is next")
-    words = result.message
     if result.is_converged and len(ends) > 1:
-        words += f" The jump to this load stalled; {len(ends)} increments in its place led there."
+        message = f"{result.message} The jump to this load stalled; {len(ends)} increments reached it."
+        result = replace(result, message=message)
     elif not is_first and result.status in _RETRIED:
-        bound = "" if attempt.problem.law.is_frictionless else ", but friction may give way before that does"
-        words = (
-            f"{Status.LOAD_NOT_REACHED.value} Increments led to {path.name_of(reached)}, "
-            f"not to {path.name_of(target)}. "
-            f"The static programme finds no collapse under this load{bound}. The last increment "
-            f"ended {result.status.name.lower().replace('_', ' ')}: {words}"
-        )
-        result = replace(result, status=Status.LOAD_NOT_REACHED)
-    return ReachedStep(path, attempt.problem, replace(result, message=words), ends)
+        result = _not_reached(path, attempt, reached, target)
+    return ReachedStep(path, attempt.problem, result, ends)
+
+
+def _not_reached(path: Path, attempt: _Attempt, reached: float, target: float) -> ContactSolution:
+    """Return the result of the last increment with a status and a message on the load that was not reached."""
+    result = attempt.result
+    bound = "" if attempt.problem.law.is_frictionless else ", but friction may give way below it"
+    message = (
+        f"{Status.LOAD_NOT_REACHED.value} Increments reached {path.name_of(reached)}, not {path.name_of(target)}. "
+        f"The linear programme of rigid bodies finds no collapse under this load{bound}. The last increment "
+        f"ended {result.status.name.lower().replace('_', ' ')}: {result.message}"
+    )
+    return replace(result, status=Status.LOAD_NOT_REACHED, message=message)
 
 
 @dataclass(frozen=True, eq=False)

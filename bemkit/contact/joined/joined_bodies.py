@@ -169,23 +169,28 @@ class JoinedBodies(CoupledMembers, LinearBody):
         largest = np.maximum(largest, LIGHTEST * largest.max())
         total = np.maximum(total, LIGHTEST * total.max())
 
-        # what is missed at a node, as the force that it would take
+        # the unexplained relative displacement of a node, as the force that it would take
         force_by_displacement = self.moduli * np.repeat(self.weights / np.median(self.weights), 2)
         force_by_displacement /= self.least_of_partners(largest)
         missing = np.abs(missed) * force_by_displacement
-        # what all forces on a member do on its rigid motions
+        work = self._work_on_rigid_motions(state, total)
+        # round-off of both: of relative displacements, and of the sums of forces
+        of_sums = float(np.finfo(float).eps) * self._over_members(np.add, terms) / total
+        of_rows = self._displacement_round_off(state, displacement) * force_by_displacement
+        round_off = max(of_rows.max(), of_sums.max())
+        return Imbalance(float(missing.max()), float(np.max(work, initial=0.0)), float(round_off))
+
+    def _work_on_rigid_motions(self, state: ContactState, total: FloatArray) -> FloatArray:
+        """Return the work of all forces on each rigid motion of largest entry one, relative to the forces `total`."""
         motions, owner = self.motions, self.motion_owner
         size = abs(motions).max(axis=0).toarray().ravel() if len(owner) else np.zeros(0)
-        work = np.abs(motions.T @ (self.contact_forces(state) + self.load)) / size / total[owner]
-        # what round-off may leave of both
-        eps = float(np.finfo(float).eps)
+        return np.asarray(np.abs(motions.T @ (self.contact_forces(state) + self.load)) / size / total[owner])
+
+    def _displacement_round_off(self, state: ContactState, displacement: FloatArray) -> FloatArray:
+        """Return the round-off (2 n_contact,) [m] of relative displacements: half an eps for each rounding of a row."""
         sizes = abs(self.relative) @ np.abs(displacement) + np.abs(self.offset) + np.abs(state.displacement.ravel())
-        of_sums = eps * self._over_members(np.add, terms) / total
-        n_roundings = 3 + np.diff(
-            self.relative.indptr
-        )  # of products and sums of a row, and of what it is compared with
-        round_off = max((0.5 * eps * n_roundings * sizes * force_by_displacement).max(), of_sums.max())
-        return Imbalance(float(missing.max()), float(np.max(work, initial=0.0)), float(round_off))
+        n_roundings = 3 + np.diff(self.relative.indptr)  # products and sums of a row, and the comparison
+        return np.asarray(0.5 * float(np.finfo(float).eps) * n_roundings * sizes)
 
     def _over_members(self, operation: np.ufunc, values: FloatArray) -> FloatArray:
         """Return the sum or the largest of values (n,) on each member (n_members,); zero of one without components."""

@@ -260,66 +260,109 @@ def _integrate(
     side: ContactSide, mortar: ContactSide, directions: FloatArray, segments: Segments, may_carry: BoolArray
 ) -> tuple[MortarCoupling, IntArray]:
     """Return the coupling with multipliers at some nodes (m, n_local), and dofs (k,) whose share is a sliver."""
-    from scipy.sparse import csr_matrix
-
-    # integrals of the multipliers on the pieces that both sides cover
+    # integrals of the multipliers over the segments that both sides cover
     segments = segments.cut(modified_rows(segments, may_carry), side.space.local_nodes)
     quadrature = quadrature_on(segments, side, mortar, directions)
-    psi, rows, integrals = multiplier_functions(side, segments, quadrature, may_carry)
-    # weight of each node; one with a tiny part of its full weight is a sliver
-    dofs, first, number = np.unique(side.dofs, return_index=True, return_inverse=True)
-    number_of = number.reshape(side.dofs.shape)
-    full = np.bincount(number_of.ravel(), _basis_integrals(side).ravel())
-    weights = np.zeros(dofs.size)
-    np.add.at(weights, number_of[rows], integrals.sum(axis=2))
-    has_weight = weights > 0.0
-    slivers = dofs[has_weight & (weights < _LEAST_SHARE * full)]
-
-    # rows of the coupling: nodes with a weight, in order of the arc length
-    arc_length = side.arc_length.ravel()[first]
-    order = np.argsort(np.where(has_weight, arc_length, np.inf), kind="stable")[: np.count_nonzero(has_weight)]
-    position = np.full(dofs.size, -1)
-    position[order] = np.arange(order.size)
-    nodal_weights = weights[order]
-
-    def rows_of(elements: IntArray, columns: IntArray, values: FloatArray, n_columns: int) -> csr_matrix:
-        """Sum values (k, n_local, j) into the rows of the nodes of elements (k,), at columns (k, j)."""
-        row, column = np.broadcast_arrays(position[number_of[elements]][:, :, None], columns[:, None])
-        is_kept = (row >= 0) & (values != 0.0)
-        entries, number = np.unique(row[is_kept] * n_columns + column[is_kept], return_inverse=True)
-        row, column = np.divmod(entries, n_columns)
-        sums = np.bincount(number, values[is_kept]) / nodal_weights[row]
-        starts = np.searchsorted(row, np.arange(order.size + 1))
-        return csr_matrix((sums, column, starts), shape=(order.size, n_columns))
-
-    # mean gap of each node along its direction, and the deepest point of the pieces
-    weighted = psi * quadrature.weights[:, None]
-    on_mortar = mortar.space.basis(quadrature.eta.ravel()).reshape(-1, *quadrature.eta.shape).transpose(1, 2, 0)
-    gap = np.zeros((dofs.size, 2))
-    np.add.at(gap, number_of[quadrature.row], np.matmul(weighted, quadrature.gap))
-    element, local = np.divmod(first[order], side.space.local_nodes.size)
-    xi = side.space.local_nodes[local][:, None]
-    direction = side.directions(directions, element, xi)[:, 0]
-    distance = np.einsum("nc,nc->n", direction, gap[order]) / nodal_weights
+    psi, elements, integrals = multiplier_functions(side, segments, quadrature, may_carry)
+    # a node with a tiny part of its full weight is a sliver; the others are the rows of the coupling
+    rows, slivers = _MultiplierRows.from_integrals(side, elements, integrals)
+    # means of the gap vector over each multiplier, along the direction of contact of its node
+    weighted_psi = psi * quadrature.weights[:, None]
+    gap = rows.summed(quadrature.row, np.matmul(weighted_psi, quadrature.gap))
+    node_xi = side.space.local_nodes[rows.local][:, None]
+    direction = side.directions(directions, rows.element, node_xi)[:, 0]
+    distance = np.einsum("nc,nc->n", direction, gap) / rows.weights
     distance[np.abs(distance) <= max(side.resolution, mortar.resolution)] = 0.0
-    depth = -np.einsum("sqc,sqc->sq", quadrature.gap, side.directions(directions, quadrature.row, quadrature.xi))
-    piece, place = np.divmod(int(np.argmax(depth)), depth.shape[1])
+    overlap, deepest = _deepest_overlap(side, directions, quadrature)
+    # mortar integrals with the bases of both sides
+    mortar_basis = mortar.space.basis(quadrature.eta.ravel()).reshape(-1, *quadrature.eta.shape).transpose(1, 2, 0)
+    mortar_integrals = np.matmul(weighted_psi, mortar_basis)
     coupling = MortarCoupling(
-        nodes=dofs[order],
-        points=side.points(element, xi)[:, 0],
-        arc_length=arc_length[order],
+        nodes=rows.dofs,
+        points=side.points(rows.element, node_xi)[:, 0],
+        arc_length=side.arc_length[rows.element, rows.local],
         frame=np.stack([direction, turned_left(direction)], axis=1),
-        weights=nodal_weights,
+        weights=rows.weights,
         gap=distance,
-        overlap=max(float(depth[piece, place]), 0.0),
-        deepest=side.points(quadrature.row[[piece]], quadrature.xi[piece, [place]])[0, 0],
-        facing=np.einsum("nc,nc->n", direction, side.directions(side.normals, element, xi)[:, 0]),
-        on_non_mortar=rows_of(rows, side.dofs[rows], integrals, side.space.n_dofs // 2),
-        on_mortar=rows_of(
-            quadrature.row, mortar.dofs[quadrature.partner], np.matmul(weighted, on_mortar), mortar.space.n_dofs // 2
+        overlap=overlap,
+        deepest=deepest,
+        facing=np.einsum("nc,nc->n", direction, side.directions(side.normals, rows.element, node_xi)[:, 0]),
+        on_non_mortar=rows.matrix(elements, side.dofs[elements], integrals, side.space.n_dofs // 2),
+        on_mortar=rows.matrix(
+            quadrature.row, mortar.dofs[quadrature.partner], mortar_integrals, mortar.space.n_dofs // 2
         ),
     )
     return coupling, slivers
+
+
+@dataclass(frozen=True, eq=False)
+class _MultiplierRows:
+    """The nodes with a multiplier, in order of the arc length: rows of the coupling.
+
+    Parameters
+    ----------
+    dofs, element, local : (n,) int arrays
+        Scalar dof of each node, and one element of the side on which it is the local node.
+    weights : (n,) array [m]
+        Positive integrals of the multipliers.
+    row_of : (m, n_local) int array
+        Row of each node of each element; -1 without a multiplier.
+    """
+
+    dofs: IntArray
+    element: IntArray
+    local: IntArray
+    weights: FloatArray
+    row_of: IntArray
+
+    @classmethod
+    def from_integrals(
+        cls, side: ContactSide, elements: IntArray, integrals: FloatArray
+    ) -> tuple[_MultiplierRows, IntArray]:
+        """Return the rows of nodes with a weight, and the dofs whose weight is only a sliver of the full one."""
+        dofs, first, index = np.unique(side.dofs, return_index=True, return_inverse=True)
+        node_of = index.reshape(side.dofs.shape)
+        weights = np.zeros(dofs.size)
+        np.add.at(weights, node_of[elements], integrals.sum(axis=2))
+        full_weights = np.bincount(node_of.ravel(), _basis_integrals(side).ravel())
+        has_weight = weights > 0.0
+        slivers = dofs[has_weight & (weights < _LEAST_SHARE * full_weights)]
+
+        arc_length = side.arc_length.ravel()[first]
+        order = np.argsort(np.where(has_weight, arc_length, np.inf), kind="stable")[: np.count_nonzero(has_weight)]
+        row_of_node = np.full(dofs.size, -1)
+        row_of_node[order] = np.arange(order.size)
+        element, local = np.divmod(first[order], side.space.local_nodes.size)
+        return cls(dofs[order], element, local, weights[order], row_of_node[node_of]), slivers
+
+    def summed(self, elements: IntArray, values: FloatArray) -> FloatArray:
+        """Sum values (k, n_local, j) at the nodes of elements (k,): (n, j)."""
+        row = self.row_of[elements]
+        sums = np.zeros((self.dofs.size, values.shape[2]))
+        np.add.at(sums, row[row >= 0], values[row >= 0])
+        return sums
+
+    def matrix(self, elements: IntArray, columns: IntArray, values: FloatArray, n_columns: int) -> csr_matrix:
+        """Sum values (k, n_local, j) at the nodes of elements (k,) and columns (k, j), relative to the weights."""
+        from scipy.sparse import csr_matrix
+
+        row, column = np.broadcast_arrays(self.row_of[elements][:, :, None], columns[:, None])
+        is_kept = (row >= 0) & (values != 0.0)
+        entries, index = np.unique(row[is_kept] * n_columns + column[is_kept], return_inverse=True)
+        row, column = np.divmod(entries, n_columns)
+        sums = np.bincount(index, values[is_kept]) / self.weights[row]
+        starts = np.searchsorted(row, np.arange(self.dofs.size + 1))
+        return csr_matrix((sums, column, starts), shape=(self.dofs.size, n_columns))
+
+
+def _deepest_overlap(
+    side: ContactSide, directions: FloatArray, quadrature: MortarQuadrature
+) -> tuple[float, FloatArray]:
+    """Return the largest overlap [m] of the sides at a quadrature point, zero if there is none, and the point (2,)."""
+    depth = -np.einsum("sqc,sqc->sq", quadrature.gap, side.directions(directions, quadrature.row, quadrature.xi))
+    segment, position = np.divmod(int(np.argmax(depth)), depth.shape[1])
+    point = side.points(quadrature.row[[segment]], quadrature.xi[segment, [position]])[0, 0]
+    return max(float(depth[segment, position]), 0.0), point
 
 
 def _basis_integrals(side: ContactSide) -> FloatArray:
