@@ -124,10 +124,10 @@ def write_animation(solution: Solution, folder: str | None, what: tuple[str, ...
     save_animation(Path(folder) / "animation.gif", steps)
 
 
-def study_output(place: str | None, table: Callable[[Content], Table]) -> tuple[str | None, TableFile[Content]]:
+def study_output(target: str | None, table: Callable[[Content], Table]) -> tuple[str | None, TableFile[Content]]:
     """Return the file of ``-o`` that keeps rows as they are ready, .jsonl, and the one that gets the whole table."""
-    keeps_rows = place is not None and place.lower().endswith(".jsonl")
-    return (place, TableFile(None, table)) if keeps_rows else (None, TableFile(place, table))
+    keeps_rows = target is not None and target.lower().endswith(".jsonl")
+    return (target, TableFile(None, table)) if keeps_rows else (None, TableFile(target, table))
 
 
 def reserve(paths: Iterable[Path]) -> None:

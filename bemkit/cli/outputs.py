@@ -31,7 +31,7 @@ TABLE_TEXTS: dict[str, Callable[[Table], str]] = {
 
 @dataclass(frozen=True)
 class TextFile(Generic[Content]):
-    """A text that is asked for, or not.
+    """A text to write to a file or to standard output, or nothing.
 
     Parameters
     ----------
@@ -40,7 +40,7 @@ class TextFile(Generic[Content]):
     text : callable (content) -> str
     """
 
-    place: str | None
+    target: str | None
     text: Callable[[Content], str]
 
     def check(self) -> list[Path]:
@@ -50,7 +50,7 @@ class TextFile(Generic[Content]):
         ------
         OutputFileError
         """
-        return [] if self.place in (None, STDOUT) else [check_target(Path(str(self.place)))]
+        return [] if self.target in (None, STDOUT) else [check_target(Path(str(self.target)))]
 
     def write(self, content: Content) -> None:
         """Write the text of some content to the file or to standard output, if it is wanted.
@@ -59,15 +59,15 @@ class TextFile(Generic[Content]):
         ------
         OutputFileError
         """
-        if self.place == STDOUT:
+        if self.target == STDOUT:
             print_data(self.text(content))
-        elif self.place is not None:
-            write_text(Path(self.place), self.text(content))
+        elif self.target is not None:
+            write_text(Path(self.target), self.text(content))
 
 
 @dataclass(frozen=True)
 class TableFile(Generic[Content]):
-    """A table in the format that the ending of its file names, or none.
+    """A table to write in the format of the ending of its file, or nothing.
 
     Parameters
     ----------
@@ -75,7 +75,7 @@ class TableFile(Generic[Content]):
     table : callable (content) -> Table
     """
 
-    place: str | None
+    target: str | None
     table: Callable[[Content], Table]
 
     def check(self) -> list[Path]:
@@ -86,9 +86,9 @@ class TableFile(Generic[Content]):
         OutputFileError
             If the ending is unknown, or the file cannot be written.
         """
-        if self.place is None:
+        if self.target is None:
             return []
-        path = Path(self.place)
+        path = Path(self.target)
         if path.suffix.lower() not in (*TABLE_TEXTS, ".h5", ".hdf5"):
             endings = ", ".join((*TABLE_TEXTS, ".h5"))
             raise OutputFileError(
@@ -104,9 +104,9 @@ class TableFile(Generic[Content]):
         ------
         OutputFileError
         """
-        if self.place is None:
+        if self.target is None:
             return
-        path, table = Path(self.place), self.table(content)
+        path, table = Path(self.target), self.table(content)
         if path.suffix.lower() in TABLE_TEXTS:
             write_text(path, TABLE_TEXTS[path.suffix.lower()](table))
         else:
@@ -138,7 +138,7 @@ class Outputs(Generic[Content]):
     @property
     def uses_stdout(self) -> bool:
         """Whether standard output is taken by data, so that nothing else may be printed there."""
-        return any(text.place == STDOUT for text in self.texts)
+        return any(text.target == STDOUT for text in self.texts)
 
     def check(self, others: Sequence[Path] = ()) -> list[Path]:
         """Find out, before any work is done, whether everything can be written, `others` besides; return all files.
@@ -149,7 +149,7 @@ class Outputs(Generic[Content]):
             If a file or folder cannot be written, two outputs go to one place, or a package for figures is missing.
         """
         targets = [*others, *(target for text in self.texts for target in text.check())]
-        places = [text.place for text in self.texts if text.place is not None]
+        places = [text.target for text in self.texts if text.target is not None]
         if len(set(targets)) < len(targets) or places.count(STDOUT) > 1:
             shown = ", ".join([*map(str, others), *places])
             raise OutputFileError(f"two outputs go to the same file ({shown}): name two files")

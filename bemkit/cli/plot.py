@@ -29,7 +29,7 @@ class _PlotCommand(click.Command):
 @click.argument("source")
 @options.what_option
 @click.option(
-    "-o", "--output", "place", default="figures", metavar="PATH", help="Write to a folder, or one picture to a file."
+    "-o", "--output", "target", default="figures", metavar="PATH", help="Write to a folder, or one picture to a file."
 )
 @click.option("--dpi", "dots_per_inch", type=click.IntRange(20, 1200), default=150, help="Dots per inch (150).")
 @click.option(
@@ -37,7 +37,7 @@ class _PlotCommand(click.Command):
 )
 @options.quiet_option
 def plot(
-    source: str, what: tuple[str, ...] | None, place: str, dots_per_inch: int, width: float | None, quiet: bool
+    source: str, what: tuple[str, ...] | None, target: str, dots_per_inch: int, width: float | None, quiet: bool
 ) -> int:
     """Draw SOURCE: a result file, or a scene, which is solved first.
 
@@ -48,12 +48,12 @@ def plot(
         from bemkit.cli.sources import solved, solved_steps
         from bemkit.pictures.files import ANIMATION, check_place, save_pictures
 
-        if what is None and Path(place).suffix in (".gif", ".mp4"):
+        if what is None and Path(target).suffix in (".gif", ".mp4"):
             what = (ANIMATION,)
-        reserve(check_place(place, what))
+        reserve(check_place(target, what))
         moves = what is not None and ANIMATION in what
         steps = solved_steps(source, callback) if moves else [solved(source, callback)]
-        paths = save_pictures(steps, place, what, dots_per_inch=dots_per_inch, width=width)
+        paths = save_pictures(steps, target, what, dots_per_inch=dots_per_inch, width=width)
     for path in paths if not quiet else ():
         print(path)
     if not steps[-1].is_converged:

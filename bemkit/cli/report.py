@@ -12,11 +12,11 @@ from bemkit.cli.options import reserve, shown_progress
 @click.command()
 @click.argument("source")
 @click.option(
-    "-o", "--output", "place", default="report.html", metavar="FILE", help="Write the page to FILE (report.html)."
+    "-o", "--output", "target", default="report.html", metavar="FILE", help="Write the page to FILE (report.html)."
 )
 @click.option("--interactive", is_flag=True, help="A drawing with values under the pointer in place of pictures.")
 @options.quiet_option
-def report(source: str, place: str, interactive: bool, quiet: bool) -> int:
+def report(source: str, target: str, interactive: bool, quiet: bool) -> int:
     """Write a page on SOURCE: a result file, or a scene, which is solved first.
 
     The page holds summary, pictures, tables, certificate, plan, scene and versions, and needs no other file.
@@ -26,9 +26,9 @@ def report(source: str, place: str, interactive: bool, quiet: bool) -> int:
         from bemkit.cli.sources import solved
         from bemkit.report.page import check_report, save_report
 
-        reserve([check_report(place, interactive=interactive)])
+        reserve([check_report(target, interactive=interactive)])
         solution = solved(source, callback)
-        path = save_report(place, solution, interactive=interactive)
+        path = save_report(target, solution, interactive=interactive)
     if not quiet:
         print(path)
     return exit_code_of(solution)

@@ -38,8 +38,8 @@ def print_sides(sides: Outline) -> None:
         for side in loop:
             start = side.curve.point(np.zeros(1))[0]
             length = norms(side.curve.derivative(_SEEN)).mean()
-            place = "outer" if number == 0 and not sides.is_exterior else f"hole {number}"
-            texts = (place, side.name, side.group, _kind(side), f"{length:.6g}", f"({start[0]:.6g}, {start[1]:.6g})")
+            target = "outer" if number == 0 and not sides.is_exterior else f"hole {number}"
+            texts = (target, side.name, side.group, _kind(side), f"{length:.6g}", f"({start[0]:.6g}, {start[1]:.6g})")
             table.add_row(*map(Text, texts))
     console.print(table)
     points = np.concatenate([side.curve.point(_SEEN) for side in sides.sides])

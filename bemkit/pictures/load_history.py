@@ -116,22 +116,22 @@ def draw_status_over_time(
     from matplotlib.patches import Patch
 
     loading = history_of(solution)
-    words = list(STATUS_COLOURS)
-    number_of = {int(status): words.index(word) for status, word in STATUS_WORDS.items()}
+    names = list(STATUS_COLOURS)
+    row_of = {int(status): names.index(name) for status, name in STATUS_WORDS.items()}
     table = loading.steps[-1].contact
-    own = np.flatnonzero(table.rows(part))
-    own = own[np.argsort(table.s[own])]
-    numbers = np.array([[number_of[value] for value in step.contact.status[own].tolist()] for step in loading.steps])
+    rows = np.flatnonzero(table.rows(part))
+    rows = rows[np.argsort(table.s[rows])]
+    statuses = np.array([[row_of[value] for value in step.contact.status[rows].tolist()] for step in loading.steps])
     abscissa = Abscissa.along(solution, part)
-    s = table.s[own]
+    s = table.s[rows]
     edges = abscissa.at(np.concatenate([s[:1], 0.5 * (s[1:] + s[:-1]), s[-1:]]))
     times = np.concatenate([[0.0], loading.times])
     axes = axes_or_new(axes)
-    colours = ListedColormap([STATUS_COLOURS[word] for word in words])
-    axes.pcolormesh(edges, times, numbers, cmap=colours, vmin=-0.5, vmax=len(words) - 0.5)
+    colours = ListedColormap([STATUS_COLOURS[name] for name in names])
+    axes.pcolormesh(edges, times, statuses, cmap=colours, vmin=-0.5, vmax=len(names) - 0.5)
     axes.set_xlabel(abscissa.label(units or solution.units))
     axes.set_ylabel("time $t$")
     axes.set_title(f"Status over time\n{solution.title}", parse_math=False, fontsize=11)
-    handles = [Patch(color=STATUS_COLOURS[word], label=word) for word in words]
+    handles = [Patch(color=STATUS_COLOURS[name], label=name) for name in names]
     axes.legend(handles=handles, loc="upper left", bbox_to_anchor=(1.0, 1.0), frameon=False, fontsize=9)
     return axes

@@ -134,7 +134,7 @@ def outline_of(obstacle: object, frame: FloatArray) -> list[FloatArray]:
     ----------
     obstacle : object
     frame : (2, 2) array [m]
-        Least and largest x, least and largest y. What has no end is cut where it is far beyond.
+        Least and largest x, least and largest y. Unbounded obstacles are cut far outside the frame.
     """
     reach = 4.0 * float(np.hypot(*np.ptp(frame, axis=1)))
     match obstacle:

@@ -96,7 +96,7 @@ class HertzLine(LineContact):
         return np.asarray(self.peak_pressure * np.sqrt(np.maximum(1.0 - (np.asarray(x) / self.half_width) ** 2, 0.0)))
 
     def approach(self, depth: float, material: Material) -> float:
-        """Return how much nearer the middle of the zone comes [m] to a point of one half-plane below it.
+        """Return the approach [m] of the middle of the zone to a point of one half-plane at a depth below it.
 
         Parameters
         ----------

@@ -45,7 +45,9 @@ def distinct_solutions(scene: Scene, *, n_starts: int = 8, mesh: Meshes = None) 
     if not scene.has_contact:
         raise NoContactError("no part is in contact: the solution is the only one, which run returns")
     if scene.n_steps > 1:
-        raise LoadHistoryError(f"a load history of {scene.n_steps} steps cannot be probed: give one load")
+        raise LoadHistoryError(
+            f"a load history of {scene.n_steps} steps cannot be searched for distinct solutions: give one load"
+        )
     if mesh is None:
         scene, mesh = on_its_meshes(scene)
     (prepared,), plan, clock = planned(load_steps(scene), mesh)

@@ -14,7 +14,7 @@ def summary(docstring: str) -> str:
 
 
 def parameters(docstring: str) -> dict[str, str]:
-    """Return what a docstring says of each parameter, as one line that begins with the unit if there is one.
+    """Return the description of each parameter in a docstring: one line, which begins with the unit if there is one.
 
     Parameters
     ----------

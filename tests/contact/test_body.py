@@ -119,7 +119,7 @@ def test_states_blend():
         (lambda: DenseBody(np.eye(2), np.zeros(2), np.ones(1), np.ones((1, 2))), r"motions has the shape \(1, 2\)"),
         (
             lambda: DenseBody(np.eye(2), np.zeros(2), np.ones(1), np.ones((2, 1, 2))),
-            "2 rigid motions leave nothing of a",
+            "a stiffness of 2 unknowns with 2 rigid motions",
         ),
         (
             lambda: DenseBody(np.eye(2), np.zeros(2), np.ones(1), modulus=0.0),

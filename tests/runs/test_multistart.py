@@ -66,7 +66,7 @@ def test_a_start_chooses_the_solution_of_the_first_of_adaptive_meshes() -> None:
 
 
 def test_refusals() -> None:
-    with pytest.raises(ValueError, match="a load history of 2 steps cannot be probed"):
+    with pytest.raises(ValueError, match="a load history of 2 steps cannot be searched for distinct solutions"):
         distinct_solutions(dataclasses.replace(leg(1.0), load_factors=(0.5, 1.0)))
     with pytest.raises(ValueError, match="n_starts = -1"):
         distinct_solutions(leg(1.0), n_starts=-1)

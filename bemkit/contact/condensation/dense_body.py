@@ -96,7 +96,7 @@ class DenseBody(LinearBody):
             raise InputError(f"weights has the entry {self.weights.min():g}; the length of a node is positive")
         if self.modulus is None and len(motions) >= n_unknowns:
             raise InputError(
-                f"{len(motions)} rigid motions leave nothing of a stiffness of {n_unknowns} unknowns but round-off: "
+                f"a stiffness of {n_unknowns} unknowns with {len(motions)} rigid motions has no scale of its own: "
                 "give modulus, the E' of the material"
             )
         if self.modulus is not None and not (math.isfinite(self.modulus) and self.modulus > 0.0):

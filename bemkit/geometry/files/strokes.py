@@ -116,15 +116,15 @@ def join_strokes(strokes: Sequence[Stroke], tolerance: float) -> tuple[list[list
     if not strokes:
         return closed, notes
     ends = np.array([point for stroke in strokes for point in (stroke.start, stroke.end)])
-    places, place_of_end = _merged(ends, tolerance)
-    gaps = norms(ends - places[place_of_end])
+    vertices, place_of_end = _merged(ends, tolerance)
+    gaps = norms(ends - vertices[place_of_end])
     if gaps.max() > _ROUND_OFF * np.abs(ends).max():
         count = int(np.count_nonzero(np.bincount(place_of_end, weights=gaps) > _ROUND_OFF * np.abs(ends).max()))
         which = "1 gap" if count == 1 else f"{count} gaps"
         notes.append(f"closed: {which} between ends of lines, of up to {2.0 * gaps.max():.2g}")
-    _check_degrees(places, place_of_end.reshape(-1, 2), [stroke.side.group for stroke in strokes], tolerance)
+    _check_degrees(vertices, place_of_end.reshape(-1, 2), [stroke.side.group for stroke in strokes], tolerance)
     strokes = [
-        _with_ends(stroke, *places[pair]) for stroke, pair in zip(strokes, place_of_end.reshape(-1, 2), strict=True)
+        _with_ends(stroke, *vertices[pair]) for stroke, pair in zip(strokes, place_of_end.reshape(-1, 2), strict=True)
     ]
     chains = closed_chains(place_of_end.reshape(-1, 2))
     return [
@@ -160,31 +160,31 @@ def _features(stroke: Stroke) -> FloatArray:
 
 
 def _merged(points: FloatArray, tolerance: float) -> tuple[FloatArray, IntArray]:
-    """Return places (m, 2), the middles of points closer than a tolerance, and the place (n,) of each point."""
+    """Return the means (m, 2) of points closer than a tolerance, and the index (n,) of the mean of each point."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
     from scipy.spatial import cKDTree
 
     pairs = cKDTree(points).query_pairs(tolerance, output_type="ndarray")
     graph = coo_array((np.ones(len(pairs)), pairs.T), shape=(len(points), len(points)))
-    n_places, place = connected_components(graph, directed=False)
-    low = np.full((n_places, 2), np.inf)
-    np.minimum.at(low, place, points)
-    offsets = [np.bincount(place, weights=column) for column in (points - low[place]).T]
-    counts = np.bincount(place)
-    return low + np.stack(offsets, axis=1) / counts[:, None], place.astype(np.intp)  # exact where points are the same
+    n_vertices, vertex = connected_components(graph, directed=False)
+    low = np.full((n_vertices, 2), np.inf)
+    np.minimum.at(low, vertex, points)
+    offsets = [np.bincount(vertex, weights=column) for column in (points - low[vertex]).T]
+    counts = np.bincount(vertex)
+    return low + np.stack(offsets, axis=1) / counts[:, None], vertex.astype(np.intp)  # exact where points are the same
 
 
-def _check_degrees(places: FloatArray, ends: IntArray, groups: Sequence[str], tolerance: float) -> None:
-    """Raise unless two lines meet at each place; the message names the groups that close by themselves.
+def _check_degrees(vertices: FloatArray, ends: IntArray, groups: Sequence[str], tolerance: float) -> None:
+    """Raise unless two lines meet at each end point; the message names groups that are closed without the others.
 
     Parameters
     ----------
-    places : (m, 2) array [m]
+    vertices : (m, 2) array [m]
     ends : (n, 2) int array
-        Numbers of the places where each stroke starts and ends.
+        Indices of the points where each stroke starts and ends.
     groups : sequence of str
-        What the file calls each stroke.
+        Name of each stroke in the file.
     tolerance : float [m]
     """
     degree = np.bincount(ends.ravel())
@@ -192,14 +192,14 @@ def _check_degrees(places: FloatArray, ends: IntArray, groups: Sequence[str], to
         return
     remedy = _groups_that_close(ends, groups)
     if (degree > 2).any():
-        crowd = int(np.argmax(degree > 2))
-        named = _in_groups(groups[int(k)] for k in np.flatnonzero((ends == crowd).any(axis=1)))
+        crossing = int(np.argmax(degree > 2))
+        named = _in_groups(groups[int(k)] for k in np.flatnonzero((ends == crossing).any(axis=1)))
         raise GeometryError(
-            f"{degree[crowd]} lines{named} meet at {format_point(places[crowd])}, where a boundary has two: "
+            f"{degree[crossing]} lines{named} meet at {format_point(vertices[crossing])}, where a boundary has two: "
             + (remedy or "remove lines inside the body and beside it, or name the right ones with only")
         )
     loose = np.flatnonzero(degree == 1)
-    first, others = places[loose[0]], places[loose[1:]]
+    first, others = vertices[loose[0]], vertices[loose[1:]]
     named = _in_groups(groups[int(k)] for k in np.flatnonzero((ends == loose[0]).any(axis=1)))
     distances = norms(others - first)
     nearest = int(np.argmin(distances))

@@ -230,9 +230,8 @@ class GalerkinElasticity(BoundaryMap):
     def element_tractions(self, displacement: FloatArray, force: FloatArray) -> FloatArray:
         """Return the (n_elements, n_local, 2) tractions V^-1 (1/2 M + K) u, with the pressures that `force` determines.
 
-        Around a hole V n is of the order of the compressibility. What curved elements leave of it besides, which hold
-        normals n only by interpolation, comes back as a pressure that is wrong by as much, and at last altogether, as
-        Poisson's ratio approaches 1/2.
+        Around a hole V n is of the order of the compressibility. Curved elements interpolate the normal n, so their V n
+        has an error, which causes an error of the pressure that grows without bound as Poisson's ratio approaches 1/2.
         """
         tractions = self.tractions(displacement)
         at_nodes = values_on_elements(self.traction_space, tractions)

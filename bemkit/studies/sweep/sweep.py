@@ -87,7 +87,7 @@ def run_sweep(
 ) -> Sweep:
     """Solve a scene under all combinations of some of its numbers; see `sweep`."""
     keys, grid = all_rows(vary)
-    text = scene_to_toml(scene)  # which functions of Python cannot be part of
+    text = scene_to_toml(scene)  # raises for Python functions, which a file cannot hold
     for key in keys:
         check_number(scene, key)
     names = tuple(key.text for key in keys)
