@@ -2,24 +2,30 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, cast
 
-from bemkit.errors import InputError
+from bemkit.errors import BemkitError, InputError
 from bemkit.plan import make_plan
+from bemkit.results.solution import Solution
+from bemkit.results.solved_steps import with_totals
 from bemkit.runs.density import DensityMeshes
 from bemkit.runs.earlier_steps import EarlierSteps
 from bemkit.runs.hp import LayeredMeshes
 from bemkit.runs.mesh_sequence import Level, MeshSequence
-from bemkit.runs.refinement import refined, required_accuracy
 from bemkit.runs.step_errors import in_which_step
 from bemkit.runs.steps import guess_from, joined, run_on_mesh, solved_history
+from bemkit.scene.mesh_options import MOST_ELEMENTS, MeshOptions
 from bemkit.scene.scene import Scene
-from bemkit.solvers.base import StepRecord
+from bemkit.solvers.base import Status, StepRecord
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
+
+_MOST_MISSED = 12
+"""Meshes whose nodes meet no contact, each of which has nodes where the one before missed it."""
 
 
 def run_adaptive(
@@ -70,13 +76,13 @@ def run_adaptive(
     """
     level: Level = Level.first(cast(Any, scene))
     refinement = _Refinement(_rule(level), start, callback, EarlierSteps(done, finished), executor)
-    return refined(level, refinement, scene.mesh)
+    return _refined(level, refinement, scene.mesh)
 
 
 def _rule(level: Level) -> MeshSequence:
     """Return how better meshes are made: in layers for elements of high degree, if there is a single load."""
     mesh, n_steps = level.asked.mesh, level.asked.n_steps
-    accuracy = required_accuracy(mesh)
+    accuracy = _required_accuracy(mesh)
     if n_steps > 1 and mesh.rising_degrees:
         raise InputError(
             f"discretisation is 'hp', and there are {n_steps} load steps: degrees rise only for single loads: "
@@ -119,10 +125,6 @@ class _Refinement:
         of_energy = "unknown" if energy is None else f"{energy:.1e}"
         return of_energy if tractions is None else f"{of_energy}, of contact tractions {tractions:.1e}"
 
-    def is_enough(self, solutions: Sequence[Any]) -> bool:
-        """Return whether the last of the solutions is as accurate as it shall be."""
-        return self.meshes.is_enough(solutions)
-
     def following(self, level: Level, solutions: Sequence[Any]) -> Level | None:
         """Return the next level, its meshes made; None if that would not help."""
         following = self.meshes.following(level, solutions)
@@ -143,3 +145,80 @@ class _Refinement:
     def expected_seconds(self, level: Level, solution: Any, spent: float) -> float:
         """Return how long the next meshes will take: what the last ones took, in the proportion of their plans."""
         return spent * make_plan(level.scene, level.meshes).seconds / float(solution.plan.seconds)
+
+
+def _required_accuracy(options: MeshOptions) -> float:
+    """Return the accuracy of mesh options; an error without one."""
+    if options.accuracy is None:
+        raise InputError("mesh.accuracy is missing: give one, such as MeshOptions(accuracy=1e-3)")
+    return options.accuracy
+
+
+def _refined(first: Level, refinement: _Refinement, options: MeshOptions) -> tuple[Solution, ...]:
+    """Solve level after level until the accuracy of the options is reached or cannot be; see `run_adaptive`."""
+    begin, accuracy = time.perf_counter(), _required_accuracy(options)
+    most_elements = MOST_ELEMENTS if options.most_elements is None else options.most_elements
+    level, obstacle = first, ""
+    solutions: list[Solution] = []
+    while not obstacle:
+        started = time.perf_counter()
+        try:
+            solution = refinement.solved(level, solutions[-1] if solutions else None)
+        except BemkitError as error:
+            if not solutions:
+                raise
+            obstacle = f"{level.n_elements} elements cannot be solved ({error})"
+            break
+        solutions.append(solution)
+        now = time.perf_counter()
+        is_missed = solution.status is Status.MISSED_CONTACT
+        if sum(each.status is Status.MISSED_CONTACT for each in solutions) > _MOST_MISSED:
+            obstacle = f"contact lies between the nodes of {len(solutions)} meshes"
+        elif not solution.is_converged and not is_missed:
+            worst, word = solution.certificate.worst, solution.status.name.lower().replace("_", " ")
+            obstacle = f"the solve on {solution.n_elements} elements ended {word} (certificate {worst:.1e})"
+        elif not (is_missed or solution.missed_contacts) and refinement.meshes.is_enough(solutions):
+            break
+        else:
+            try:
+                following = refinement.following(level, solutions)
+            except BemkitError as error:
+                obstacle = f"no finer mesh can be made ({error})"
+                break
+            if following is None:
+                obstacle = "the estimated error no longer falls"
+                break
+            level = following
+            if excess := refinement.excess(level, most_elements):
+                obstacle = f"more than {excess} would be needed"
+            elif options.most_seconds is not None:
+                expected = refinement.expected_seconds(level, solution, now - started)
+                if now - begin + expected > options.most_seconds:
+                    obstacle = f"more than {options.most_seconds:g} s would be needed"
+    return _best_last(solutions, obstacle, accuracy, refinement)
+
+
+def _best_last(
+    solutions: Sequence[Solution], obstacle: str, accuracy: float, refinement: _Refinement
+) -> tuple[Solution, ...]:
+    """Put the best solution last, with the totals of all and the reason why its accuracy is not what was asked for.
+
+    The last one is the best if it is accurate enough.
+    """
+    best = solutions[-1]
+    if obstacle:
+        # without estimates the finest mesh is the best
+        converged = [solution for solution in reversed(solutions) if solution.is_converged]
+        best = min(converged, key=refinement.error, default=best)
+    message = f"{len(solutions)} meshes, the last with {best.n_elements} elements. {best.message}"
+    status = best.status
+    if obstacle:
+        message = (
+            f"The accuracy {accuracy:g} was not reached: {obstacle}; estimated error {refinement.shown_error(best)}; "
+            f"allow more elements or time, or ask for less. {message}"
+        )
+        status = Status.ACCURACY_NOT_REACHED if best.is_converged else best.status
+    names = [f"mesh {number} of {len(solutions)}" for number in range(1, len(solutions) + 1)]
+    others = [solution for solution in solutions if solution is not best]
+    total = with_totals(best, solutions, names)
+    return (*others, replace(total, warnings=total.unasked_warnings, status=status, message=message))

@@ -9,7 +9,7 @@ import numpy as np
 
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.results.solution import Solution
-from bemkit.runs.refinement import SizedLevel
+from bemkit.runs.mesh_sequence import Level
 
 _SAME = 1e-9
 """Relative difference of the lengths of equal elements, in the coordinates of the shape and in those of its place."""
@@ -30,7 +30,7 @@ class EarlierSteps:
     done: Solution | None = None
     finished: Callable[[Solution], None] | None = None
 
-    def on(self, level: SizedLevel) -> tuple[Solution | None, Callable[[Solution], None] | None]:
+    def on(self, level: Level) -> tuple[Solution | None, Callable[[Solution], None] | None]:
         """Return the finished steps on the meshes of a level, and the callback for further ones."""
         if self.done is None:
             return None, self.finished

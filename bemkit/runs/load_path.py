@@ -6,14 +6,14 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import pairwise
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from bemkit.arrays import FloatArray
 from bemkit.contact.body import ContactState, SlipHistory
 from bemkit.contact.problem import ContactProblem
-from bemkit.model.units import Units
+from bemkit.model.model import Model
 from bemkit.results.solved_steps import continued
 from bemkit.solvers.active_sets import NodeStatus
 from bemkit.solvers.base import ContactSolution, ContactSolver, Status, StepRecord, solve
@@ -41,29 +41,6 @@ _RETRIED = (Status.MAX_STEPS, Status.STALLED, Status.CYCLING, Status.SINGULAR)
 Callback = Callable[[StepRecord], None] | None
 
 
-class StepModel(Protocol):
-    """The members of a model that a load history needs; `Model` has them."""
-
-    @property
-    def problem(self) -> ContactProblem:
-        """The problem under the loads of the step; slip counts from the undeformed bodies."""
-
-    @property
-    def units(self) -> Units:
-        """The physical size of one dimensionless unit."""
-
-    @property
-    def solver(self) -> ContactSolver:
-        """The solver."""
-
-    @property
-    def has_body_forces(self) -> bool:
-        """Whether something acts inside a body."""
-
-    def acting(self, state: ContactState) -> tuple[FloatArray, FloatArray]:
-        """Return the forces of loads and supports, and the displacements on which they work."""
-
-
 @dataclass(frozen=True, eq=False)
 class IncrementEnd:
     """The end of an increment.
@@ -75,7 +52,7 @@ class IncrementEnd:
     motion : SlipHistory
     gap : (n_contact,) array
         Dimensionless.
-    loads : tuple of (float, StepModel)
+    loads : tuple of (float, Model)
         The models whose loads act there, each with its share; none at rest.
     dragged : (n_contact,) array
         How far obstacles have travelled along the tangents in this increment, dimensionless.
@@ -84,7 +61,7 @@ class IncrementEnd:
     state: ContactState
     motion: SlipHistory
     gap: FloatArray
-    loads: tuple[tuple[float, StepModel], ...] = ()
+    loads: tuple[tuple[float, Model], ...] = ()
     obstacle_slip: FloatArray | float = 0.0
 
     @property
@@ -102,18 +79,18 @@ class IncrementEnd:
         return forces, displacements
 
     @classmethod
-    def at_rest(cls, model: StepModel) -> IncrementEnd:
+    def at_rest(cls, model: Model) -> IncrementEnd:
         """Return the state before any load, with obstacles that overlap with the body still at its surface."""
         n = model.problem.n_contact
         rest = ContactState(np.zeros((n, 2)), np.zeros((n, 2)))
         return cls(rest, SlipHistory.at_rest(n), np.maximum(model.problem.gap, 0.0))
 
     @classmethod
-    def under(cls, model: StepModel, state: ContactState, motion: SlipHistory) -> IncrementEnd:
+    def under(cls, model: Model, state: ContactState, motion: SlipHistory) -> IncrementEnd:
         """Return the end of a step of a model."""
         return cls(state, motion, model.problem.gap, ((1.0, model),))
 
-    def work_from(self, before: IncrementEnd, model: StepModel) -> StepWork:
+    def work_from(self, before: IncrementEnd, model: Model) -> StepWork:
         """Return the work from the end of the increment before to this one, by the trapezoidal rule."""
         from bemkit.results.load_history import StepWork
 
@@ -180,13 +157,13 @@ class Path:
 
     Parameters
     ----------
-    model : StepModel
+    model : Model
         Of the step.
     start : IncrementEnd
         Where the step before has ended, or rest.
     time : float [s]
         At the end of the step.
-    before : StepModel, optional
+    before : Model, optional
         Of the step before; without one there is a single increment.
     between : callable
         Share of the way -> the problem there.
@@ -196,10 +173,10 @@ class Path:
         Load factors before and at the end of the step [-], where the scene states some.
     """
 
-    model: StepModel
+    model: Model
     start: IncrementEnd
     time: float
-    before: StepModel | None
+    before: Model | None
     between: Callable[[float], ContactProblem]
     drag: FloatArray | float = 0.0
     factors: tuple[float, float] | None = None

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from threading import Lock
-from typing import Any, Protocol
+from typing import Any
 
 from bemkit.errors import BemkitError
 from bemkit.model.model import build_model
@@ -36,7 +36,8 @@ class SharedBody:
     def __init__(self, scenes: Sequence[Scene], *, starts_cold: bool = False) -> None:
         self._base = max(scenes, key=_n_with_friction)  # friction that is new would take another condensation
         self._starts_cold = starts_cold
-        self._solver: _Solver | None = None
+        self._bodies: _Bodies | None = None
+        self._is_refused = False
         self._lock = Lock()
 
     def __reduce__(self) -> tuple[object, ...]:
@@ -52,24 +53,26 @@ class SharedBody:
             As `bemkit.run` does.
         """
         with self._lock:
-            if self._solver is None:
-                self._solver = self._made()
-            if not self._starts_cold and self._solver.has_start:
-                solution = self._solver.run(scene, is_cold=False)
+            if self._bodies is None and not self._is_refused:
+                self._make()
+            if self._bodies is None:
+                return run(scene)  # each scene says itself what is wrong
+            if not self._starts_cold and self._bodies.has_start:
+                solution = self._bodies.run(scene, is_cold=False)
                 if solution.is_converged:
                     return solution
-            return self._solver.run(scene, is_cold=True)
+            return self._bodies.run(scene, is_cold=True)
 
     def release(self) -> None:
         """Let go of all matrices; they would be made again for another scene."""
         with self._lock:
-            self._solver = None
+            self._bodies = None
 
-    def _made(self) -> _Solver:
+    def _make(self) -> None:
         try:
-            return _Bodies(self._base)
+            self._bodies = _Bodies(self._base)
         except BemkitError:
-            return _Anew()  # each scene says itself what is wrong
+            self._is_refused = True
 
 
 def _shared_body(base: Scene, starts_cold: bool) -> SharedBody:
@@ -79,24 +82,6 @@ def _shared_body(base: Scene, starts_cold: bool) -> SharedBody:
 def _n_with_friction(scene: Scene) -> int:
     laws = [scene.law] if scene.bodies else scene.only.laws.values()
     return sum(not law.is_frictionless for law in laws)
-
-
-class _Solver(Protocol):
-    @property
-    def has_start(self) -> bool:
-        """Whether a scene has been solved from which others can start."""
-
-    def run(self, scene: Scene, *, is_cold: bool) -> Any:
-        """Solve a scene."""
-
-
-class _Anew:
-    """Assembles the bodies of every scene anew."""
-
-    has_start = False
-
-    def run(self, scene: Scene, *, is_cold: bool) -> Any:
-        return run(scene)
 
 
 class _Bodies:
@@ -111,9 +96,11 @@ class _Bodies:
 
     @property
     def has_start(self) -> bool:
+        """Whether a scene has been solved from which others can start."""
         return self._last is not None
 
     def run(self, scene: Scene, *, is_cold: bool) -> Any:
+        """Solve a scene, from rest or from the solution of the last."""
         clock, base = StageClock.start(), self._model.prepared
         scenes = [with_found_contacts(step, self._found) for step in load_steps(scene)]
         with blas_threads_for(base.largest_matrix):

@@ -13,11 +13,10 @@ import bemkit as bk
 import bemkit.runs.adaptive
 from bemkit.geometry.meshing.partition import STEEPEST, better_partition
 from bemkit.reference import DiscBetweenPlates
-from bemkit.runs.adaptive import _Refinement, run_adaptive
+from bemkit.runs.adaptive import _best_last, _Refinement, run_adaptive
 from bemkit.runs.density import DensityMeshes
 from bemkit.runs.earlier_steps import EarlierSteps
 from bemkit.runs.mesh_sequence import Level
-from bemkit.runs.refinement import _best_last
 from tests.scenes import contact_error, disc, paper, reference_values, square, wavy
 from tests.slow import slow_except
 
