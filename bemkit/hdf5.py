@@ -126,7 +126,7 @@ class FileFormat:
             if marks.get("schema_version") != self.version:
                 raise reader.error(
                     f"has layout version {marks.get('schema_version')}, this bemkit {__version__} reads version "
-                    f"{self.version}: use the bemkit that wrote it, or write it anew"
+                    f"{self.version}: use the bemkit that wrote it, or solve the scene again"
                 )
             yield reader
 

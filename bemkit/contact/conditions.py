@@ -253,8 +253,8 @@ def of_statuses(
     Parameters
     ----------
     is_closed, slips : (n_contact,) bool arrays
-        Where the normal condition is that of `held` (elsewhere ``t_n = 0``), and where the tangential one is that of
-        `sliding` (elsewhere that of `held`).
+        Nodes with the normal condition of `held` (the others have ``t_n = 0``), and nodes with the tangential condition
+        of `sliding` (the others have that of `held`).
     held, sliding : LinearConditions
     """
     conditions = separated(len(is_closed)).replaced(np.stack([is_closed, ~slips], axis=1), held)

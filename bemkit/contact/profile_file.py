@@ -116,7 +116,7 @@ def _read_instrument(name: str, path: Path, row: int | None) -> ReadProfile:
     """Read a line scan, or a row of a map of heights, in metres if the file states its unit."""
     if importlib.util.find_spec("SurfaceTopography") is None:
         raise ProfileError(
-            f"{name}: is no text of two columns; files of instruments need SurfaceTopography: "
+            f"{name}: is not a text of two columns; files of instruments need SurfaceTopography: "
             'pip install "bemkit[surface]"'
         )
     from SurfaceTopography import open_topography

@@ -248,19 +248,18 @@ class BoundaryMesh:
         return self.parts[name]
 
     def points(self, elements: IntArray, xi: FloatArray) -> FloatArray:
-        """Evaluate elements.
+        """Return points on elements.
 
         Parameters
         ----------
         elements : (m,) int array
-            Element numbers.
+            Indices of the elements.
         xi : (q,) or (m, q) array
-            Local coordinates in [-1, 1], from start to end; the same on all elements, or those of each.
+            Local coordinates in [-1, 1], from start to end, common to all elements or one row for each.
 
         Returns
         -------
         (m, q, 2) array [m]
-            Points.
         """
         before, after = 0.5 - 0.5 * xi, 0.5 + 0.5 * xi
         straight = before[..., None] * self.start[elements][:, None] + after[..., None] * self.end[elements][:, None]

@@ -61,7 +61,7 @@ def traction_free_modes(mesh: BoundaryMesh, points: FloatArray) -> FloatArray:
 
 
 def without_motion(mesh: BoundaryMesh, points: FloatArray, displacement: FloatArray) -> FloatArray:
-    """Return a displacement less the rigid motion nearest to it, which strains nothing.
+    """Return a displacement without the rigid motion that fits it best, which causes no strain.
 
     Parameters
     ----------
@@ -71,7 +71,7 @@ def without_motion(mesh: BoundaryMesh, points: FloatArray, displacement: FloatAr
     Returns
     -------
     (n, 2) array [m]
-        Of an exterior the displacement itself, since any motion of its boundary strains it; see `admissible_modes`.
+        For an exterior the displacement itself, since any motion of its boundary causes strain; see `admissible_modes`.
     """
     motions = traction_free_modes(mesh, points)
     if not motions.shape[1]:

@@ -24,12 +24,12 @@ _DISTANCE, _LINE, _ATTEMPTS = 9.0, 11.0, 30
 
 
 def draw_outline(outline: Outline, title: str, axes: Axes | None = None, *, units: UnitNames | None = None) -> Axes:
-    """Draw the sides of an outline in turning colours, their names beside them, and a dot where each begins."""
+    """Draw the sides of an outline in alternating colours, with their names and a dot at the start of each."""
     axes, labels = axes_or_new(axes, 7.0, 5.2), []
     outwards = [1.0 if k == 0 or outline.is_exterior else -1.0 for k, loop in enumerate(outline.loops) for _ in loop]
-    for number, (side, sense) in enumerate(zip(outline.sides, outwards, strict=True)):
+    for index, (side, sense) in enumerate(zip(outline.sides, outwards, strict=True)):
         points = side.curve.point(_SEEN)
-        colour = _COLOURS[number % len(_COLOURS)]
+        colour = _COLOURS[index % len(_COLOURS)]
         axes.plot(*points.T, color=colour, linewidth=2.0)
         axes.plot(*points[0], color="black", marker="o", markersize=3.0)
         if len(outline.sides) <= _MANY:

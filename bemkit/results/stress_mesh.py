@@ -69,7 +69,7 @@ def stress_mesh(body: SolvedBody, spacing: float, frame: FloatArray) -> StressMe
     Parameters
     ----------
     body : Solution or SolvedBody
-        Of a half-plane the part of the frame below the strip of its surface that has elements.
+        For a half-plane the mesh fills the part of the frame below the strip with elements.
     spacing : float [m]
         Distance of points far from the boundary; close to it they are as dense as its elements.
     frame : (2, 2) array [m]

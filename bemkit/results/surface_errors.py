@@ -15,7 +15,7 @@ from bemkit.results.error_indicators import LOCAL_CALIBRATION, ky_fan_distance, 
 
 @dataclass(frozen=True, eq=False)
 class SurfaceErrors:
-    """Errors of constant tractions, and what they are measured by.
+    """Errors of constant tractions, and the sizes to which they are relative.
 
     Parameters
     ----------

@@ -238,8 +238,8 @@ def _moved_contacts(body: SolvedBody, units: UnitNames | None) -> Iterator[Resul
             yield ResultWarning(
                 "moved contact",
                 name,
-                f"Part {name!r} moves so far that its contact is {distance} off the obstacle, {share} the "
-                "displacement that its contact force causes: gaps and normals are those of the undeformed body. "
+                f"Part {name!r} moves so far that its contact ends {distance} off the obstacle, {share} the "
+                "displacement by its contact force: gaps and normals are those of the undeformed body. "
                 "Model the body in its final position.",
                 off,
             )

@@ -264,20 +264,14 @@ class _Path:
         limit_rate = bound.slope * rate.sigma_n + cover.friction
         slack = [-origin.sigma_n, problem.gap - origin.u_n, limit + origin.sigma_t, limit - origin.sigma_t]
         slack_rate = [-rate.sigma_n, cover.gap - rate.u_n, limit_rate + rate.sigma_t, limit_rate - rate.sigma_t]
+        may_open, may_close = is_closed, ~is_closed & np.isfinite(problem.gap)
+        keeps_slipping = slips & ~is_free & ~problem.body.tangent_follows
         return _Segment(
             origin,
             rate,
-            np.stack(
-                [
-                    is_closed,
-                    ~is_closed & np.isfinite(problem.gap),
-                    sticks,
-                    sticks,
-                    slips & ~is_free & ~problem.body.tangent_follows,
-                ]
-            ),
-            np.stack([*slack, direction * origin_slip]),
-            np.stack([*slack_rate, direction * (rate.u_t - cover.slip)]),
+            is_kept=np.stack([may_open, may_close, sticks, sticks, keeps_slipping]),
+            slack=np.stack([*slack, direction * origin_slip]),
+            slack_rate=np.stack([*slack_rate, direction * (rate.u_t - cover.slip)]),
         )
 
 

@@ -19,8 +19,8 @@ _ELEMENTS = 16
 def check_shape(shape: Shape) -> None:
     """Check everything that `Shape` promises; call it on your own shape.
 
-    The outline is closed, has the body on its left, and is the same whenever it is asked for; its curves conform, and
-    have a parameter proportional to the arc length.
+    The outline is closed, has the body on its left, and is the same at every call; its curves pass `check_curve`, and
+    their parameter is proportional to the arc length.
 
     Parameters
     ----------

@@ -106,7 +106,7 @@ def test_similar_halves_answer_alike_where_all_sticks() -> None:
     assert Verdict(row.verdict) is Verdict.RIGHT, row
     for name in ("turn", "position"):
         (axis,) = find_axes([name], AXES_OF_BODIES)
-        assert "has a symmetry, whose bodies stay where they are drawn" in axis.reason_against(blocks())
+        assert "has a symmetry, so its bodies cannot be moved" in axis.reason_against(blocks())
 
 
 def test_normals_at_a_line_are_those_of_the_whole_side() -> None:

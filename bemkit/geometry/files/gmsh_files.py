@@ -52,7 +52,7 @@ def read_with_gmsh(path: Path) -> PlaneMesh:
     """
     with path.open("rb") as stream:
         if not stream.read(100).lstrip().startswith(b"$"):  # gmsh would run anything else as a .geo file
-            raise GeometryError("it cannot be read: a .msh file begins with $MeshFormat: write it anew")
+            raise GeometryError("it cannot be read: a .msh file begins with $MeshFormat: export it again")
     with _opened(path) as gmsh:
         tags, coordinates, _ = gmsh.model.mesh.getNodes()
         if not len(tags):
@@ -187,7 +187,7 @@ def _opened(path: Path) -> Iterator[Any]:
             gmsh.model.add(f"bemkit {path.name}")
             gmsh.merge(str(path))  # where opening would clear the models there are
         except Exception as error:  # gmsh's own class of all its errors
-            raise GeometryError(f"gmsh cannot read it ({printable(str(error))}): write it anew") from error
+            raise GeometryError(f"gmsh cannot read it ({printable(str(error))}): export it again") from error
         yield gmsh
     finally:
         gmsh.option.setNumber("General.Terminal", speaks)

@@ -55,7 +55,7 @@ def read_with_meshio(path: Path) -> PlaneMesh:
             or nodes.shape[1] < n_corners
             or (nodes.size and not 0 <= nodes.min() <= nodes.max() < len(points))
         ):
-            raise GeometryError(f"it is damaged: its cells do not join its {len(points)} points: write it anew")
+            raise GeometryError(f"it is damaged: its cells do not join its {len(points)} points: export it again")
         blocks.append(CellBlock(n_corners, order, nodes.astype(np.intp), _names(mesh, k), _curves(mesh, k)))
     return PlaneMesh(points, tuple(blocks), tuple(mesh.field_data))
 
@@ -100,7 +100,7 @@ def _names(mesh: Any, number: int) -> tuple[str, ...]:
         ) from error
     for name in dict.fromkeys(names):
         if not name.isprintable():
-            raise GeometryError(f"it is damaged: the group {name!r} has a name that is not printable: write it anew")
+            raise GeometryError(f"it is damaged: the group {name!r} has a name that is not printable: export it again")
     return names
 
 

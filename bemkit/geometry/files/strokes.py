@@ -35,7 +35,7 @@ class Stroke:
     ----------
     start : (float, float) [m]
     side : LineTo, ArcTo, SplineTo or NurbsTo
-        Its group is what the file calls it: a physical group, a layer, an id; empty if it has no name.
+        Its group is its name in the file: a physical group, a layer, an id; empty without a name.
     """
 
     start: Point
@@ -216,9 +216,9 @@ def _in_groups(groups: Iterable[str]) -> str:
 
 
 def _groups_that_close(ends: IntArray, groups: Sequence[str]) -> str:
-    """Return as a remedy the groups whose strokes form closed loops without those of others; empty if there are none.
+    """Return the remedy: groups whose strokes form closed loops without the others; empty if there are none.
 
-    Tried are all groups but one, then those that close by themselves.
+    It tries all groups but one, then the groups that are closed by themselves.
     """
     of_group = np.array(groups)
     names = sorted({*groups})
@@ -233,8 +233,8 @@ def _groups_that_close(ends: IntArray, groups: Sequence[str]) -> str:
         return ""
     dropped = _in_groups(set(names) - set(kept))
     listed = ", ".join(map(repr, kept))
-    words = " ".join(f"--only {shlex.quote(name)}" for name in kept)
-    remedy = "name the others with only" if "" in kept else f"write only = [{listed}], or {words}"
+    options = " ".join(f"--only {shlex.quote(name)}" for name in kept)
+    remedy = "name the others with only" if "" in kept else f"write only = [{listed}], or {options}"
     return f"without the lines{dropped} the outline is closed: {remedy}"
 
 

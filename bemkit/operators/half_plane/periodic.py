@@ -37,7 +37,7 @@ def wave_flexibility(n_elements: int, period: float, material: Material) -> Floa
     -------
     (n_elements,) array [m/Pa]
         Positive, in the order of `numpy.fft.fftfreq`. The uniform wave displaces like the longest one, by
-        period / (pi E'): a choice, since nothing is at rest below.
+        period / (pi E'): a convention, since no point of a half-plane is at rest.
     """
     from scipy.special import zeta
 

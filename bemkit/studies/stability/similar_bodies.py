@@ -79,7 +79,7 @@ class BodiesSimilarity:
             If something of it has no similar one; the message names it.
         """
         if scene.symmetry is not None and not (self.turn == 0.0 and self.shift == (0.0, 0.0)):
-            raise InputError("the scene has a symmetry, whose bodies stay where they are drawn: remove it")
+            raise InputError("the scene has a symmetry, so its bodies cannot be moved: remove the symmetry")
         return with_changed_steps(scene, self._applied)
 
     def _applied(self, scene: Scene) -> Scene:

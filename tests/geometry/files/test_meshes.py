@@ -275,7 +275,7 @@ def test_geometries_that_are_no_plane_body(tmp_path) -> None:
             r"it holds a solid: bemkit solves plane problems",
         ),
         ('SetFactory("OpenCASCADE"); Rectangle(1) = {0, 0, 0, 1, 1};\n', ""),
-        ("Point(1) = {0, 0\n", r"gmsh cannot read it \(.*\): write it anew"),
+        ("Point(1) = {0, 0\n", r"gmsh cannot read it \(.*\): export it again"),
     ):
         (tmp_path / "part.geo").write_text(text)
         if not message:
