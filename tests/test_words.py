@@ -65,3 +65,15 @@ def test_household_words_are_found(text: str) -> None:
 @pytest.mark.parametrize("text", ["It leaves the forces out of equilibrium", "a standalone file", "the left side"])
 def test_other_words_are_not_found(text: str) -> None:
     assert not found_in(text)
+
+
+def test_the_readme_fits_a_screen_or_two() -> None:
+    lines = (TOP / "README.md").read_text("utf-8").splitlines()
+    assert len(lines) <= 80
+    assert max(map(len, lines)) <= 120
+
+
+def test_the_changelog_has_at_most_25_entries_for_a_version() -> None:
+    versions = re.split(r"^## ", (TOP / "CHANGELOG.md").read_text("utf-8"), flags=re.MULTILINE)[1:]
+    assert versions
+    assert all(len(re.findall(r"^- ", version, re.MULTILINE)) <= 25 for version in versions)

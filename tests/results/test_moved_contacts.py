@@ -36,7 +36,7 @@ def test_sliding_far_along_a_curved_obstacle_is_doubted() -> None:
     solution = bk.run(block(0.1))
     assert solution.is_converged
     (doubt,) = doubts(solution)
-    assert "Part 'floor' moves so far that its contact is 0.00" in doubt
+    assert "Part 'floor' moves so far that its contact ends 0.00" in doubt
     assert "Model the body in its final position" in doubt
     there = bk.run(replace(block(0.0), shape=bk.Rectangle(1.0, 1.0, (0.1, 0.0))))
     assert solution.force_normal > 1.2 * there.force_normal  # the doubt is right
