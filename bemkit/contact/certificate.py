@@ -33,7 +33,7 @@ class Certificate:
     tension : float
         ``sigma_n`` where positive.
     complementarity : float
-        The smaller of traction and distance to the obstacle: both are there where an open node carries traction.
+        The smaller of traction and distance to the obstacle, positive if an open node carries traction.
     cone_excess : float
         ``|sigma_t| - bound(sigma_n)`` where positive, the bound taken at the *present* normal traction.
     slip_opposition : float

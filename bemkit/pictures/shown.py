@@ -85,7 +85,7 @@ class DrawnBody:
 
 @dataclass(frozen=True, eq=False)
 class DrawnScene:
-    """All that a picture of bodies needs.
+    """Bodies, rigid bodies and contact table, as pictures draw them.
 
     Parameters
     ----------

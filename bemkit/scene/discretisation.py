@@ -24,7 +24,7 @@ class Discretisation(Protocol):
     """Spaces of displacements and tractions, and the map between them; a frozen dataclass without a mesh.
 
     A discretisation of your own derives from this class and writes the members without a default;
-    `bemkit.testing.check_discretisation` proves its promises.
+    `bemkit.testing.check_discretisation` tests it.
     """
 
     @property

@@ -82,7 +82,7 @@ def with_changed_steps(scene: Scene, change: Callable[[Scene], Scene]) -> Scene:
     Returns
     -------
     Scene
-        With the changes of its steps as objects of Python, so that no file can hold them, if it has several.
+        If it has several steps, their changes are Python objects, which a file cannot hold.
     """
     first, *others = (change(step) for step in load_steps(scene))
     if not others:

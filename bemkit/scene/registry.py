@@ -19,24 +19,24 @@ def reference_of(declared: object) -> str:
 
 @dataclass(frozen=True)
 class Registry:
-    """Classes of one role and the words that name them in scene files.
+    """Classes of one role and their names in scene files.
 
     Parameters
     ----------
     role : str
         What the classes are, for messages: "friction law".
     built_in : mapping of str to str
-        Word to ``"module:Class"``; a module is imported when its word is first met.
+        Name to ``"module:Class"``; a module is imported when its name is first used.
     group : str
         Name of the entry-point group by which installed packages add classes; empty if there is none.
     presets : mapping of str to (str, mapping), optional
-        Words for a class with options: the word of the class, and the values of its keys.
+        Names of a class with options: the name of the class, and the values of its keys.
     hints : mapping of str to str, optional
-        Words that name no class, and what to write instead.
+        Names without a class, and what to write instead.
     protocol : str, optional
-        The protocol that the classes fulfil, as ``"module:Class"``; none if they are all alternatives there are.
+        The protocol of the classes, as ``"module:Class"``; none if nobody can add a class.
     listed : str, optional
-        The word of the class that a list of words or tables makes; a tuple of them is its only field.
+        The name of the class that a list of names or tables makes; its only field is a tuple of them.
     """
 
     role: str

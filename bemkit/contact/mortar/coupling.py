@@ -235,7 +235,7 @@ def couple(
 
 
 def facing_segments(non_mortar: ContactSide, mortar: ContactSide, reach: float) -> tuple[FloatArray, Segments]:
-    """Return the directions of contact (n_knots, 2) of a side, and its pieces that face another one.
+    """Return the directions of contact (n_knots, 2) of a side, and its segments that face another side.
 
     Raises
     ------

@@ -93,7 +93,7 @@ class InteriorFields(PotentialFields):
     What limits the accuracy is the boundary data: the result is the exact field of the given piecewise polynomials.
     Where these jump or kink, at a node between constant or linear elements, stresses of that field grow like log(d)
     (jumps of tractions or kinks of displacements) or 1 / d (jumps of displacements). Closer to the boundary than
-    about one element length, stresses of discrete solutions are therefore to be read opposite the middle of elements.
+    about one element length, read stresses of discrete solutions opposite the middle of elements.
     """
 
     def __init__(

@@ -106,7 +106,7 @@ def all_rows(vary: Mapping[str, Sequence[float]]) -> tuple[tuple[SweepKey, ...],
         columns.append(values)
     n_rows = math.prod(map(len, columns))
     if n_rows > MOST_ROWS:
-        raise StudyError(f"there are {n_rows} rows: give fewer values, {MOST_ROWS} rows at most")
+        raise StudyError(f"the sweep has {n_rows} rows: give fewer values, at most {MOST_ROWS} rows")
     return tuple(SweepKey(name) for name in vary), list(product(*columns))
 
 

@@ -127,7 +127,7 @@ def test_wrong_words_are_named(text: str, message: str) -> None:
         ({"a": [1.0, float("nan")]}, "a: nan is not a finite number"),
         ({"a": ["1"]}, "a: '1' is not a finite number"),
         ({"a": [1.0, 1]}, "a: 1 is given twice: remove one"),
-        ({"a": range(400), "b": range(400)}, "there are 160000 rows: give fewer values"),
+        ({"a": range(400), "b": range(400)}, "the sweep has 160000 rows: give fewer values"),
     ],
 )
 def test_wrong_values_are_named(vary: dict[str, list[float]], message: str) -> None:
