@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import traceback
 import warnings
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
 from functools import partial
@@ -77,13 +77,12 @@ def drawn_case(seed: int, index: int) -> RandomCase | RandomCase:
     return random_assembly(seed, index) if index % EVERY == EVERY - 1 else random_case(seed, index)
 
 
-def try_case(seed: int, index: int) -> Trial:
-    """Draw a random scene or assembly, solve it and judge the answer; see `drawn_case`."""
+def try_case(seed: int, index: int, solve: Callable[[RandomCase], Sequence[Solution]] | None = None) -> Trial:
+    """Draw a random scene, solve it, by default with `solved_steps`, and judge the solution; see `drawn_case`."""
     with warnings.catch_warnings():
         warnings.simplefilter("error")  # a warning of numpy is a number that nobody expected
         try:
-            steps = solved_steps(drawn_case(seed, index))
-            return Trial(seed, index, *judge(steps))
+            return Trial(seed, index, *judge((solve or solved_steps)(drawn_case(seed, index))))
         except BemkitError as error:
             return Trial(seed, index, Outcome.NAMED, type(error).__name__, str(error))
         except Exception as error:
@@ -91,8 +90,8 @@ def try_case(seed: int, index: int) -> Trial:
 
 
 def solved_steps(
-    case: RandomCase | RandomCase,
-) -> Sequence[Solution] | Sequence[Solution]:
+    case: RandomCase,
+) -> Sequence[Solution]:
     """Solve the scenes of a case; one solution for each load step."""
     scenes: Any = case.scenes
     return [run(scenes[0])] if len(scenes) == 1 and scenes[0].n_steps == 1 else run(scenes)

@@ -33,6 +33,7 @@ from bemkit.solvers.base import solve
 from bemkit.solvers.ssn import SemismoothNewton
 from bemkit.studies.engine import Task, compute
 
+_OPTIONS = AugmentedLagrangian()
 RHO = (1e2, 1e3, 1e4, 1e5, 1e6)
 """Values of rho_1 (rows) and rho_2 (columns)."""
 
@@ -95,8 +96,11 @@ class PaperTable:
 
 def paper_tables(
     run: Callable[[Sequence[Task[PaperCell]]], Iterable[PaperCell]] = compute,
+    options: AugmentedLagrangian = _OPTIONS,
 ) -> tuple[PaperTable, PaperTable]:
     """Compute both tables, about a second, with their 50 cells computed by `compute` or `compute_with_progress`.
+
+    The penalties of the options are those of the cells.
 
     Raises
     ------
@@ -110,7 +114,7 @@ def paper_tables(
             Task(
                 (number, i, j),
                 f"Table {number}, rho_1 = {RHO[i]:.0e}, rho_2 = {RHO[j]:.0e}",
-                partial(_cell, number, i, j, models[number]),
+                partial(_cell, number, i, j, models[number], options),
             )
             for number, i, j in product((1, 2), range(len(RHO)), range(len(RHO)))
         ]
@@ -147,10 +151,10 @@ def text_of(table: PaperTable) -> str:
     return "\n".join([heading, *lines, newton, ""])
 
 
-def _cell(number: int, i: int, j: int, model: Model) -> PaperCell:
+def _cell(number: int, i: int, j: int, model: Model, options: AugmentedLagrangian) -> PaperCell:
     # from rho * E / (1 unit of length) to units of E'/L
     unit = model.prepared.only.material.youngs_modulus / model.units.modulus * model.units.length
-    driver = AugmentedLagrangian(rho_n=RHO[i] * unit, rho_t=RHO[j] * unit)
+    driver = replace(options, rho_n=RHO[i] * unit, rho_t=RHO[j] * unit)
     try:
         return PaperCell((number, i, j), *_outer_steps(model.problem, driver))
     except PaperTableError as error:

@@ -64,8 +64,9 @@ def compute_with_progress(
     processes: int = 1,
     cluster: str | None = None,
     finished: Mapping[Hashable, R] | None = None,
+    console: Console | None = None,
 ) -> Iterator[R]:
-    """Compute records as `bemkit.studies.engine.compute` does, while a bar on standard error shows the progress.
+    """Compute records as `bemkit.studies.engine.compute` does, while a bar, by default on standard error, shows it.
 
     Raises
     ------
@@ -76,7 +77,7 @@ def compute_with_progress(
 
     counts = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn())
     times = (TimeElapsedColumn(), TextColumn("left"), TimeRemainingColumn())
-    bar = Progress(*counts, *times, console=Console(stderr=True), transient=True, disable=not is_live)
+    bar = Progress(*counts, *times, console=console or Console(stderr=True), transient=True, disable=not is_live)
     with executor_of(processes, cluster) as (executor, n_workers), bar:
         row = bar.add_task(name, total=len(tasks))
 

@@ -316,15 +316,6 @@ def test_what_shows_only_while_solving_is_one_line_too(
     assert message in error
 
 
-def test_defects_of_bemkit_keep_their_traceback(monkeypatch: pytest.MonkeyPatch) -> None:
-    def broken(*arguments: object, **options: object) -> None:
-        raise ValueError("not an input error")
-
-    monkeypatch.setattr(bemkit.runs.run, "run", broken)
-    with pytest.raises(ValueError, match="not an input error"):
-        main(["run", "paper-1"])
-
-
 @pytest.mark.parametrize("error", [KeyboardInterrupt, MemoryError])
 def test_an_interrupt_leaves_no_file(
     error: type[BaseException], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import io
 import json
 import os
@@ -61,13 +62,13 @@ def test_letters_that_the_encoding_lacks_are_shown_as_codes(encoding: str, expec
     assert terminal.shown == expected
 
 
-def test_data_are_utf_8_in_any_encoding(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_data_are_utf_8_in_any_encoding() -> None:
     terminal = Terminal("ascii")
-    monkeypatch.setattr(sys, "stdout", terminal)
-    with guarded_streams():
-        print_data("x = 'ü'")
-    assert terminal.shown == "x = 'ü'".encode()
-    assert sys.stdout is terminal
+    with contextlib.redirect_stdout(terminal):
+        with guarded_streams():
+            print_data("x = 'ü'")
+        assert terminal.shown == "x = 'ü'".encode()
+        assert sys.stdout is terminal
 
 
 @pytest.mark.parametrize(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -117,9 +117,9 @@ def test_a_profile_is_levelled_before_its_period_begins_again(tmp_path: Path) ->
 
 
 @pytest.mark.parametrize("file", ["surface.sdf", "scan.txt"])
-def test_files_of_instruments_need_an_extra(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, file: str) -> None:
+def test_files_of_instruments_need_an_extra(tmp_path: Path, without: Callable[..., None], file: str) -> None:
     (tmp_path / file).write_bytes(b"\xff\x00binary" if file == "surface.sdf" else b"a\0b")
-    monkeypatch.setitem(sys.modules, "SurfaceTopography", None)
+    without("SurfaceTopography")
     with pytest.raises(ProfileError, match=r'need SurfaceTopography: pip install "bemkit\[surface\]"'):
         bk.Profile(str(tmp_path / file))
 

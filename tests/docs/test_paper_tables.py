@@ -7,7 +7,6 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
-import docs.paper_tables as module
 from bemkit.cli.progress import compute_with_progress
 from bemkit.solvers.alm import AugmentedLagrangian, InnerNewton
 from bemkit.studies.engine import Task
@@ -79,20 +78,12 @@ def test_the_text_shows_each_cell(tables: tuple[PaperTable, PaperTable]) -> None
         assert max(map(len, text.splitlines())) <= 80
 
 
-def test_a_run_that_does_not_stop_is_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
-    def impatient(rho_n: float, rho_t: float) -> AugmentedLagrangian:
-        return AugmentedLagrangian(rho_n=rho_n, rho_t=rho_t, inner=InnerNewton(max_steps=1))
-
-    monkeypatch.setattr(module, "AugmentedLagrangian", impatient)
+def test_a_run_that_does_not_stop_is_an_error() -> None:
+    impatient = AugmentedLagrangian(inner=InnerNewton(max_steps=1))
     with pytest.raises(PaperTableError, match=r"table 1, rho_1 = 100, rho_2 = 100: INNER_FAILED in outer step 1"):
-        paper_tables()
-
-    def short(rho_n: float, rho_t: float) -> AugmentedLagrangian:
-        return AugmentedLagrangian(rho_n=rho_n, rho_t=rho_t, max_steps=3)
-
-    monkeypatch.setattr(module, "AugmentedLagrangian", short)
+        paper_tables(options=impatient)
     with pytest.raises(PaperTableError, match="not stopped after 3 outer steps"):
-        paper_tables()
+        paper_tables(options=AugmentedLagrangian(max_steps=3))
 
 
 def test_every_pair_is_a_task_and_finds_its_place(tables: tuple[PaperTable, PaperTable]) -> None:

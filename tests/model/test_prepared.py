@@ -3,37 +3,15 @@
 from __future__ import annotations
 
 import dataclasses
-from collections import Counter
 
 import numpy as np
 import pytest
 
 import bemkit as bk
-import bemkit.model.prepared
 from bemkit.model.model import build_model
 from bemkit.model.prepared import prepare, prepare_steps
 from bemkit.operators.steklov_poincare.collocation import CollocationElasticity
 from bemkit.scene.load_history import load_steps
-
-ONCE = ("candidates_of", "obstacle_rows", "held_nodes", "nodal_forces")
-
-
-@pytest.mark.parametrize("factors", [(1.0,), (0.5, 1.0)])
-def test_everything_is_found_once_for_each_load_step(
-    factors: tuple[float, ...], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    calls: Counter[str] = Counter()
-    for name in ONCE:
-        original = getattr(bemkit.model.prepared, name)
-
-        def counted(*arguments: object, name: str = name, original: object = original) -> object:
-            calls[name] += 1
-            return original(*arguments)  # type: ignore[operator]
-
-        monkeypatch.setattr(bemkit.model.prepared, name, counted)
-    scene = dataclasses.replace(bk.load_scene("paper-1"), mesh=bk.MeshOptions(elements=40), load_factors=factors)
-    assert bk.run(scene).is_converged
-    assert calls == dict.fromkeys(ONCE, len(factors))
 
 
 def test_load_steps_share_the_units_of_the_largest_load() -> None:

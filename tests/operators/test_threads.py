@@ -82,16 +82,16 @@ def test_large_and_small_work_take_turns() -> None:
     assert n_blas_threads() == ALL
 
 
-def test_an_interrupt_while_waiting_leaves_the_queue(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_interrupt_while_waiting_leaves_the_queue() -> None:
     turns = threads._Turns()
 
     def interrupted(*arguments: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(turns._change, "wait_for", interrupted)
+    turns._change.wait_for = interrupted  # type: ignore[method-assign, assignment]
     with pytest.raises(KeyboardInterrupt), turns.shared(False, lambda: threadpool_limits(1)):
         pass
-    monkeypatch.undo()
+    del turns._change.wait_for
     with turns.shared(True, lambda: threadpool_limits(1, "blas")):
         assert n_blas_threads() == {1}
 

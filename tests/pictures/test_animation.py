@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import dataclasses
 import subprocess
+from collections.abc import Callable
 from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib import rc_context
 from PIL import Image
 
 import bemkit as bk
@@ -45,11 +47,11 @@ def test_the_animation_has_a_picture_of_each_step(steps: tuple[bk.Solution, ...]
 
 
 def test_the_encoder_of_the_package_makes_an_mp4_with_a_picture_of_each_step(
-    steps: tuple[bk.Solution, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    steps: tuple[bk.Solution, ...], tmp_path: Path
 ) -> None:
     imageio_ffmpeg = pytest.importorskip("imageio_ffmpeg")
-    monkeypatch.setattr("bemkit.pictures.animation.which", lambda name: None)  # none of the system
-    path = save_animation(tmp_path / "square.mp4", steps, steps_per_second=5)
+    with rc_context({"animation.ffmpeg_path": "no-such-program"}):  # none of the system
+        path = save_animation(tmp_path / "square.mp4", steps, steps_per_second=5)
     assert [each.name for each in tmp_path.iterdir()] == ["square.mp4"]
     decode = [imageio_ffmpeg.get_ffmpeg_exe(), "-i", str(path), "-f", "rawvideo", "-pix_fmt", "gray", "-"]
     film = subprocess.run(decode, capture_output=True, check=True)
@@ -61,14 +63,14 @@ def test_the_encoder_of_the_package_makes_an_mp4_with_a_picture_of_each_step(
 
 
 def test_animations_that_cannot_be_written_are_refused(
-    steps: tuple[bk.Solution, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    steps: tuple[bk.Solution, ...], tmp_path: Path, without: Callable[..., None]
 ) -> None:
-    monkeypatch.setattr("bemkit.pictures.animation._encoder", lambda: None)
+    without("imageio_ffmpeg")
     for name, message in (
         ("a.avi", "unknown ending of a moving picture: choose .gif or .mp4"),
         ("a.mp4", r"\.mp4 needs an encoder: pip install \"bemkit\[movie\]\", or choose \.gif"),
     ):
-        with pytest.raises(OutputFileError, match=message):
+        with pytest.raises(OutputFileError, match=message), rc_context({"animation.ffmpeg_path": "no-such-program"}):
             save_animation(tmp_path / name, steps)
     with pytest.raises(bk.InputError, match="steps_per_second is 0: give a whole number from 1 to 60"):
         save_animation(tmp_path / "a.gif", steps, steps_per_second=0)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import logging
 from collections.abc import Callable
 from pathlib import Path
 
@@ -148,11 +149,12 @@ def test_the_command_draws_results_and_scenes(tmp_path: Path, capsys: pytest.Cap
 )
 @pytest.mark.usefixtures("here")
 def test_the_command_refuses_before_anything_is_solved(
-    arguments: tuple[str, ...], message: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+    arguments: tuple[str, ...], message: str, tmp_path: Path, caplog: pytest.LogCaptureFixture,
     capsys: pytest.CaptureFixture[str],
 ) -> None:  # fmt: skip
-    monkeypatch.setattr("bemkit.cli.sources.run", None)
-    assert call(*arguments) == 2
+    with caplog.at_level(logging.DEBUG, "bemkit.progress"):
+        assert call(*arguments) == 2
+    assert not caplog.records  # of a run
     assert message in capsys.readouterr().err
     assert not list(tmp_path.iterdir())
 

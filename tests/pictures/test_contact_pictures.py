@@ -9,9 +9,7 @@ import matplotlib.colors
 import numpy as np
 import pytest
 from matplotlib.axes import Axes
-from matplotlib.collections import PathCollection
 from matplotlib.figure import Figure
-from matplotlib.quiver import Quiver
 
 import bemkit as bk
 from bemkit.pictures import (
@@ -21,9 +19,9 @@ from bemkit.pictures import (
     draw_contact_traction,
     draw_convergence,
     draw_friction_cone,
-    draw_zoom,
 )
 from bemkit.pictures.contact_axes import STATUS_COLOURS
+from bemkit.pictures.crowds import marked
 from bemkit.pictures.drawing import ignore_round_off
 from bemkit.pictures.traction_curves import traction_curve
 from bemkit.results.solution import Solution
@@ -202,25 +200,10 @@ def test_many_nodes_have_no_dots(draw: Draw, monkeypatch: pytest.MonkeyPatch) ->
     assert all(line.get_marker() != "o" for line in many.lines)
 
 
-@pytest.mark.parametrize("draw", [draw_zoom, lambda solution: draw_friction_cone(solution, "foundation")])
-def test_of_a_crowd_of_nodes_those_that_are_seen_apart_are_marked(
-    draw: Callable[[Solution], Axes], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    solution = run(with_overrides(load_scene("paper-1"), elements=80))
-    few = marks(draw(solution))
-    monkeypatch.setattr("bemkit.pictures.crowds.MANY", 3)
-    monkeypatch.setattr("bemkit.pictures.crowds._ACROSS", 4)
-    many = marks(draw(solution))
-    assert few.keys() == many.keys() > {"slip", "stick"}
-    assert len(few["stick"]) > len(many["stick"]) > 1
-    for word, points in many.items():
-        assert {*map(tuple, points)} <= {*map(tuple, few[word])}
-
-
-def marks(axes: Axes) -> dict[str, np.ndarray]:
-    """Return the points of all marks and arrows of axes by their labels, arrows by their class."""
-    return {
-        str(each.get_label()) if isinstance(each, PathCollection) else "arrows": np.asarray(each.get_offsets())
-        for each in axes.collections
-        if isinstance(each, PathCollection | Quiver)
-    }
+def test_of_a_crowd_of_points_the_largest_of_those_that_hide_each_other_are_marked() -> None:
+    points = np.column_stack([np.linspace(0.0, 1.0, 1000), np.zeros(1000)])
+    sizes = np.tile([1.0, 2.0], 500)
+    rows = marked(points, sizes, 1.0)
+    assert 70 < len(rows) < 90  # 80 across the width
+    assert (sizes[rows] == 2.0).all()
+    assert len(marked(points[:300], sizes[:300], 1.0)) == 300

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import json
-import sys
 from base64 import b64decode
+from collections.abc import Callable
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -238,7 +238,7 @@ def test_a_grid_of_pyvista_holds_what_the_file_holds() -> None:
     np.testing.assert_array_equal(grid.point_data["sigma_n"][is_contact], solution.contact.sigma_n)
 
 
-def test_a_grid_without_pyvista_names_the_extra(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, "pyvista", None)
+def test_a_grid_without_pyvista_names_the_extra(without: Callable[..., None]) -> None:
+    without("pyvista")
     with pytest.raises(bk.InputError, match=r'grids of pyvista need it: pip install "bemkit\[viz\]"'):
         bk.run(bk.load_scene("bending")).to_pyvista()

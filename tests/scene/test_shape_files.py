@@ -38,8 +38,8 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def test_names_of_files_begin_at_the_scene(folder: Path, monkeypatch) -> None:
-    monkeypatch.chdir("/")
+def test_names_of_files_begin_at_the_scene(folder: Path) -> None:
+    assert not Path("part.msh").exists()
     scene = load_scene(folder / "scene.toml")
     assert isinstance(scene, bk.Scene)
     assert scene.shape.outline().side_names[:2] == ("foot", "wall-1")

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import h5py
 import pytest
+from rich.console import Console
 
 from bemkit.atomic_files import OutputFileError
 from bemkit.cli.options import study_output
@@ -146,11 +147,9 @@ def test_texts_are_written_only_where_they_are_wanted(tmp_path: Path) -> None:
     assert (tmp_path / "a.txt").read_text() == "1.0\n4.0\n"
 
 
-def test_the_bar_is_on_standard_error_and_only_where_it_is_live(
-    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv("FORCE_COLOR", "1")  # as if standard error were a terminal
-    assert list(compute_with_progress(tasks(1, 2), "squares", is_live=True)) == [square(1), square(2)]
+def test_the_bar_is_on_standard_error_and_only_where_it_is_live(capsys: pytest.CaptureFixture[str]) -> None:
+    terminal = Console(stderr=True, force_terminal=True)
+    assert list(compute_with_progress(tasks(1, 2), "squares", is_live=True, console=terminal)) == [square(1), square(2)]
     shown = capsys.readouterr()
     assert shown.out == ""
     assert "square of 2" in shown.err

@@ -50,14 +50,13 @@ class Jumping(Discretisation):
 
 
 @pytest.fixture
-def plugin(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    (tmp_path / "bemkit_jumping.py").write_text(PLUGIN, "utf-8")
-    information = tmp_path / "bemkit_jumping-1.0.dist-info"
+def plugin(here: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    (here / "bemkit_jumping.py").write_text(PLUGIN, "utf-8")
+    information = here / "bemkit_jumping-1.0.dist-info"
     information.mkdir()
     (information / "METADATA").write_text("Metadata-Version: 2.1\nName: bemkit-jumping\nVersion: 1.0\n", "utf-8")
     (information / "entry_points.txt").write_text("[bemkit.discretisations]\njumping = bemkit_jumping:Jumping\n")
-    monkeypatch.syspath_prepend(tmp_path)
-    monkeypatch.chdir(tmp_path)
+    monkeypatch.syspath_prepend(here)
     yield
     sys.modules.pop("bemkit_jumping", None)
 

@@ -36,7 +36,11 @@ def read_with_meshio(path: Path) -> PlaneMesh:
         If meshio is missing, cannot read the file, or the file holds no plane mesh.
     """
     require_meshio()
-    mesh = _read_quietly(path)
+    return plane_mesh_of(_read_quietly(path))
+
+
+def plane_mesh_of(mesh: Any) -> PlaneMesh:
+    """Return the plane mesh in the contents of a file as meshio reads them; GeometryError if there is none."""
     points = in_plane(_points_of(mesh))
     solid = [block.type for block in mesh.cells if block.type.startswith(("tetra", "hexa", "wedge", "pyramid"))]
     if solid:

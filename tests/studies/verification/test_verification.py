@@ -20,6 +20,7 @@ from bemkit.studies.row_file import RowFileError
 from bemkit.studies.verification import verification as module
 from bemkit.studies.verification.case import Case, Quantity
 from bemkit.studies.verification.cases import CASES
+from bemkit.studies.verification.records import FILE
 from bemkit.studies.verification.verification import Comparison, verify
 from tests.slow import slow_only
 
@@ -105,7 +106,7 @@ def test_nothing_measured_is_nothing_met() -> None:
     assert found.rows[0].errors == ()
 
 
-def test_what_is_in_the_file_is_not_computed_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_is_in_the_file_is_not_computed_again(tmp_path: Path) -> None:
     file, computed = tmp_path / "verification.jsonl", []
 
     def counting(tasks: Sequence[Task[Comparison]]) -> list[Comparison]:
@@ -119,9 +120,10 @@ def test_what_is_in_the_file_is_not_computed_again(tmp_path: Path, monkeypatch: 
         [("rotating-disc", 16), ("rotating-disc", 32)],
     ]
     assert second.rows[0].errors == first.rows[0].errors
-    monkeypatch.setattr(module, "LABELS", {"version": "0.0"})
+    old = tmp_path / "old.jsonl"
+    list(FILE.keep(old, (record for row in first.rows for record in row.records), {}, {"version": "0.0"}))
     with pytest.raises(RowFileError, match="holds a study with version"):
-        verify(["kirsch-hole"], file=file)
+        verify(["kirsch-hole"], file=old)
 
 
 def test_names_choose_cases() -> None:
