@@ -107,7 +107,7 @@ class FarFields:
         half = (self._panels.half * self._panels.tangent)[elements, None]
         place, slope = self._panels.centre[elements, None] + half * xi, np.repeat(half, xi.size, axis=1)
         bent = np.flatnonzero(~self._panels.is_straight[elements])
-        place[bent], slope[bent] = self._curved.place(elements[bent], np.tile(xi, (bent.size, 1)))
+        place[bent], slope[bent] = self._curved.place(elements[bent], xi)
         v, p = (
             each[elements] @ legendre_values(each.shape[1] - 1, xi).reshape(each.shape[1], -1)
             for each in (displacement, traction)

@@ -24,7 +24,6 @@ import numpy as np
 
 from bemkit.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from bemkit.geometry.mesh import BoundaryMesh
-from bemkit.geometry.pieces import derivative_on, evaluate_curves, point_on
 from bemkit.geometry.quadrature import gauss_legendre
 from bemkit.operators import kernels
 from bemkit.operators.integrals.panels import Panels
@@ -180,20 +179,13 @@ class ArcQuadrature:
     """
 
     def __init__(self, mesh: BoundaryMesh, origin: FloatArray) -> None:
-        self._curves = mesh.curves
-        self._curve = np.zeros(0, np.intp) if mesh.element_curve is None else mesh.element_curve
-        self._span = np.zeros((0, 2)) if mesh.element_span is None else mesh.element_span
-        self._origin = complex(origin[0], origin[1])
+        self._mesh, self._origin = mesh, complex(origin[0], origin[1])
         self._rules: dict[int, tuple[ComplexArray, ComplexArray]] = {}
 
     def place(self, elements: IntArray, xi: FloatArray) -> tuple[ComplexArray, ComplexArray]:
-        """Return y and dy/dxi, (n, q), for (n,) elements at (n, q) local coordinates."""
-        span = self._span[elements]
-        s = span[:, :1] * (0.5 - 0.5 * xi) + span[:, 1:] * (0.5 + 0.5 * xi)
-        curve = self._curve[elements]
-        point = evaluate_curves(self._curves, curve, s, point_on)
-        slope = evaluate_curves(self._curves, curve, s, derivative_on) * (0.5 * np.diff(span, axis=1))[..., None]
-        return point[..., 0] + 1j * point[..., 1] - self._origin, slope[..., 0] + 1j * slope[..., 1]
+        """Return y and dy/dxi, (n, q), for (n,) elements at (q,) or (n, q) local coordinates."""
+        plane = np.array([1.0, 1j])
+        return self._mesh.points(elements, xi) @ plane - self._origin, self._mesh.derivatives(elements, xi) @ plane
 
     def displacement_moments(
         self, x: ComplexArray, elements: IntArray, highest: int, length: float
@@ -277,10 +269,10 @@ class ArcQuadrature:
         return sums
 
     def _rule(self, n_points: int) -> tuple[ComplexArray, ComplexArray]:
-        """Return y and dy/dxi (n_elements, n_points) of every element, zero of straight ones, computed once."""
+        """Return y and dy/dxi (n_elements, n_points) of every element, computed once."""
         if n_points not in self._rules:
-            xi = np.tile(gauss_legendre(n_points)[0], (self._curve.size, 1))
-            self._rules[n_points] = self.place(np.arange(self._curve.size), xi)
+            xi = gauss_legendre(n_points)[0]
+            self._rules[n_points] = self.place(np.arange(self._mesh.n_elements), xi)
         return self._rules[n_points]
 
     def _split(self, x: ComplexArray, elements: IntArray) -> tuple[IntArray, FloatArray, FloatArray]:
