@@ -17,7 +17,7 @@ from bemkit.operators.linear.threads import for_each_chunk
 from bemkit.operators.material import Material
 from bemkit.operators.pair_form import Tag
 from bemkit.operators.steklov_poincare.needs import CHUNK_PAIRS, BodyCase, BodyNeeds, collocation_needs
-from bemkit.operators.steklov_poincare.nodal_conditions import GivenData, NodalConditions, rotate_columns
+from bemkit.operators.steklov_poincare.nodal_conditions import GivenData, NodalConditions, turn_columns
 from bemkit.operators.steklov_poincare.protocol import BoundaryMap, CondensedMap
 from bemkit.stopwatch import assembling
 
@@ -147,8 +147,10 @@ class MixedSystem:
         border, frame = self._equations.border, conditions.frame
         balances = border.balances.reshape(-1, mesh.n_elements, 2, 2)
         self._on_traction, self._on_displacement = (
-            rotate_columns(each.reshape(len(balances), -1), frame) for each in (balances[:, :, 0], -balances[:, :, 1])
+            each.reshape(len(balances), -1).copy() for each in (balances[:, :, 0], -balances[:, :, 1])
         )
+        for each in (self._on_traction, self._on_displacement):
+            turn_columns(each, frame)
 
         # the displacement equations with the columns of their errors, and the balances below them
         n_rows, order = self._weights.size, self._weights.size + len(balances)
@@ -197,12 +199,12 @@ class MixedSystem:
         def fill(nodes: slice) -> None:
             rows, own = slice(2 * nodes.start, 2 * nodes.stop), np.arange(nodes.start, nodes.stop)
             single = self._equations.block(np.arange(rows.start, rows.stop), of_traction)  # minus the single layer
-            _rotate(single, conditions.frame[elements])
+            turn_columns(single, conditions.frame[elements])
             known[rows] -= _product(single[:, index[loaded]], traction)
             if not needs_double:
                 return
             double = displacement_rows(self._equations, own, value_of_one)
-            _rotate(double, conditions.frame)
+            turn_columns(double, conditions.frame)
             known[rows] -= _product(double[:, moved], displacement)
             if matrix is not None and right is not None:
                 matrix[rows], right[rows] = double, double[:, self._retained]
@@ -296,14 +298,6 @@ class _MixedMap(CondensedMap):
     def follow(self, directions: IntArray) -> tuple[FloatArray, FloatArray]:
         """Return what free directions do."""
         return self.system.followed(self, directions)
-
-
-def _rotate(matrix: FloatArray, frame: FloatArray) -> None:
-    """Overwrite the columns (2 * node + component) of a matrix by those in the frames (n_nodes, 2, 2) of the nodes."""
-    turned = np.flatnonzero(np.any(frame != np.eye(2), axis=(1, 2)))
-    x, y = matrix.T[2 * turned], matrix.T[2 * turned + 1]
-    for k in range(2):
-        matrix.T[2 * turned + k] = frame[turned, k, 0, None] * x + frame[turned, k, 1, None] * y
 
 
 def _product(columns: FloatArray, values: FloatArray) -> FloatArray:

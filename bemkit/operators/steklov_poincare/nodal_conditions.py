@@ -199,35 +199,21 @@ def integrate_traction(space: BoundarySpace, elements: IntArray, field: Traction
     return summed_at_dofs(space, local, elements)
 
 
-def rotate_columns(matrix: FloatArray, frame: FloatArray) -> FloatArray:
-    """Express the columns (2 * node + component) of a matrix in the frames (n_nodes, 2, 2) of the nodes."""
-    turned = np.flatnonzero(np.any(frame != np.eye(2), axis=(1, 2)))
-    if not turned.size:
-        return matrix
-    result = matrix.copy(order="K")
-    x, y = matrix[:, 2 * turned], matrix[:, 2 * turned + 1]
-    for k in range(2):
-        result[:, 2 * turned + k] = frame[turned, k, 0] * x + frame[turned, k, 1] * y
-    return result
-
-
-def rotate_rows(matrix: FloatArray, frame: FloatArray) -> FloatArray:
-    """Express the rows (2 * node + component) of a matrix in the frames (n_nodes, 2, 2) of the nodes."""
-    return rotate_columns(matrix.T, frame).T
+def turn_columns(matrix: FloatArray, frame: FloatArray) -> None:
+    """Overwrite the columns (2 * node + component) of a matrix by those in the frames (n_nodes, 2, 2) of the nodes."""
+    columns = matrix.reshape(len(matrix), len(frame), 2)  # a view in any memory order
+    for _, nodes in consecutive_runs(np.flatnonzero(np.any(frame != np.eye(2), axis=(1, 2)))):
+        own, x, y = frame[nodes], columns[:, nodes, 0], columns[:, nodes, 1]
+        columns[:, nodes, 0], columns[:, nodes, 1] = [own[:, k, 0] * x + own[:, k, 1] * y for k in (0, 1)]
 
 
 def rotated(matrix: FloatArray, frame: FloatArray) -> FloatArray:
     """Express both the rows and the columns of a matrix in the frames (n_nodes, 2, 2) of the nodes."""
-    turned = np.flatnonzero(np.any(frame != np.eye(2), axis=(1, 2)))
-    if not turned.size:
+    if np.array_equal(frame, np.broadcast_to(np.eye(2), frame.shape)):
         return matrix
     result = matrix.copy()
-    rows, columns = result.reshape(len(frame), 2, -1), result.reshape(-1, len(frame), 2)
-    for _, nodes in consecutive_runs(turned):
-        own = frame[nodes]
-        rows[nodes] = own @ rows[nodes]
-        x, y = (columns[:, nodes, component] for component in (0, 1))
-        columns[:, nodes, 0], columns[:, nodes, 1] = [own[:, k, 0] * x + own[:, k, 1] * y for k in (0, 1)]
+    turn_columns(result, frame)
+    turn_columns(result.T, frame)
     return result
 
 

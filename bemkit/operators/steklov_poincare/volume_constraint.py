@@ -10,7 +10,7 @@ import numpy as np
 from bemkit.arrays import FloatArray
 from bemkit.operators.linear.dense import SingularMatrixError
 from bemkit.operators.linear.solvers import Factor
-from bemkit.operators.steklov_poincare.nodal_conditions import rotate_rows
+from bemkit.operators.steklov_poincare.nodal_conditions import turn_columns
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,7 +31,9 @@ class Volume:
 
     def in_frames(self, frame: FloatArray) -> Volume:
         """Return the same for displacements in the frames of the nodes."""
-        return replace(self, change=rotate_rows(self.change, frame))
+        change = self.change.copy()
+        turn_columns(change.T, frame)
+        return replace(self, change=change)
 
 
 @dataclass(frozen=True, eq=False)
