@@ -6,7 +6,7 @@ import numpy as np
 
 from bemkit.arrays import ComplexArray, FloatArray
 from bemkit.geometry.mesh import BoundaryMesh
-from bemkit.operators.collocation.collocation_points import CollocationPoints
+from bemkit.operators.collocation.curved_elements import CollocationPoints
 from bemkit.operators.collocation.gradient_reconstruction import GradientReconstruction
 from bemkit.operators.integrals.panels import Panels
 from bemkit.operators.material import Material
