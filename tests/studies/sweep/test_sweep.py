@@ -65,7 +65,7 @@ def bodies_made(monkeypatch: pytest.MonkeyPatch) -> list[str]:
         ({"parts.top-load.condition.y": [-1e-3, -1.0, -1e4]}, 1),
         ({"parts.foundation.condition.obstacle.point[1]": [0.0, -1e-5]}, 1),
         # the obstacle turns: the body is condensed anew, not assembled
-        ({"parts.foundation.condition.obstacle.normal[0]": [0.0, 0.01], FRICTION: [0.2, 0.4]}, 1),
+        ({"parts.foundation.condition.obstacle.normal[0]": [0.0, 1e-4], FRICTION: [0.2, 0.4]}, 1),
         ({"load_factors[0]": [0.5, 3.0]}, 1),
         ({FRICTION: [0.2, 0.4], "material.poisson_ratio": [0.0, 0.3, 0.5]}, 3),
         ({"mesh.elements": [32, 48]}, 0),
