@@ -5,11 +5,12 @@ import zlib
 import numpy as np
 
 from bemkit.contact.condensation.direct_body import DirectBody, WholeBody
-from bemkit.contact.condensation.nodes import ContactNodes, contact_conditions, contact_frame, nodes_on
+from bemkit.contact.condensation.nodes import ContactNodes, approaches, contact_frame, nodes_on, opened
 from bemkit.contact.laws import Coulomb
 from bemkit.contact.problem import ContactProblem, ContactState, DenseBody, LinearBody
 from bemkit.geometry.local_values import dof_weights
 from bemkit.geometry.spaces import dof_points
+from bemkit.operators.steklov_poincare.nodal_conditions import supported
 
 
 def contact_along_normals(space, elements):
@@ -17,6 +18,13 @@ def contact_along_normals(space, elements):
     nodes, normals = nodes_on(space, elements)
     weights = dof_weights(space, elements)[nodes]
     return ContactNodes(nodes, dof_points(space)[nodes], contact_frame(normals), weights)
+
+
+def contact_conditions(space, supports, candidates):
+    """Return the conditions of all nodes under supports, and those of the candidates that can touch."""
+    conditions = supported(space, supports)
+    contact = candidates.take(approaches(candidates.nodes, candidates.directions, conditions))
+    return opened(conditions, contact), contact
 
 
 def condense(elastic, supports, candidates, force):

@@ -8,7 +8,7 @@ import numpy as np
 from scipy import sparse
 
 from bemkit.arrays import BoolArray
-from bemkit.contact.condensation.nodes import nodes_on
+from bemkit.contact.condensation.nodes import approaches, nodes_on
 from bemkit.contact.laws import FrictionLaw
 from bemkit.contact.mortar.congruent import CongruentCouplings, PlacedSide
 from bemkit.contact.mortar.facing import find_facing, is_non_mortar
@@ -18,7 +18,7 @@ from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.reflection import antisymmetric_dofs
 from bemkit.geometry.spaces import BoundarySpace
 from bemkit.geometry.symmetry import Symmetry
-from bemkit.model.contacts import ContactRows, approaches, check_overlap
+from bemkit.model.contacts import ContactRows, check_overlap
 from bemkit.model.placed import PlacedBody
 from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions
 from bemkit.scene.contacts import ContactPair
@@ -94,7 +94,7 @@ def body_rows(
     for k in np.argsort(-np.round(np.array(lengths) / max(lengths, default=1.0), _DIGITS), kind="stable").tolist():
         (first, part, side), (second, _, other_side) = ordered[k]
         own_nodes, normals = nodes_on(side.space, side.elements)
-        held = ~approaches(own_nodes, normals, conditions[first].frame, conditions[first].is_fixed)
+        held = ~approaches(own_nodes, normals, conditions[first])
         crossed = np.array([taken[first].get(node, part) != part for node in own_nodes.tolist()])
         without = own_nodes[held | crossed]
         try:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray, IntArray
+from bemkit.contact.condensation.nodes import approaches
 from bemkit.contact.laws import FrictionLaw, Frictionless, LawOfCoefficients
 from bemkit.contact.problem import LawError
 from bemkit.errors import InputError
@@ -24,9 +25,6 @@ if TYPE_CHECKING:
 
 OVERLAP_TOLERANCE = 1e-6
 """Share of the size of the smaller body by which shapes may overlap without anybody meaning it: round-off of curves."""
-HELD_COSINE = 1e-3
-"""Cosine of the angle between the free direction of a supported node and the direction of contact below which it does
-not approach."""
 _SAME_DIRECTION = 1e-12
 
 
@@ -130,12 +128,6 @@ class ContactRows:
         return is_alike and np.allclose(self.frame, other.frame, rtol=0.0, atol=_SAME_DIRECTION)
 
 
-def approaches(nodes: IntArray, directions: FloatArray, frame: FloatArray, is_fixed: BoolArray) -> BoolArray:
-    """Return (n,) bool: nodes that their supports let move along directions (n, 2)."""
-    free = np.where(is_fixed[nodes][:, :, None], 0.0, frame[nodes])
-    return np.asarray(np.abs(np.einsum("nkc,nc->nk", free, directions)).max(axis=1) > HELD_COSINE)
-
-
 def check_overlap(pair: ContactPair, overlap: float, deepest: FloatArray, size: float) -> None:
     """Refuse bodies that overlap, at the point `deepest`, by more than the interference of their contact.
 
@@ -179,8 +171,8 @@ def obstacle_rows(
     rigid = {body.name: number for number, body in enumerate(scene.rigid)}
     pairs = {pair.name: pair for pair in scene.contacts if pair.rigid_body is not None}
     for number, (body, found) in enumerate(zip(bodies, candidates, strict=True)):
-        frames, fixed = conditions[number].frame, conditions[number].is_fixed
-        can_touch = approaches(found.nodes.nodes, found.nodes.directions, frames, fixed)
+        fixed = conditions[number].is_fixed
+        can_touch = approaches(found.nodes.nodes, found.nodes.directions, conditions[number])
         for name in dict.fromkeys(found.parts):
             rows = np.equal(found.parts, name) & can_touch
             nodes, gap, points = found.nodes.take(rows), found.gap[rows], found.points[rows]

@@ -10,7 +10,7 @@ import pytest
 import bemkit as bk
 from bemkit.contact.body import ContactState, SingularResponse
 from bemkit.contact.condensation.hierarchical_body import HierarchicalBody, hierarchical_body
-from bemkit.contact.condensation.nodes import NoContactNodesError, contact_conditions
+from bemkit.contact.condensation.nodes import NoContactNodesError
 from bemkit.contact.conditions import separated, stick
 from bemkit.contact.problem import ContactProblem
 from bemkit.errors import InputError
@@ -24,7 +24,7 @@ from bemkit.operators.linear.solvers import DenseCholesky, Hierarchical
 from bemkit.operators.steklov_poincare.hierarchical import HierarchicalCollocation
 from bemkit.operators.steklov_poincare.nodal_conditions import Support
 from bemkit.testing import check_body
-from tests.handmade import condensed_body
+from tests.handmade import condensed_body, contact_conditions
 from tests.scenes import Perforated, paper, squeezed, wavy
 from tests.slow import slow_except
 

@@ -367,7 +367,7 @@ def hierarchical_body(
     elastic : HierarchicalCollocation
     conditions : NodalConditions
     contact : ContactNodes
-        Both as `contact_conditions` has found them.
+        They may touch, and are retained where no support holds them; see `opened`.
     force : (n_elements, 2) array [N/m]
         Given nodal forces, zero at contact nodes.
     inside : ForcesInside, optional

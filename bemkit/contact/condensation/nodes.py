@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
 
@@ -12,7 +11,7 @@ from bemkit.arrays import BoolArray, FloatArray, IntArray
 from bemkit.errors import InputError
 from bemkit.geometry.spaces import BoundarySpace, element_nodes
 from bemkit.geometry.vectors import turned_left
-from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions, Support, free_modes, supported
+from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions, free_modes
 
 APPROACH_TOLERANCE = 1e-3
 """Cosine of the angle between the one direction in which a supported node can move and the direction of contact below
@@ -100,53 +99,18 @@ def nodes_on(space: BoundarySpace, elements: IntArray) -> tuple[IntArray, FloatA
     return order, normals[order]
 
 
-def contact_conditions(
-    space: BoundarySpace, supports: Sequence[Support], candidates: ContactNodes, driven: tuple[int, ...] = ()
-) -> tuple[NodalConditions, ContactNodes]:
-    """Find what is known at every node of a space: held by a support, retained for contact, or free.
+def approaches(nodes: IntArray, directions: FloatArray, conditions: NodalConditions) -> BoolArray:
+    """Return (n,) bool: nodes that their supports let move along directions (n, 2) of contact.
 
-    Parameters
-    ----------
-    space : BoundarySpace
-        The displacement space.
-    supports : sequence of Support
-    candidates : ContactNodes
-        Nodes that may touch, held by supports or not.
-    driven : tuple of int
-        Rigid motions that forces far away drive; see `NodalConditions`.
-
-    Returns
-    -------
-    conditions : NodalConditions
-        Contact nodes are retained in all directions that no support holds.
-    contact : ContactNodes
-        The candidates that can touch. The others are left to their supports, which let them move neither towards the
-        obstacle nor away from it.
-
-    Raises
-    ------
-    ConflictingSupportsError
-        If supports contradict each other at a node.
+    The others are left to their supports, which let them move neither towards the obstacle nor away from it.
     """
-    conditions = replace(supported(space, supports), driven=driven)
-    motion = np.where(conditions.is_fixed[candidates.nodes][:, :, None], 0.0, conditions.frame[candidates.nodes])
-    approach = np.abs(np.einsum("nkc,nc->nk", motion, candidates.directions)).max(axis=1)
-    contact = candidates.take(approach > APPROACH_TOLERANCE)
-    return opened(conditions, contact), contact
+    free = np.where(conditions.is_fixed[nodes][:, :, None], 0.0, conditions.frame[nodes])
+    return np.asarray(np.abs(np.einsum("nkc,nc->nk", free, directions)).max(axis=1) > APPROACH_TOLERANCE)
 
 
 def held_nodes(conditions: NodalConditions, contact: ContactNodes) -> BoolArray:
     """Return (n_contact,) bool: the contact nodes that a support holds in one direction."""
     return np.asarray(np.any(conditions.is_fixed[contact.nodes], axis=1))
-
-
-def following_tangents(conditions: NodalConditions, contact: ContactNodes) -> BoolArray:
-    """Return (n_contact,) bool: nodes without a tangential displacement of their own.
-
-    It follows from the one normal displacement of the node where a support holds the other direction, and between two
-    obstacles from the displacements towards both.
-    """
-    return held_nodes(conditions, contact) | contact.is_shared
 
 
 def opened(conditions: NodalConditions, contact: ContactNodes) -> NodalConditions:
