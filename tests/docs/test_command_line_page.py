@@ -105,7 +105,7 @@ def test_json_fields() -> None:
     of_contact = all_names(text.partition("Each of the `contacts`")[2])
     assert [*summary["parts"][0], *of_contact] == list(summary["contacts"][0])
     assert all_names(text.partition("The `certificate`")[2]) == list(summary["certificate"])
-    assert all_names(text.partition("`between_nodes` says")[2]) == list(summary["between_nodes"])
+    assert all_names(text.partition("`between_nodes` measures")[2]) == list(summary["between_nodes"])
     rows = {plain(row[0]): row[-1] for row in table(text)}
     assert re.findall(r"`(\w+)`", rows["status"]) == [status.name.lower() for status in Status]
     assert re.findall(r"`(\w+)`", rows["timings"]) == list(summary["timings"])
