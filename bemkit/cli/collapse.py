@@ -11,6 +11,7 @@ from bemkit.cli import options
 from bemkit.cli.options import shown_progress
 from bemkit.cli.outputs import Outputs, TextFile
 from bemkit.errors import InputError, concerning
+from bemkit.scene.unit_names import unit_of
 from bemkit.table import json_text
 
 if TYPE_CHECKING:
@@ -60,7 +61,7 @@ def collapse(
         outputs = Outputs(texts)
         figures = Outputs((), folder, pictures, "smallest-thrust")
         figures.check(outputs.check())
-        unit = "" if chosen.units is None else f" {chosen.units.force}"
+        unit, per = unit_of("force", chosen.result_units), "" if chosen.thickness else "  per unit thickness"
         numbers: dict[str, Any]
         if contact is None:
             limit = coulomb_load_factor(chosen)
@@ -73,7 +74,7 @@ def collapse(
                 settlement = {body: list(motion) for body, motion in state.settlement.items()}
                 numbers[name] = {"thrust": state.value, "settlement": settlement}
                 moving = f"{len(settlement)} of {len(state.bodies)} bodies move when the support yields"
-                lines.append(f"{name} thrust".ljust(17) + f"{state.value:.6g}{unit}  per unit thickness; {moving}")
+                lines.append(f"{name} thrust".ljust(17) + f"{f'{state.value:.6g} {unit}'.rstrip()}{per}; {moving}")
     outputs.write({"title": chosen.title, **numbers})
     if contact is not None:
         figures.write(states)

@@ -13,9 +13,11 @@ from bemkit.contact.condensation.nodes import approaches
 from bemkit.contact.laws import FrictionLaw, Frictionless, LawOfCoefficients
 from bemkit.contact.problem import LawError
 from bemkit.errors import InputError
+from bemkit.geometry.spaces import dof_points
 from bemkit.model.contact_data import ContactData, FacingPart, find_contact
 from bemkit.model.placed import PlacedBody, groups
 from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions
+from bemkit.scene.contacts import name_at_obstacle
 from bemkit.scene.scene import Scene
 
 if TYPE_CHECKING:
@@ -98,6 +100,16 @@ class ContactRows:
         """Return the values (n, ...) of each row from those of the nodes of the body (n_nodes, ...)."""
         return np.asarray(values[self.nodes] if self.couplings is None else self.couplings[0] @ values)
 
+    def acting_at(self, bodies: Sequence[PlacedBody]) -> list[FloatArray]:
+        """Return where the force of each row acts on the body, and on its partner if that is elastic: (n, 2) [m] each.
+
+        That is beside the node if it takes a share of others.
+        """
+        points = [self.at_nodes(dof_points(bodies[self.body].space))]
+        if self.couplings is not None:
+            points.append(np.asarray(self.couplings[1] @ dof_points(bodies[self.other].space)))
+        return points
+
     @property
     def touched_nodes(self) -> list[tuple[int, IntArray]]:
         """The elastic bodies, and their nodes that take part."""
@@ -179,7 +191,7 @@ def obstacle_rows(
             if not nodes.nodes.size:
                 continue
             motions: FloatArray | None = None
-            title, part, law, other = body.contact_title(name), name, body.scene.laws.get(name, scene.law), -1
+            title, part, law, other = name_at_obstacle(body.name, name), name, body.scene.laws.get(name, scene.law), -1
             if name in pairs:
                 pair, deepest = pairs[name], int(np.argmin(gap))
                 check_overlap(pair, -float(gap[deepest]), points[deepest], body.mesh.diameter)

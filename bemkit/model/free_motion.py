@@ -98,18 +98,19 @@ def describe(prepared: Prepared, load: UnsolvableLoad) -> str:
     """
     if not prepared.scene.has_obstacles_only:
         return f"{load.description}: hold what moves by a support, raise the friction, or change the loads"
-    units = prepared.units
+    units, scene = prepared.units, prepared.scene
+    force = prepared.force_unit * scene.depth
     mode = _rigid_mode(prepared, load)
     size, turn = float(np.hypot(*mode[:2])), float(mode[2])
     if abs(turn) <= _STRAIGHT * size:
-        net = amount(load.work / size * units.stress * units.length, "force", prepared.scene.units)
+        net = amount(load.work / size * force, "force", scene.result_units)
         if load.is_sliding:
             return (
                 f"the load slides the body {_direction(mode[:2])} with {net} more than friction can hold; "
                 "change the load, raise the friction or hold the body"
             )
         return f"the load pushes the body {_direction(mode[:2])} with {net}; nothing holds it{_REMEDY}"
-    moment = amount(load.work / abs(turn) * units.stress * units.length**2, "energy", prepared.scene.units)
+    moment = amount(load.work / abs(turn) * force * units.length, "energy", scene.result_units)
     sense = "anticlockwise" if turn > 0.0 else "clockwise"
     words = f"the load turns the body {sense} {_pivot(mode, units)} with {moment}"
     return f"{words}; contact cannot hold it{_REMEDY}"

@@ -69,6 +69,11 @@ class Model:
         return self.prepared.scene.solver
 
     @property
+    def depth(self) -> float:
+        """The thickness on which forces in results act, 1 if none is given; inside, all is per unit of thickness."""
+        return self.prepared.scene.depth
+
+    @property
     def has_body_forces(self) -> bool:
         """Whether something acts inside a body."""
         return any(body.inside is not None for body in self.prepared.bodies)

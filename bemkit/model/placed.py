@@ -66,7 +66,7 @@ class PlacedBody:
         """Whether its parts and body forces are the very objects that another one has, and it moves alike far away."""
         own, others = ((*each.body.parts, *each.body.body_forces) for each in (self, other))
         is_alike = len(own) == len(others) and all(one is two for one, two in zip(own, others, strict=True))
-        return is_alike and self.scene.far == other.scene.far
+        return is_alike and (self.scene.far, self.scene.depth) == (other.scene.far, other.scene.depth)
 
     @property
     def name(self) -> str:
@@ -92,10 +92,6 @@ class PlacedBody:
     def traction_space(self) -> BoundarySpace:
         """The space of the tractions on the mesh in place."""
         return self.scene.discretisation.traction_space(self.mesh)
-
-    def contact_title(self, part: str) -> str:
-        """Return the name of the contact of a part with a fixed obstacle: ``"body.part"``."""
-        return f"{self.name}.{part}" if self.name else part
 
     def units(self, modulus: float, force: float, mesh: BoundaryMesh | None = None) -> Units:
         """Return its units, in which forces and displacements are those of all bodies of the scene.

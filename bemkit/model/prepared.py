@@ -28,7 +28,7 @@ from bemkit.model.given import (
     nodal_forces,
 )
 from bemkit.model.placed import Meshes, PlacedBody, place
-from bemkit.model.same_bodies import bodies_under, check_rigid, find_units, listed_contacts, with_found_contacts
+from bemkit.model.same_bodies import bodies_under, check_step, find_units, listed_contacts, with_found_contacts
 from bemkit.model.traction_recovery import TractionRecovery
 from bemkit.model.units import Units
 from bemkit.operators.linear.solvers import ChosenLinearSolver, DenseCholesky, LinearSolver
@@ -202,12 +202,6 @@ class Prepared:
         return tuple(rows.name for rows in self.rows for _ in range(rows.n_contact))
 
     @property
-    def acting_at(self) -> FloatArray:
-        """(n_contact, 2) array [m]: where the force of each contact node acts on the body that it belongs to."""
-        points = (rows.at_nodes(dof_points(self.bodies[rows.body].space)) for rows in self.rows)
-        return np.concatenate([np.zeros((0, 2)), *points])
-
-    @property
     def contact_nodes(self) -> ContactNodes:
         """The contact nodes of the only body, dimensionless."""
         nodes = np.concatenate([np.zeros(0, np.intp), *(rows.nodes for rows in self.rows)])
@@ -251,7 +245,7 @@ class Prepared:
             If its bodies have other names, shapes or kinds of conditions, a rigid body becomes another one, or a load
             drives another of its motions.
         """
-        check_rigid(self.scene, scene)
+        check_step(self.scene, scene)
         before = self if units is None else None
         following = _prepared(scene, bodies_under(scene, self.bodies), units or self.units, before)
         if self.is_coupled_like(following) and "recovery" in self.__dict__:
@@ -336,7 +330,7 @@ def prepare_steps(scenes: Sequence[Scene], meshes: Meshes = None) -> tuple[Prepa
     found = listed_contacts(scenes[0], bodies)
     steps = [with_found_contacts(step, found) for step in scenes]
     for step in steps[1:]:
-        check_rigid(steps[0], step)
+        check_step(steps[0], step)
     first = _prepared(steps[0], bodies, find_units(steps, bodies))
     if len(bodies) > 1 or scenes[0].rigid:
         from bemkit.model.overlaps import check_apart

@@ -36,6 +36,6 @@ def rigid_members(prepared: Prepared) -> tuple[Member, ...]:
         is_load_controlled = body.is_load_controlled
         n_driven = int(np.count_nonzero(is_load_controlled))
         if n_driven:
-            load = (body.load / motion_units(units) / prepared.force_unit)[is_load_controlled]
+            load = (prepared.scene.load_on(body) / motion_units(units) / prepared.force_unit)[is_load_controlled]
             members.append(Member(np.zeros((n_driven, n_driven)), load, np.eye(n_driven), modulus, body.name))
     return tuple(members)

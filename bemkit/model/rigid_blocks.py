@@ -27,7 +27,7 @@ from bemkit.operators.rigid_modes import rigid_motions
 from bemkit.operators.steklov_poincare.forces_inside import ForcesInside
 from bemkit.operators.steklov_poincare.nodal_conditions import free_modes
 from bemkit.scene.conditions import Contact
-from bemkit.scene.contacts import ContactPair
+from bemkit.scene.contacts import ContactPair, name_at_obstacle
 from bemkit.scene.scene import Scene
 
 _ENDS = np.array([-1.0, 1.0])
@@ -145,7 +145,7 @@ def rigid_blocks(scene: Scene, bodies: Sequence[PlacedBody]) -> tuple[Block, ...
     blocks = [_elastic_block(body) for body in bodies]
     for body in scene.rigid:
         chosen = np.eye(3)[:, body.is_load_controlled]
-        blocks.append(Block(np.array(body.centre), 1.0, chosen, body.load @ chosen))
+        blocks.append(Block(np.array(body.centre), 1.0, chosen, scene.load_on(body) @ chosen))
     return tuple(blocks)
 
 
@@ -218,7 +218,7 @@ def joints_of(scene: Scene, bodies: Sequence[PlacedBody]) -> Iterator[Joint]:
         for part in body.scene.parts:
             if isinstance(part.condition, Contact):
                 law = body.scene.laws[part.name]
-                name = body.contact_title(part.name)
+                name = name_at_obstacle(body.name, part.name)
                 yield from _on_obstacle(name, body, (number, part.name), -1, part.condition.obstacle, law)
 
 

@@ -64,7 +64,7 @@ def _units_of(scene: Scene, bodies: Sequence[PlacedBody]) -> Units:
         motions.append(max(-float(pair.gap_at(mesh.centres[mesh.part(part)]).min(initial=0.0)), pair.interference))
     motions += [float(np.abs(body.motion / [1.0, 1.0, 1.0 / length]).max()) for body in scene.rigid]
     loads = [load for load, _, _ in sizes]
-    loads += [float(np.abs(body.load / [length, length, length**2]).max()) for body in scene.rigid]
+    loads += [float(np.abs(scene.load_on(body) / [length, length, length**2]).max()) for body in scene.rigid]
     stress = max(*loads, max(motions) / length * modulus)
     stress = stress or max(gap for _, _, gap in sizes) / length * modulus or modulus
     units = Units(np.mean([body.mesh.centre for body in bodies], axis=0), length, modulus, stress)
@@ -92,8 +92,10 @@ def bodies_under(scene: Scene, bodies: Sequence[PlacedBody]) -> tuple[PlacedBody
     return tuple(under)
 
 
-def check_rigid(first: Scene, other: Scene) -> None:
-    """Check that a load step has the rigid bodies of the first one."""
+def check_step(first: Scene, other: Scene) -> None:
+    """Check that a load step has the thickness and the rigid bodies of the first one."""
+    if first.thickness != other.thickness:
+        raise InputError(f"thickness is {other.thickness} in a load step and {first.thickness} in the first: keep it")
     for body, changed in zip_longest(first.rigid, other.rigid):
         if body is None or changed is None or _layout(body) != _layout(changed):
             raise InputError(

@@ -23,6 +23,7 @@ from bemkit.operators.pair_form import Tag
 from bemkit.operators.rigid_modes import traction_free_modes
 from bemkit.operators.steklov_poincare import CondensedMap, SteklovPoincare
 from bemkit.result_warning import ResultWarning
+from bemkit.scene.contacts import name_at_obstacle
 from bemkit.scene.unit_names import UnitNames, amount
 from bemkit.solvers.active_sets import NodeStatus
 from bemkit.solvers.base import ContactSolution, Status
@@ -105,7 +106,7 @@ def _pushed_in(
         if overlap[node] > SMALLEST_OVERLAP * np.abs(displacement).max():
             x, y = candidates.points[node]
             depth = amount(overlap[node], "length", units, 3)
-            name = body.contact_title(part)
+            name = name_at_obstacle(body.name, part)
             text = (
                 f"Supports push part {name!r} {depth} into its obstacle at ({x:.6g}, {y:.6g}), "
                 "where contact cannot act: let them move with the obstacle, or leave a free element between them."

@@ -81,7 +81,7 @@ def _turned(prepared: Prepared, bodies: list[PlacedBody], sides: list[_Side]) ->
         return ""
     diameter = max(body.mesh.diameter for body in bodies)
     x, y = np.where(np.abs(centre) < _ROUND_OFF * diameter, 0.0, centre).tolist()
-    by = amount(abs(moment), "energy", prepared.scene.units)
+    by = amount(prepared.scene.depth * abs(moment), "energy", prepared.scene.result_units)
     sense = "anticlockwise" if moment > 0.0 else "clockwise"
     names = " and ".join(repr(body.name) for body in bodies)
     return (

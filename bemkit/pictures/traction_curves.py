@@ -14,6 +14,7 @@ from bemkit.geometry.spaces import BoundarySpace, ConstantSpace
 from bemkit.pictures.shown import Result
 from bemkit.results.solved_body import SolvedBody
 from bemkit.scene.conditions import Contact
+from bemkit.scene.contacts import name_at_obstacle
 
 _POINTS_OF_CURVE = 9
 
@@ -92,7 +93,7 @@ def _directions(
 ) -> FloatArray:
     """Return the directions of contact (n, 2) at points of elements, between bodies those of the nodes near by."""
     for own in body.scene.contact_parts:
-        if body.contact_name(own.name) == part and isinstance(own.condition, Contact):
+        if name_at_obstacle(body.name, own.name) == part and isinstance(own.condition, Contact):
             points, normals = body.mesh.points(elements, xi), body.mesh.normals_at(elements, xi)
             return measure_contact(own.condition.obstacle, points.reshape(-1, 2), normals.reshape(-1, 2))[1]
     rows = solution.contact.rows(part)

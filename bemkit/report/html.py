@@ -44,10 +44,15 @@ def facts(rows: Iterable[tuple[str, str]], caption: str) -> Element:
     return _scrolling(element("table", element("caption", caption), element("tbody", *lines)), caption)
 
 
-def table(rows: Sequence[Mapping[str, object]], caption: str) -> Element:
-    """Return a table of rows that share their keys, which head the columns; numbers are aligned to the right."""
+def table(rows: Sequence[Mapping[str, object]], caption: str, units: Mapping[str, str] | None = None) -> Element:
+    """Return a table of rows that share their keys, which head the columns with their units.
+
+    Numbers are aligned to the right.
+    """
     names = list(rows[0]) if rows else []
-    head = element("tr", *(element("th", name.replace("_", " "), scope="col") for name in names))
+    of_names = {name: f" [{units[name]}]" for name in names if units and units.get(name)}
+    heads = (name.replace("_", " ") + of_names.get(name, "") for name in names)
+    head = element("tr", *(element("th", each, scope="col") for each in heads))
     lines = [element("tr", *(_cell(row[name]) for name in names)) for row in rows]
     whole = element("table", element("caption", caption), element("thead", head), element("tbody", *lines))
     return _scrolling(whole, caption)

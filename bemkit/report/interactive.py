@@ -22,13 +22,11 @@ from bemkit.pictures.magnification import magnification
 from bemkit.pictures.shown import DrawnScene, Result, shown
 from bemkit.pictures.traction_curves import traction_curve
 from bemkit.report.html import Element, element
-from bemkit.results.tables import table_of
-from bemkit.scene.unit_names import UnitNames, amount, with_unit
+from bemkit.results.tables import in_units, table_of
+from bemkit.scene.unit_names import UnitNames, with_unit
 from bemkit.stopwatch import announce
 from bemkit.table import Column, Table
 
-_QUANTITIES = {"m": "length", "Pa": "stress"}
-"""Quantity of a column by its SI unit."""
 _UNPACK = """
 const packed = document.getElementById("packed-drawing").textContent;
 const bytes = Uint8Array.from(atob(packed), (letter) => letter.charCodeAt(0));
@@ -144,7 +142,7 @@ def _contact_traces(step: Result, part: str) -> list[dict[str, Any]]:
     sign, nodes = (1.0, along) if abscissa is None else (abscissa.sign, abscissa.at(step.contact.s[rows]))
     heads, lines = table.columns, tuple(table.rows[row] for row in rows.tolist())
     if step.motion is not None:
-        heads = (*heads, Column("slip", "m"))
+        heads = (*heads, in_units(Column("slip", "m"), step))
         lines = tuple((*line, slip) for line, slip in zip(lines, step.motion.slip[rows].tolist(), strict=True))
     texts = _texts(Table(heads, lines), step.units)
     words = np.array(step.contact.status_words(), dtype=object)[rows]
@@ -178,7 +176,7 @@ def _texts(table: Table, units: UnitNames | None) -> list[str]:
 def _lines(table: Table, row: Sequence[Any], units: UnitNames | None) -> Iterable[str]:
     for head, value in zip(table.columns, row, strict=True):
         if isinstance(value, float):
-            yield f"{head.name} = {amount(value, _QUANTITIES.get(head.unit, ''), units)}"
+            yield f"{head.name} = {value:.4g} {'' if units is None else head.unit}".rstrip()
         elif value != "":
             yield f"{head.name} {value}".replace("&", "&amp;").replace("<", "&lt;")
 

@@ -9,7 +9,8 @@ from bemkit.hdf5 import provenance
 from bemkit.pictures.shown import Result
 from bemkit.plan import Plan
 from bemkit.report.html import Element, element, facts, number, table
-from bemkit.results.tables import history_columns
+from bemkit.results.contact_table import CONTACT_COLUMNS
+from bemkit.results.tables import RESULTANT_COLUMNS, history_columns, in_units
 from bemkit.scene.toml import SceneError, scene_to_toml
 from bemkit.scene.written_tables import UnstructureError
 from bemkit.version import __version__
@@ -32,16 +33,15 @@ def warnings_section(result: Result) -> list[Element]:
 
 def forces_section(result: Result) -> list[Element]:
     """Return what contacts and parts carry, and where the status changes."""
-    summary, found = result.summary(), []
-    if summary["contacts"]:
-        found.append(_shortened(summary["contacts"], "What each contact transmits"))
-    parts = summary.get("parts") or [
-        {"body": name, **part} for name, body in summary.get("bodies", {}).items() for part in body["parts"]
-    ]
-    if parts:
-        found.append(_shortened(parts, "Resultants of the tractions on each part"))
-    if summary["transitions"]:
-        found.append(_shortened(summary["transitions"], "Where the contact status changes"))
+    summary = result.summary()
+    tables = {
+        "What each contact transmits": summary["contacts"],
+        "Resultants on each part": summary["parts"],
+        "Where the contact status changes": summary["transitions"],
+    }
+    heads = [in_units(head, result) for head in (*RESULTANT_COLUMNS, *CONTACT_COLUMNS)]
+    units = {} if result.units is None else {head.name: head.unit for head in heads}
+    found = [_shortened(rows, caption, units) for caption, rows in tables.items() if rows]
     return found or [element("p", "No part of the boundary has a name.")]
 
 
@@ -106,8 +106,8 @@ def _plain(value: Any) -> Any:
     return value.item() if hasattr(value, "item") else value
 
 
-def _shortened(rows: Sequence[Mapping[str, Any]], caption: str) -> Element:
+def _shortened(rows: Sequence[Mapping[str, Any]], caption: str, units: Mapping[str, str] | None = None) -> Element:
     """Return a table of the first rows, whose caption says how many there are."""
     first = [{key: _plain(value) for key, value in row.items()} for row in rows[:_MOST_ROWS]]
     cut = "" if len(first) == len(rows) else f" (the first {len(first)} of {len(rows)} rows)"
-    return table(first, caption + cut)
+    return table(first, caption + cut, units)

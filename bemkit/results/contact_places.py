@@ -13,6 +13,7 @@ from bemkit.arrays import FloatArray, IntArray
 from bemkit.contact.body import SlipHistory
 from bemkit.results.contact_table import resolved_transitions, unresolved_contacts
 from bemkit.results.zone_ends import Side, ZoneEnd
+from bemkit.scene.contacts import name_at_obstacle
 from bemkit.solvers.active_sets import NodeStatus
 
 if TYPE_CHECKING:
@@ -81,7 +82,7 @@ class ContactPlaces:
         found: dict[str, list[SingularCorner]] = {}
         given, materials = {}, {name: body.scene.material for name, body in solution.bodies.items()}
         for name, body in solution.bodies.items():
-            own = {body.contact_name(part.name): part.name for part in body.scene.contact_parts}
+            own = {name_at_obstacle(body.name, part.name): part.name for part in body.scene.contact_parts}
             table, motion = solution.contact.renamed(own), self._motion_of(own)
             listed = solution.scene.listed_parts(name)
             given[name] = GivenSides(body, table, motion, listed)

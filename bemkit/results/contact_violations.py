@@ -22,6 +22,7 @@ from bemkit.results.between_nodes import (
 from bemkit.results.least_clearance import Sample, nearest_only, with_least_clearances
 from bemkit.results.part_forces import RigidResult
 from bemkit.scene.conditions import Contact
+from bemkit.scene.contacts import name_at_obstacle
 from bemkit.scene.plane_motion import RigidBody
 
 if TYPE_CHECKING:
@@ -104,7 +105,9 @@ def _at_obstacles(solution: SolvedScene) -> Iterator[MeasuredContact]:
             elements = mesh.part(part.name)
             if isinstance(part.condition, Contact) and elements.size:  # none beyond a symmetry line
                 sample = sample_at_obstacle(body, part.condition.obstacle, elements)
-                facing.setdefault(part.name, []).append((body.contact_name(part.name), scene.laws[part.name], sample))
+                facing.setdefault(part.name, []).append(
+                    (name_at_obstacle(body.name, part.name), scene.laws[part.name], sample)
+                )
         for pair in moving.get(owner, ()):
             part_name = pair.elastic_parts[0][1]
             rigid = stated.rigid_body_of(pair)

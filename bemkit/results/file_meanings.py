@@ -6,13 +6,11 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from bemkit.results.contact_table import CONTACT_COLUMNS
-from bemkit.scene.unit_names import UnitNames, unit_of
+from bemkit.scene.unit_names import QUANTITIES, UnitNames, unit_of
 
 if TYPE_CHECKING:
     import h5py
 
-_QUANTITIES = {"": "", "m": "length", "Pa": "stress"}
-"""Quantities of the units of columns, by whose names units are called."""
 _BOUNDARY = {
     "points": ("length", "nodes of the displacements"),
     "centres": ("length", "centres of the elements"),
@@ -22,7 +20,7 @@ _BOUNDARY = {
     "reaction": ("force", "force of supports along x and y at the points"),
 }
 _COLUMNS = {
-    **{head.name: (_QUANTITIES[head.unit], head.meaning) for head in CONTACT_COLUMNS},
+    **{head.name: (QUANTITIES.get(head.unit, ""), head.meaning) for head in CONTACT_COLUMNS},
     "direction_x": ("", "direction of contact, first component"),
     "direction_y": ("", "direction of contact, second component"),
     "friction_bound": ("stress", "largest tangential traction that the law allows"),

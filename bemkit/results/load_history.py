@@ -26,6 +26,14 @@ class StepEnd(Protocol):
     def contact(self) -> ContactTable:
         """The table of contact nodes."""
 
+    @property
+    def force_normal(self) -> float:
+        """Sum of the pressing forces of all contacts [N/m]."""
+
+    @property
+    def force_tangential(self) -> float:
+        """Sum of the friction forces of all contacts [N/m]."""
+
 
 _COARSE = 0.01
 """Share of the external work that increments may lose without a warning."""
@@ -116,12 +124,12 @@ class LoadStep:
     @property
     def force_normal(self) -> float:
         """Total pressing force [N/m], positive."""
-        return -float(self.contact.weight @ self.contact.sigma_n)
+        return self.end.force_normal
 
     @property
     def force_tangential(self) -> float:
         """Integral of sigma_t [N/m]."""
-        return float(self.contact.weight @ self.contact.sigma_t)
+        return self.end.force_tangential
 
     @property
     def mean_displacement(self) -> float:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Iterable, Sequence
+from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 
@@ -11,14 +11,16 @@ from bemkit.arrays import FloatArray, IntArray
 from bemkit.geometry.local_values import summed_at_dofs
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.quadrature import gauss_legendre
-from bemkit.geometry.spaces import BoundarySpace
+from bemkit.geometry.spaces import BoundarySpace, dof_points
+from bemkit.operators.steklov_poincare.nodal_conditions import integrate_traction
 from bemkit.results.contact_table import ContactTable, Transition
+from bemkit.scene.conditions import Load
 from bemkit.solvers.active_sets import NodeStatus
 
 
 @dataclass(frozen=True)
 class PartForce:
-    """The resultant of what acts on a part of the boundary: of tractions, or of the reactions of a support.
+    """The resultant of what acts on a part of the boundary: contacts, the reactions of a support, or given tractions.
 
     Parameters
     ----------
@@ -33,6 +35,11 @@ class PartForce:
     force_x: float
     force_y: float
     moment: float
+
+    def __add__(self, other: PartForce) -> PartForce:
+        """Return the resultant of both, under the name of the first."""
+        sums = (getattr(self, key) + getattr(other, key) for key in ("force_x", "force_y", "moment"))
+        return PartForce(self.name, *sums)
 
     def as_dict(self) -> dict[str, float | str]:
         """Return the entries by name."""
@@ -86,10 +93,8 @@ class ContactForce(PartForce):
     largest_slip: float
 
 
-def part_force(
-    name: str, mesh: BoundaryMesh, space: BoundarySpace, traction: FloatArray, elements: IntArray
-) -> PartForce:
-    """Integrate tractions over some elements.
+def part_force(name: str, mesh: BoundaryMesh, space: BoundarySpace, load: FloatArray, elements: IntArray) -> PartForce:
+    """Integrate loads per length over some elements.
 
     Parameters
     ----------
@@ -98,11 +103,12 @@ def part_force(
         In physical units.
     space : BoundarySpace
         Of the tractions.
-    traction : (n_elements, n_local, 2) array [Pa]
+    load : (n_elements, n_local, 2) array [N/m]
+        Tractions times the thickness.
     elements : (m,) int array
     """
     xi, weights = gauss_legendre(space.degree + 4)
-    values = np.einsum("lq,elc->eqc", space.basis(xi), traction[elements])
+    values = np.einsum("lq,elc->eqc", space.basis(xi), load[elements])
     measured = values * (mesh.jacobian(elements, xi) * weights)[:, :, None]
     x, y = np.moveaxis(mesh.points(elements, xi), 2, 0)
     force = measured.sum(axis=(0, 1))
@@ -110,11 +116,17 @@ def part_force(
     return PartForce(name, float(force[0]), float(force[1]), moment)
 
 
+def load_force(name: str, moved: BoundarySpace, elements: IntArray, load: Load, depth: float) -> PartForce:
+    """Sum up the nodal forces of a load on some elements, on the space of displacements and a thickness [m]."""
+    forces = integrate_traction(moved, elements, load.at)
+    return nodal_resultant(name, depth * forces, dof_points(moved))
+
+
 def support_forces(
     supports: Sequence[str],
     moved: BoundarySpace,
     loaded: BoundarySpace,
-    traction: FloatArray,
+    load: FloatArray,
     points: FloatArray,
     reaction: FloatArray,
 ) -> dict[str, PartForce]:
@@ -128,7 +140,8 @@ def support_forces(
         Parts of the mesh.
     moved, loaded : BoundarySpace
         Of displacements and tractions.
-    traction : (n_elements, n_local, 2) array [Pa]
+    load : (n_elements, n_local, 2) array [N/m]
+        Tractions times the thickness.
     points : (n_points, 2) array [m]
         Of the displacements.
     reaction : (n_points, 2) array [N/m]
@@ -138,7 +151,7 @@ def support_forces(
     xi, weights = gauss_legendre(moved.degree + loaded.degree + 4)
     for name in supports:
         elements = mesh.part(name)
-        values = np.einsum("lq,elc->eqc", loaded.basis(xi), traction[elements])
+        values = np.einsum("lq,elc->eqc", loaded.basis(xi), load[elements])
         measured = values * (mesh.jacobian(elements, xi) * weights)[:, :, None]
         shares[name] = summed_at_dofs(moved, np.einsum("pq,eqc->epc", moved.basis(xi), measured), elements)
         counts[np.unique(moved.element_dofs[elements])] += 1
@@ -153,52 +166,52 @@ def support_forces(
     return forces
 
 
-def nodal_resultants(table: ContactTable, frame: FloatArray, acting_at: FloatArray) -> tuple[PartForce, ...]:
-    """Sum up the nodal forces of each contact, on the body with the nodes.
+def nodal_resultant(name: str, forces: FloatArray, acting_at: FloatArray) -> PartForce:
+    """Sum up nodal forces (n, 2) [N/m] that act at points (n, 2) [m].
 
-    Parameters
-    ----------
-    table : ContactTable
-    frame : (n_contact, 2, 2) array
-        Directions of contact and tangents of the nodes.
-    acting_at : (n_contact, 2) array [m]
-        Where the forces act: beside the node if it takes a share of others.
+    With such sums bodies are in equilibrium to round-off; the moment of tractions differs by the error of the mesh.
     """
-    forces = np.einsum("nk,nkc->nc", table.weight[:, None] * np.stack([table.sigma_n, table.sigma_t], axis=1), frame)
-    moments = acting_at[:, 0] * forces[:, 1] - acting_at[:, 1] * forces[:, 0]
-    rows = {part: table.rows(part) for part in table.parts}
-    return tuple(
-        PartForce(part, float(forces[nodes, 0].sum()), float(forces[nodes, 1].sum()), float(moments[nodes].sum()))
-        for part, nodes in rows.items()
-    )
+    moment = float(acting_at[:, 0] @ forces[:, 1] - acting_at[:, 1] @ forces[:, 0])
+    return PartForce(name, float(forces[:, 0].sum()), float(forces[:, 1].sum()), moment)
 
 
 def contact_forces(
-    table: ContactTable, resultants: Sequence[PartForce], transitions: Sequence[Transition]
+    table: ContactTable, depth: float, resultants: Sequence[PartForce], transitions: Sequence[Transition]
 ) -> tuple[ContactForce, ...]:
     """Return the forces and sizes of each contact.
 
     Parameters
     ----------
     table : ContactTable
+    depth : float [m]
+        Thickness that forces act on.
     resultants : sequence of PartForce
         Of each contact part of the table.
     transitions : sequence of Transition
         Of the same table.
     """
     return tuple(
-        ContactForce(**(vars(resultant) | contact_sizes(table, resultant.name, transitions)))
+        ContactForce(**(vars(resultant) | contact_sizes(table, depth, resultant.name, transitions)))
         for resultant in resultants
     )
 
 
-def contact_sizes(table: ContactTable, part: str, transitions: Sequence[Transition]) -> dict[str, float]:
+def forces_on_parts(on_sides: Iterable[tuple[tuple[str, str], PartForce]]) -> dict[str, dict[str, PartForce]]:
+    """Add up what contacts exert on sides of bodies, by the names of body and part."""
+    forces: dict[str, dict[str, PartForce]] = {}
+    for (body, part), force in on_sides:
+        own = forces.setdefault(body, {})
+        own[part] = own[part] + force if part in own else replace(force, name=part)
+    return forces
+
+
+def contact_sizes(table: ContactTable, depth: float, part: str, transitions: Sequence[Transition]) -> dict[str, float]:
     """Return the entries of `ContactForce` besides the resultant."""
     nodes = table.rows(part)
     closed = nodes & (table.status != NodeStatus.SEPARATED)
     return {
-        "force_normal": -float(table.weight[nodes] @ table.sigma_n[nodes]),
-        "force_tangential": float(table.weight[nodes] @ table.sigma_t[nodes]),
+        "force_normal": -depth * float(table.weight[nodes] @ table.sigma_n[nodes]),
+        "force_tangential": depth * float(table.weight[nodes] @ table.sigma_t[nodes]),
         "contact_length": _contact_length(table, part, transitions),
         "peak_pressure": float(np.max(-table.sigma_n[nodes], initial=0.0)),
         "largest_slip": float(np.abs(table.u_t[closed]).max(initial=0.0)),

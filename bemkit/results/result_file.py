@@ -1,7 +1,7 @@
 """Result files: HDF5 with a versioned layout, written step by step, safe to read.
 
 A result file holds plain arrays, texts and numbers only, so any HDF5 program can read it, and reading one from a
-stranger runs no code. The layout, version 6 (files of other versions are refused):
+stranger runs no code. The layout, version 7 (files of other versions are refused):
 
     /                attributes format = "bemkit-result" and schema_version
     /provenance      attributes
@@ -80,7 +80,7 @@ __all__ = ["OutputFileError", "ResultFileError", "ResultWriter", "check_result_t
 
 _MOST_BYTES = 100_000_000
 """Size of a scene as text, which holds the points of measured profiles."""
-FORMAT = FileFormat("bemkit-result", 6, "bemkit result", "bemkit run -o")
+FORMAT = FileFormat("bemkit-result", 7, "bemkit result", "bemkit run -o")
 _MAX_PLAN = 1_000_000
 
 

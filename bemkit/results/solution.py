@@ -243,7 +243,8 @@ class Solution(SolvedScene, Explorable):
         Returns
         -------
         dict
-            ``title``, ``units`` (names, None without), ``status`` (a word), ``message`` (how the solver ended),
+            ``title``, ``units`` (names, None without), ``thickness`` [m] (None if forces are per unit of it),
+            ``status`` (a word), ``message`` (how the solver ended),
             ``converged``, ``certified``, ``warnings``, ``n_bodies``, ``n_elements``, ``n_contact``, ``linear_solves``,
             ``outer_steps``, ``force_normal`` and ``force_tangential`` [N/m], ``energy`` [J/m], ``estimated_error``,
             ``estimated_traction_error`` and ``estimated_local_traction_error`` (None without an estimate),
@@ -258,6 +259,7 @@ class Solution(SolvedScene, Explorable):
         return {
             "title": self.title,
             "units": None if self.units is None else self.units.as_dict(),
+            "thickness": self.scene.thickness,
             "status": self.status.name.lower(),
             "message": self.message or self.status.value,
             "converged": self.is_converged,

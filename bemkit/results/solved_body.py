@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
@@ -114,6 +115,8 @@ class SolvedBody:
     energy : float [J/m]
         Elastic energy: half the work of the stresses in the plane on the strains that they cause. In plane strain heat
         also compresses the body along its length, which costs E (alpha T)^2 / 2 per volume, not counted here.
+    contact_forces : mapping of str to PartForce
+        What contacts exert on each part that is in contact; see `bemkit.results.part_forces.forces_on_parts`.
     """
 
     name: str
@@ -121,14 +124,11 @@ class SolvedBody:
     mesh: BoundaryMesh
     boundary: BoundaryFields
     energy: float
+    contact_forces: Mapping[str, PartForce]
 
     def __repr__(self) -> str:
         """Return one line; the fields hold thousands of numbers."""
         return f"SolvedBody({self.name!r}: {self.mesh.n_elements} elements)"
-
-    def contact_name(self, part: str) -> str:
-        """Return the name of the contact of a part with a fixed obstacle: ``"body.part"``."""
-        return f"{self.name}.{part}" if self.name else part
 
     @cached_property
     def map_tags(self) -> frozenset[Tag]:
@@ -276,24 +276,30 @@ class SolvedBody:
 
     @cached_property
     def part_forces(self) -> tuple[PartForce, ...]:
-        """The resultants on each part: of the reactions of a support, and of tractions."""
-        from bemkit.results.part_forces import part_force, support_forces
+        """The resultants on each part: of contacts, of the reactions of a support, or of loads.
+
+        All are sums of the nodal forces with which the body is in equilibrium to round-off.
+        """
+        from bemkit.results.part_forces import load_force, part_force, support_forces
 
         space = self.scene.discretisation.traction_space(self.mesh)
         if len(self.boundary.traction_dofs) != space.element_dofs.size:  # a file of an older version
             space = ConstantSpace(self.mesh)
-        traction = self.boundary.traction_dofs.reshape(self.mesh.n_elements, -1, 2)
+        load = self.scene.depth * self.boundary.traction_dofs.reshape(self.mesh.n_elements, -1, 2)
+        moved = self.scene.discretisation.displacement_space(self.mesh)
         parts = self.mesh.parts.items()
-        forces = {part: part_force(part, self.mesh, space, traction, elements) for part, elements in parts}
+        forces = {part: part_force(part, self.mesh, space, load, elements) for part, elements in parts}
+        for part, elements in self.scene.parts_on(self.mesh):
+            if isinstance(part.condition, Load):
+                forces[part.name] = load_force(part.name, moved, elements, part.condition, self.scene.depth)
         if self.boundary.reaction.size:
             held = (Clamped, Roller, PrescribedDisplacement)
             supports = [
                 part.name for part in self.scene.parts if isinstance(part.condition, held) and part.name in forces
             ]
-            moved = self.scene.discretisation.displacement_space(self.mesh)
             fields = self.boundary
-            forces |= support_forces(supports, moved, space, traction, fields.points, fields.reaction)
-        return tuple(forces.values())
+            forces |= support_forces(supports, moved, space, load, fields.points, fields.reaction)
+        return tuple({name: self.contact_forces.get(name, force) for name, force in forces.items()}.values())
 
     @property
     def error_unit(self) -> float:
@@ -302,7 +308,7 @@ class SolvedBody:
         At least a share of the energy that heat would cause if the body could not expand.
         """
         held = 0.0 if self.particular is None else _FREE_SHARE * self.particular.held_energy
-        return 2.0 * max(self.energy, held)
+        return 2.0 * max(self.energy / self.scene.depth, held)
 
     @property
     def energy_of_round_off(self) -> float:

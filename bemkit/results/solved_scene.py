@@ -16,6 +16,7 @@ from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.results.contact_table import ContactTable, Transition
 from bemkit.results.part_forces import ContactForce, PartForce, RigidResult
 from bemkit.results.solved_body import BoundaryFields, SideName, SolvedBody
+from bemkit.scene.contacts import name_at_obstacle
 from bemkit.scene.scene import Scene
 from bemkit.scene.unit_names import UnitNames
 
@@ -142,7 +143,7 @@ class SolvedScene:
     @property
     def units(self) -> UnitNames | None:
         """Names of units, if the scene has them."""
-        return self.scene.units
+        return self.scene.result_units
 
     @property
     def title(self) -> str:
@@ -158,7 +159,9 @@ class SolvedScene:
     def laws(self) -> dict[str, FrictionLaw]:
         """The friction law of each contact, by name."""
         at_obstacles = {
-            body.contact_name(part): law for body in self.bodies.values() for part, law in body.scene.laws.items()
+            name_at_obstacle(body.name, part): law
+            for body in self.bodies.values()
+            for part, law in body.scene.laws.items()
         }
         return at_obstacles | {pair.name: self.scene.law_of(pair) for pair in self.scene.contacts}
 
@@ -199,16 +202,9 @@ def _peak(table: ContactTable, part: str) -> dict[str, float]:
 
 
 def part_facts(solution: SolvedScene) -> list[dict[str, Any]]:
-    """Return the resultants on each part, with the name of the ``body`` if it has one.
-
-    Those on parts at fixed obstacles are those of the contacts: of the nodal forces, with which the body is in
-    equilibrium to round-off.
-    """
-    contacts = {contact.name: contact for contact in solution.contacts}
-    facts = []
-    for name, body in solution.bodies.items():
-        for force in body.part_forces:
-            found = contacts.get(body.contact_name(force.name), force)
-            sums = {"force_x": found.force_x, "force_y": found.force_y, "moment": found.moment}
-            facts.append(({"body": name} if name else {}) | {"name": force.name} | sums)
-    return facts
+    """Return the resultants on each part, with the name of the ``body`` if it has one."""
+    return [
+        ({"body": name} if name else {}) | force.as_dict()
+        for name, body in solution.bodies.items()
+        for force in body.part_forces
+    ]

@@ -22,7 +22,7 @@ from bemkit.plan import Plan
 from bemkit.result_warning import ResultWarning
 from bemkit.results.contact_table import ContactTable, Transition
 from bemkit.results.load_history import LoadStep, StepWork
-from bemkit.results.part_forces import ContactForce, RigidResult
+from bemkit.results.part_forces import ContactForce, PartForce, RigidResult
 from bemkit.results.solution import Solution
 from bemkit.results.solved_body import BoundaryFields, SideName, SolvedBody
 from bemkit.scene.scene import Scene
@@ -106,9 +106,10 @@ def read_step(reader: Reader, group: str, outcome: str, problem: Scene, layout: 
     boundaries = _read_boundaries(reader, group, layout.bodies)
     placed = [problem.scene_of(body) for body in problem.placed_bodies]
     energies = map(float, entries["energies"])
+    columns_of_bodies = layout.bodies, placed, boundaries, energies, entries["contact_forces"]
     bodies = [
-        SolvedBody(body.name, scene, body.mesh, boundary, energy)
-        for body, scene, boundary, energy in zip(layout.bodies, placed, boundaries, energies, strict=True)
+        SolvedBody(body.name, scene, body.mesh, boundary, energy, {row.name: row for row in _rows(forces, PartForce)})
+        for body, scene, boundary, energy, forces in zip(*columns_of_bodies, strict=True)
     ]
     bound = columns["friction_bound"]
     return Solution(
@@ -143,6 +144,7 @@ def write_outcome(group: h5py.Group, solution: Solution, step: LoadStep | None =
     }
     entries |= {
         "energies": [body.energy for body in solution.bodies.values()],
+        "contact_forces": [list(map(asdict, body.contact_forces.values())) for body in solution.bodies.values()],
         "sides": solution.contact_sides,
         "has_friction": solution.friction_bound is not None,
         "contacts": [asdict(contact) for contact in solution.contacts],

@@ -38,6 +38,8 @@ def _lines(name: str, text: str) -> list[tuple[str, str]]:
 def summary_rows(solution: Solution) -> Iterator[tuple[str, str]]:
     """Yield names and texts of all that a summary says of a result, numbers with their units."""
     yield "status", _status(solution)
+    if (thickness := solution.scene.thickness) is not None:
+        yield "thickness", _amount(thickness, "length", solution.units)
     yield from _bodies_rows(solution)
     if has_contact := solution.contact.n_contact > 0:
         yield "contact nodes", _node_counts(solution)
@@ -45,7 +47,8 @@ def summary_rows(solution: Solution) -> Iterator[tuple[str, str]]:
     else:
         yield "contact", "none"
     yield from _part_rows(solution)
-    yield "elastic energy", f"{_amount(solution.energy, 'energy', solution.units)}  per unit thickness"
+    per = "" if solution.scene.thickness else "  per unit thickness"
+    yield "elastic energy", f"{_amount(solution.energy, 'energy', solution.units)}{per}"
     yield from _history_rows(solution)
     if solution.estimated_error is not None:
         words = f"{solution.estimated_error:.1e}  relative, in the energy norm{_traction_errors(solution)}"
@@ -89,7 +92,8 @@ def _force_rows(solution: Solution) -> Iterator[tuple[str, str]]:
     """Yield the forces of all contacts together, then those of each, the largest first."""
     units = solution.units
     total, friction = solution.force_normal, solution.force_tangential
-    yield "normal force", f"{_amount(total, 'force', units)}  pressing, per unit thickness"
+    per = "" if solution.scene.thickness else ", per unit thickness"
+    yield "normal force", f"{_amount(total, 'force', units)}  pressing{per}"
     yield "friction force", f"{_amount(friction, 'force', units)}  on the body, along the boundary"
     facts = sorted(contact_facts(solution), key=lambda fact: -fact["force_normal"])
     if len(facts) == 1:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import fields
+from dataclasses import fields, replace
 from itertools import chain
 from typing import Any
 
@@ -20,6 +20,7 @@ from bemkit.results.solution import Solution
 from bemkit.results.solved_body import SolvedBody
 from bemkit.results.solved_scene import part_facts
 from bemkit.results.stress_measures import STRESSES
+from bemkit.scene.unit_names import QUANTITIES, UnitNames, unit_of
 from bemkit.solvers.base import StepRecord
 from bemkit.table import Column, Table, json_text
 
@@ -39,13 +40,39 @@ _BOUNDARY = (
     Column("hoop", "Pa", "normal stress along the boundary at the centre", ".6g"),
     Column("von_mises", "Pa", "equivalent stress of von Mises at the centre", ".6g"),
 )
-_FORCES = (
+RESULTANT_COLUMNS = (
     Column("body", "", "name of the body"),
-    Column("name", "", "part of the boundary"),
+    Column("name", "", "part of the boundary, or contact"),
     Column("force_x", "N/m", "resultant along x, on the body", ".6g"),
     Column("force_y", "N/m", "resultant along y, on the body", ".6g"),
     Column("moment", "N m/m", "moment about the origin, anticlockwise", ".6g"),
+    Column("force_normal", "N/m", "pressing force", ".6g"),
+    Column("force_tangential", "N/m", "friction force", ".6g"),
+    Column("contact_length", "m", "length in contact", ".6g"),
+    Column("peak_pressure", "Pa", "largest pressure of a node", ".6g"),
+    Column("largest_slip", "m", "of nodes in contact", ".6g"),
+    Column("contact_fraction", "", "share of the part that is in contact", ".6g"),
+    Column("peak_x", "m", "first coordinate of the node with the peak pressure", ".6g"),
+    Column("peak_y", "m", "second coordinate", ".6g"),
 )
+"""Columns of the resultants on parts and contacts."""
+_STEPS = (
+    Column("time", "s", "at the end of the step", ".6g"),
+    *(Column(name, "J/m", "in the step", ".6g") for name in ("external_work", "dissipation", "increment_work")),
+    Column("friction_gain", "J/m", "work that friction gives in the step", ".6g"),
+    Column("elastic_energy", "J/m", "at the end of the step", ".6g"),
+    Column("force_normal", "N/m", "pressing force of all contacts", ".6g"),
+    Column("force_tangential", "N/m", "friction force of all contacts", ".6g"),
+    Column("mean_displacement", "m", "mean displacement of the contact nodes along the tangent", ".6g"),
+)
+
+_HEADS = {
+    "contact": CONTACT_COLUMNS,
+    "boundary": (*CONTACT_COLUMNS[:2], *_BOUNDARY, CONTACT_COLUMNS[-1]),
+    "forces": RESULTANT_COLUMNS,
+    "steps": _STEPS,
+    "history": (),
+}
 
 
 def to_csv(solution: Solution, table: str) -> str:
@@ -73,10 +100,17 @@ def table_of(solution: Solution, table: str) -> Table:
         raise InputError(f"table is {table!r}: give one of {', '.join(TABLES)}")
     if table == "pressures":
         shares = (pressure_shares(solution.contact, part) for part in solution.contact.parts)
-        return Table.from_records(PressureShare, chain.from_iterable(shares))
+        found = Table.from_records(PressureShare, chain.from_iterable(shares))
+        return Table(tuple(in_units(head, solution) for head in found.columns), found.rows)
     arrays = _columns(solution, table)
-    known = {head.name: head for head in (*CONTACT_COLUMNS, *_BOUNDARY, *_FORCES)}
+    known = {head.name: in_units(head, solution) for head in _HEADS[table]}
     return Table.from_arrays([known.get(name) or Column(name) for name in arrays], arrays)
+
+
+def in_units(head: Column, solution: Solution) -> Column:
+    """Return a column with the name of its unit in the scene, without names in SI units."""
+    names = solution.units or UnitNames("m", "Pa").over_thickness(solution.scene.thickness)
+    return replace(head, unit=unit_of(QUANTITIES[head.unit], names)) if head.unit in QUANTITIES else head
 
 
 def columns_of(
@@ -121,7 +155,7 @@ def _columns(solution: Solution, table: str) -> dict[str, Any]:
             return _boundary_columns(solution)
         case "forces":
             facts = part_facts(solution)
-            names = list(facts[0]) if facts else [head.name for head in _FORCES if head.name != "body"]
+            names = list(facts[0]) if facts else [head.name for head in RESULTANT_COLUMNS[1:5]]
             return {name: [fact[name] for fact in facts] for name in names}
         case "steps":
             rows = [] if solution.loading is None else [step.as_dict() for step in solution.loading.steps]

@@ -142,7 +142,8 @@ def thrust(
         state = least_force(case.motions, load, sign * objective, *case.only_friction)
         if state is None:
             raise UnsolvableSceneError("no contact tractions can balance the loads")
-        found.append(case.joint_forces(float(objective @ state[0].ravel()), names, *state))
+        forces, velocities = scene.depth * state[0], state[1]
+        found.append(case.joint_forces(float(objective @ forces.ravel()), names, forces, velocities))
     return found[0], found[1]
 
 

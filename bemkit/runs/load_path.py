@@ -95,7 +95,7 @@ class IncrementEnd:
         from bemkit.results.load_history import StepWork
 
         units = model.units
-        unit = units.stress * units.displacement * units.length
+        unit = units.stress * units.displacement * units.length * model.depth
         weights = 0.5 * unit * model.problem.body.weights
         sigma = weights[:, None] * (before.state.traction + self.state.traction)
         moved = self.state.displacement - before.state.displacement
@@ -108,7 +108,7 @@ class IncrementEnd:
         dissipation = max(float(of_friction[is_held].sum()), 0.0)
         along_slip = 2.0 * weights * self.state.traction[:, 1] * slip
         (forces_before, displacements_before), (forces, displacements) = before.acting, self.acting
-        of_forces = 0.5 * float((forces_before + forces) @ (displacements - displacements_before))
+        of_forces = 0.5 * model.depth * float((forces_before + forces) @ (displacements - displacements_before))
         return StepWork(
             external_work=of_forces + float(sigma[:, 0] @ approached + np.sum(sigma[:, 1] * self.obstacle_slip)),
             dissipation=dissipation,

@@ -17,7 +17,7 @@ from bemkit.model.solved_contact import contact_warnings
 from bemkit.plan import Plan
 from bemkit.result_warning import ResultWarning
 from bemkit.results.contact_table import ContactTable, bound_at, find_transitions
-from bemkit.results.part_forces import RigidResult, contact_forces, nodal_resultants
+from bemkit.results.part_forces import PartForce, RigidResult, contact_forces, forces_on_parts, nodal_resultant
 from bemkit.results.solution import Solution
 from bemkit.results.solved_body import BoundaryFields, SideName, SolvedBody
 from bemkit.results.warnings import find_warnings
@@ -34,7 +34,7 @@ def solution_of(
     """Turn what the solver found into the physical fields of all bodies; the slip is for laws that depend on it."""
     prepared = model.prepared
     state, node_status = result.state, result.node_status
-    solved, reactions = model.boundary_fields(state), model.reactions(state)
+    solved, reactions, depth = model.boundary_fields(state), model.reactions(state), model.depth
     table = _contact_table(model, state, node_status)
     displacements = [displacement for displacement, _, _ in solved]
     of_contact = contact_warnings(model, displacements, node_status) if result.is_converged else ()
@@ -45,7 +45,7 @@ def solution_of(
             body.mesh.centres.copy(),
             mean_tractions(body.traction_space, traction),
             traction.reshape(-1, 2),
-            reaction,
+            depth * reaction,
         )
         for body, (displacement, traction, _), reaction in zip(prepared.bodies, solved, reactions, strict=True)
     ]
@@ -54,20 +54,26 @@ def solution_of(
     if result.is_converged and not all(finite):
         result = replace(result, status=Status.NOT_FINITE, message=Status.NOT_FINITE.value)
     law = prepared.law if motion is None else prepared.law.at_slip(motion)
-    resultants = nodal_resultants(table, prepared.frame, prepared.acting_at)
+    sides = _contact_sides(prepared)
+    resultants = _resultants(prepared, table)
+    on_parts = forces_on_parts(
+        pair
+        for own in resultants
+        for pair in zip(sides[own[0].name], own, strict=False)  # no side of a rigid body
+    )
     transitions = find_transitions(table, table.u_t - model.problem.slip_origin * model.units.displacement)
     solution = Solution(
         scene=prepared.scene,
         bodies={
-            body.name: SolvedBody(body.name, body.scene, body.mesh, own, energy)
+            body.name: SolvedBody(body.name, body.scene, body.mesh, own, depth * energy, on_parts.get(body.name, {}))
             for body, own, (_, _, energy) in zip(prepared.bodies, fields, solved, strict=True)
         },
-        contact_sides=_contact_sides(prepared),
+        contact_sides=sides,
         contact_directions=prepared.frame[:, 0].copy(),
         friction_bound=bound_at(table, law),
-        contacts=contact_forces(table, resultants, transitions),
+        contacts=contact_forces(table, depth, [own[0] for own in resultants], transitions),
         rigid={
-            body.name: RigidResult(body.name, *reaction.tolist(), *moved.tolist())
+            body.name: RigidResult(body.name, *(depth * reaction).tolist(), *moved.tolist())
             for body, (moved, reaction) in zip(prepared.scene.rigid, model.rigid_bodies(state), strict=True)
         },
         status=result.status,
@@ -84,6 +90,19 @@ def solution_of(
         message=result.message,
     )
     return solution.with_warnings(partial(_warnings, of_contact))
+
+
+def _resultants(prepared: Prepared, table: ContactTable) -> list[list[PartForce]]:
+    """Return what each contact with nodes exerts on its elastic sides, first on the one with the nodes."""
+    traction = np.stack([table.sigma_n, table.sigma_t], axis=1)
+    areas = prepared.scene.depth * table.weight
+    forces = np.einsum("nk,nkc->nc", areas[:, None] * traction, prepared.frame)
+    resultants, begin = [], 0
+    for rows in prepared.rows:
+        own, begin = forces[begin : begin + rows.n_contact], begin + rows.n_contact
+        signed = zip((own, -own), rows.acting_at(prepared.bodies), strict=False)  # a rigid partner has no points
+        resultants.append([nodal_resultant(rows.name, each, points) for each, points in signed])
+    return resultants
 
 
 def _contact_sides(prepared: Prepared) -> dict[str, tuple[SideName, ...]]:

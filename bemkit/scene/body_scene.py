@@ -55,6 +55,9 @@ class BodyScene:
     discretisation : Discretisation
     mesh : MeshOptions
     units : UnitNames or None
+        In results.
+    depth : float [m]
+        Thickness on which forces in results act, 1 if none is given. Everything here is per unit of thickness.
 
     Raises
     ------
@@ -77,6 +80,7 @@ class BodyScene:
     discretisation: Discretisation
     mesh: MeshOptions
     units: UnitNames | None
+    depth: float
 
     def __post_init__(self) -> None:
         check_laws({f"law of part {name!r}": law for name, law in self.laws.items()}, self.steps)
@@ -109,6 +113,14 @@ class BodyScene:
             raise InputError(
                 f"mesh.accuracy is {accuracy}: {self.discretisation.method} has no error estimate: choose the "
                 "discretisation 'quadratic' or 'linear', or give elements"
+            )
+
+    def check_among_others(self, name: str) -> None:
+        """Raise InputError, with the name of the body, if it has what only a single one may have."""
+        if isinstance(self.discretisation, Galerkin) and isinstance(self.discretisation.degree, tuple):
+            raise InputError(
+                f"degree is a list, of body {name!r}: elements have several degrees in scenes of one body only; give "
+                "one degree"
             )
 
     @property

@@ -148,7 +148,7 @@ class Force:
     Parameters
     ----------
     x, y : float [N/m]
-        The force on the whole part, per unit of thickness.
+        The force on the whole part, per unit of thickness unless the scene has a thickness.
     moment : float [N m/m]
         About the middle of the part, anticlockwise.
 
@@ -168,12 +168,12 @@ class Force:
             if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
                 raise InputError(f"{name} is {value!r}: give a finite number, the resultant on the whole part")
 
-    def over(self, length: float, middle: FloatArray, second_moment: float) -> Traction:
-        """Return the tractions on a part of a length [m], middle (2,) [m] and second moment of its length [m^3]."""
+    def over(self, area: float, middle: FloatArray, second_moment: float) -> Traction:
+        """Return the tractions on a part of an area [m^2], middle (2,) [m] and second moment of its area [m^4]."""
 
         def component(axis: int, x: FloatArray, y: FloatArray) -> FloatArray:
             turning = self.moment / second_moment * turned_left(np.column_stack([x, y]) - middle)
-            return np.asarray((self.x, self.y)[axis] / length + turning[:, axis])
+            return np.asarray((self.x, self.y)[axis] / area + turning[:, axis])
 
         return Traction(partial(component, 0), partial(component, 1))
 
@@ -265,8 +265,10 @@ class Part:
         """The piece of the outline that the part covers."""
         return Selection(sides=self.sides, where=self.where)
 
-    def on(self, outline: Outline, placement: Placement) -> Part:
+    def on(self, outline: Outline, placement: Placement, thickness: float) -> Part:
         """Return the part with the tractions of its resultant force, if it has one, on its piece of a placed outline.
+
+        The force acts on a thickness [m].
 
         Raises
         ------
@@ -279,4 +281,4 @@ class Part:
         points, length = placement.forward(points), float(lengths.sum())
         middle: FloatArray = lengths @ points / length
         second_moment = float(lengths @ np.sum((points - middle) ** 2, axis=1))
-        return replace(self, condition=self.condition.over(length, middle, second_moment))
+        return replace(self, condition=self.condition.over(thickness * length, middle, thickness * second_moment))

@@ -128,7 +128,7 @@ def with_value(scene: Node, key: Key, value: object) -> Node:
     SceneKeyError
         If there is no such key, or the value does not fit there.
     """
-    fitting = partial(_fitting, value, cast(Any, scene).units)
+    fitting = partial(_fitting, value, cast(Any, scene).result_units)
     changed: Node = _replaced(scene, type(scene), key.names, fitting, "", None)
     return changed
 

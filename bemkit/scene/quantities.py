@@ -6,7 +6,7 @@ import inspect
 import re
 
 from bemkit.errors import InputError
-from bemkit.scene.unit_names import PURE_NUMBER, Unit, UnitNames, read_unit
+from bemkit.scene.unit_names import PURE_NUMBER, Unit, UnitNames, is_force, read_unit
 
 _TEXT = re.compile(r"\s*((?>[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?))\s*((?:[^\W\d_]|°)[\w°^/* -]*?)\s*")
 
@@ -23,7 +23,7 @@ def in_units_of_scene(text: str, owner: type, name: str, units: UnitNames | None
     name : str
         Of the field.
     units : UnitNames or None
-        Of the scene.
+        Of the scene; with a thickness their force is no force per thickness.
 
     Raises
     ------
@@ -38,12 +38,15 @@ def in_units_of_scene(text: str, owner: type, name: str, units: UnitNames | None
     documented = unit_of_parameter(inspect.getdoc(owner) or "", name)
     if not documented:
         return text
+    if units is not None and is_force(units.force or ""):
+        documented = {"N/m": "N", "N m/m": "N m"}.get(documented, documented)
     expected = PURE_NUMBER if documented == "-" else read_unit(documented)
     given = read_unit(found[2])
+    scale = _scale(given, units, text)
     if given.powers != expected.powers:
         remedy = "without a unit" if expected == PURE_NUMBER else f"in {documented} or a multiple of it"
         raise InputError(f"{text!r} has a unit of another kind: give it {remedy}")
-    return float(found[1]) * given.factor / (expected.factor * _scale(given, units, text))
+    return float(found[1]) * given.factor / (expected.factor * scale)
 
 
 def _scale(unit: Unit, units: UnitNames | None, text: str) -> float:

@@ -9,11 +9,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
+from bemkit.arrays import FloatArray
 from bemkit.contact.laws import FrictionLaw, Frictionless
 from bemkit.errors import InputError
 from bemkit.geometry.mesh import BoundaryMesh
@@ -31,7 +31,7 @@ from bemkit.scene.discretisation import Discretisation, Galerkin
 from bemkit.scene.mesh_options import MeshOptions
 from bemkit.scene.objects import check_objects, outline_of
 from bemkit.scene.plane_motion import FarField, RigidBody
-from bemkit.scene.steps import Step, check_laws, check_names
+from bemkit.scene.steps import Step, check_laws, check_names, check_steps
 from bemkit.scene.unit_names import UnitNames
 from bemkit.solvers.base import ContactSolver
 from bemkit.solvers.fallbacks import Fallbacks
@@ -94,6 +94,9 @@ class Scene(ShownInNotebooks):
     solver : ContactSolver
     units : UnitNames, optional
         Names of the units that everything is stated in; they label results.
+    thickness : float, optional [m]
+        Out of the plane. With it forces and moments, given and in results, are those on the whole thickness, and
+        energies, too; without it all are per unit of thickness.
     description, reference : str
         For the reader: what the scene shows and where it comes from.
 
@@ -128,6 +131,7 @@ class Scene(ShownInNotebooks):
     mesh: MeshOptions = field(default_factory=MeshOptions)
     solver: ContactSolver = field(default_factory=Fallbacks)
     units: UnitNames | None = None
+    thickness: float | None = None
     description: str = ""
     reference: str = ""
 
@@ -137,8 +141,11 @@ class Scene(ShownInNotebooks):
         object.__setattr__(self, "steps", tuple(self.steps))
         if not self.title or not self.title.isprintable():
             raise InputError(f"title is {self.title!r}: give one line of printable text")
+        if self.thickness is not None and not 0.0 < self.thickness < np.inf:
+            raise InputError(f"thickness is {self.thickness}: give a positive length, or omit it")
+        _ = self.result_units
         self._check_form()
-        self._check_steps()
+        check_steps(self.load_factors, self.steps)
         for body in self.bodies:
             body.check_name()
         names = [*(body.name for body in self.placed_bodies), *(body.name for body in self.rigid)]
@@ -159,7 +166,7 @@ class Scene(ShownInNotebooks):
         for body in self.placed_bodies:
             scene = self.scene_of(body)  # parts and sides are checked
             if len(self.placed_bodies) > 1:
-                _check_among_others(body, scene)
+                scene.check_among_others(body.name)
 
     def __getstate__(self) -> dict[str, Any]:
         """Pickle the fields only: what is cached is known by the identity of objects."""
@@ -179,19 +186,6 @@ class Scene(ShownInNotebooks):
         for name in OF_ONE_BODY:
             if getattr(self, name) not in (None, ()):
                 raise InputError(f"{name} is given besides bodies: state it of one of the bodies")
-
-    def _check_steps(self) -> None:
-        if not (self.load_factors and np.all(np.isfinite(self.load_factors))):
-            raise InputError(f"load_factors is {self.load_factors}: give finite numbers such as (0.5, 1.0)")
-        if self.steps and self.load_factors != (1.0,):
-            raise InputError(
-                f"load_factors is {self.load_factors} besides {len(self.steps)} steps: give each step its load_factor"
-            )
-        for number, (before, step) in enumerate(pairwise(self.steps), start=1):
-            if step.time <= before.time:
-                raise InputError(
-                    f"steps[{number}]: time is {step.time:g} after {before.time:g}: give times that increase"
-                )
 
     def _check_without_contact(self) -> None:
         remedy = "no part is in contact: remove the {name}, or give one part the condition 'contact' with an obstacle"
@@ -238,6 +232,20 @@ class Scene(ShownInNotebooks):
             own = {name: getattr(self, name) for name in OF_ONE_BODY}
             return (Body(name="", **own),)
         return tuple(placed for body in self.bodies for placed in body.copied())
+
+    @property
+    def depth(self) -> float:
+        """The thickness that forces act on: 1 if none is given."""
+        return 1.0 if self.thickness is None else self.thickness
+
+    @property
+    def result_units(self) -> UnitNames | None:
+        """Names of the units of forces, lengths and stresses in results."""
+        return None if self.units is None else self.units.over_thickness(self.thickness)
+
+    def load_on(self, body: RigidBody) -> FloatArray:
+        """Return the given loads (3,) [N/m, N/m, N m/m] on a rigid body, per unit of thickness."""
+        return body.load / self.depth
 
     @property
     def has_contact(self) -> bool:
@@ -334,21 +342,22 @@ class Scene(ShownInNotebooks):
         named = {part.name for part in body.parts}
         try:
             outline = outline_of(body.shape)
-            own = tuple(part.on(outline, body.placement) for part in body.parts)
+            own = tuple(part.on(outline, body.placement, self.depth) for part in body.parts)
             facing = [body.contact_part(name) for name in self.touching_parts(body)]
             return BodyScene(
                 shape=body.shape,
                 material=body.material,
                 parts=(*own, *(part for part in facing if part.name not in named)),
                 body_forces=body.body_forces,
-                far=body.far,
+                far=None if body.far is None else body.far.multiplied(np.ones(3), np.full(3, 1.0 / self.depth)),
                 law=self.law,
                 steps=self.steps,
                 n_steps=self.n_steps,
                 symmetry=self._lines_across(body),
                 discretisation=self.discretisation if body.discretisation is None else body.discretisation,
                 mesh=self.mesh if body.mesh is None else body.mesh,
-                units=self.units,
+                units=self.result_units,
+                depth=self.depth,
             )
         except InputError as error:
             if not body.name:
@@ -373,15 +382,6 @@ def _identity(value: object) -> object:
     if isinstance(value, tuple):
         return tuple(id(entry) for entry in value)
     return value if isinstance(value, Material | FarField) else id(value)
-
-
-def _check_among_others(body: Body, scene: BodyScene) -> None:
-    """Raise InputError if a body has what only a single one may have."""
-    if isinstance(scene.discretisation, Galerkin) and isinstance(scene.discretisation.degree, tuple):
-        raise InputError(
-            f"degree is a list, of body {body.name!r}: elements have several degrees in scenes of one body only; give "
-            "one degree"
-        )
 
 
 def check_scene(scene: object) -> None:

@@ -6,14 +6,12 @@ import math
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import Any, TypeAlias
 
 from bemkit.contact.laws import FrictionLaw
 from bemkit.errors import InputError
-
-if TYPE_CHECKING:
-    pass
 
 TimeValue: TypeAlias = float | str | Callable[[float], float]
 """A number, a formula in the time t, or a Python function of it."""
@@ -63,6 +61,17 @@ class Step:
     def is_plain(self) -> bool:
         """Whether it has a time and nothing else, as the steps of results do."""
         return not self.changes and self.load_factor is None and self.increments == 1
+
+
+def check_steps(load_factors: Sequence[float], steps: Sequence[Step]) -> None:
+    """Raise InputError unless load factors are finite, times increase, and only one of both describes the history."""
+    if not (load_factors and all(map(math.isfinite, load_factors))):
+        raise InputError(f"load_factors is {load_factors}: give finite numbers such as (0.5, 1.0)")
+    if steps and load_factors != (1.0,):
+        raise InputError(f"load_factors is {load_factors} besides {len(steps)} steps: give each step its load_factor")
+    for number, (before, step) in enumerate(pairwise(steps), start=1):
+        if step.time <= before.time:
+            raise InputError(f"steps[{number}]: time is {step.time:g} after {before.time:g}: give times that increase")
 
 
 def check_names(owner: str, names: Iterable[str], kind: str) -> None:

@@ -28,7 +28,7 @@ MAX_BYTES = 1_000_000
 
 # the order of keys in files that are written, as a reader wants it
 _SCENE_KEYS = (
-    *("title", "description", "reference", "units", "discretisation", "linear_solver", "solver"),
+    *("title", "description", "reference", "units", "thickness", "discretisation", "linear_solver", "solver"),
     *("load_factors", "steps", "symmetry", "law", "shape", "material", "body_forces", "far", "touching", "mesh"),
     *("parts", "bodies", "rigid", "contacts"),
 )
@@ -164,10 +164,11 @@ def scene_from_table(table: dict[str, Any], folder: Path | None = None) -> Scene
 
 
 def _units_of(table: dict[str, Any]) -> UnitNames | None:
-    """Return the units that a table states, None if there are none or their table holds a mistake."""
+    """Return the units of a table and its thickness, None if there are none or their tables hold a mistake."""
     try:
-        return structure(table["units"], UnitNames) if "units" in table else None
-    except StructureError:  # found again, and named, with the other mistakes of the scene
+        units = structure(table["units"], UnitNames) if "units" in table else None
+        return units if units is None or "thickness" not in table else units.over_thickness(1.0)
+    except InputError:  # found again, and named, with the other mistakes of the scene
         return None
 
 

@@ -6,13 +6,17 @@ import math
 import re
 import unicodedata
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from types import MappingProxyType
 
 from bemkit.errors import InputError
 from bemkit.formulas import closest
 
 _LONGEST = 24
+QUANTITIES: Mapping[str, str] = MappingProxyType(
+    {"m": "length", "Pa": "stress", "N/m": "force", "N m/m": "energy", "J/m": "energy"}
+)
+"""Quantities of the SI units that columns of tables state, by whose names units are called."""
 _FACTOR = re.compile(r"([^\W\d_]+|°)(?:\^?(-?\d))?")
 
 
@@ -81,15 +85,26 @@ def read_unit(text: str) -> Unit:
     return unit
 
 
-def name_of_force(length: str, stress: str) -> str:
-    """Return the name of the unit of forces per thickness, such as ``N/mm`` of mm and MPa; empty if none is known."""
+def name_of_force(length: str, stress: str, suffix: str = "") -> str:
+    """Return the name of the unit of forces, stress times area, such as ``N`` of mm and MPa; empty if none is known.
+
+    With a suffix such as ``/mm`` it is that of forces per thickness, ``N/mm``.
+    """
     try:
-        size = read_unit(stress).factor * read_unit(length).factor
+        size = read_unit(stress).factor * read_unit(length).factor ** (1 if suffix else 2)
     except InputError:  # units of one's own
         return ""
-    names = ("N", "kN", "MN", "mN", "lbf", "kip")
-    per_length = {f"{name}/{length}": read_unit(f"{name}/{length}").factor for name in names}
-    return next((name for name, own in per_length.items() if math.isclose(own, size, rel_tol=1e-9)), "")
+    names = [f"{name}{suffix}" for name in ("N", "kN", "MN", "mN", "lbf", "kip")]
+    return next((name for name in names if math.isclose(read_unit(name).factor, size, rel_tol=1e-9)), "")
+
+
+def is_force(name: str) -> bool | None:
+    """Whether a unit is one of forces, and not of forces per thickness; None if it is unknown."""
+    try:
+        powers = read_unit(name).powers
+    except InputError:
+        return None
+    return {(1, 1, -2, 0, 0): True, (1, 0, -2, 0, 0): False}.get(powers)
 
 
 def length_in_metres(name: str) -> float | None:
@@ -109,7 +124,8 @@ class UnitNames:
     stress : str
         Such as ``"MPa"``; of tractions, pressures and moduli.
     force : str, optional
-        Of forces per thickness, stress times length, such as ``"N/mm"``; derived from the other two if not given.
+        Of forces per thickness, stress times length, such as ``"N/mm"``; in a scene with a thickness of forces, such as
+        ``"N"``. Derived from the other two if not given.
 
     Raises
     ------
@@ -125,15 +141,37 @@ class UnitNames:
         for entry in fields(self):
             name = getattr(self, entry.name)
             if name is None and entry.name == "force":
-                known = name_of_force(self.length, self.stress)
-                object.__setattr__(self, "force", known or f"{self.stress} {self.length}")
+                object.__setattr__(self, "force", self._per_thickness)
                 continue
             if not (isinstance(name, str) and name.strip() and name.isprintable() and len(name) <= _LONGEST):
                 raise InputError(f"units.{entry.name} is {name!r}: give a short name such as 'mm' or 'MPa'")
 
     @property
+    def _per_thickness(self) -> str:
+        known = name_of_force(self.length, self.stress, f"/{self.length}")
+        return known or f"{self.stress} {self.length}"
+
+    def over_thickness(self, thickness: float | None) -> UnitNames:
+        """Return the names in a scene of a thickness, in which forces are stresses times areas, or of none.
+
+        Raises
+        ------
+        InputError
+            If the name of the unit of forces is that of the other kind.
+        """
+        names = self
+        if thickness is not None and self.force == self._per_thickness:
+            names = replace(self, force=name_of_force(self.length, self.stress) or f"{self.stress} {self.length}^2")
+        if is_force(names.force or "") is (thickness is None):
+            given, remedy = ("no thickness", "N/mm") if thickness is None else (f"thickness {thickness:g}", "N")
+            raise InputError(
+                f"units.force is {self.force!r}, and the scene has {given}: give a unit such as {remedy!r}, or omit it"
+            )
+        return names
+
+    @property
     def energy(self) -> str:
-        """Unit of energies and moments per thickness."""
+        """Unit of energies and moments, per thickness as forces are."""
         per_length = f"/{self.length}"
         force = self.force or ""
         if force.endswith(per_length):

@@ -103,7 +103,7 @@ def test_scenes_that_follow_each_other_come_back(tmp_path: Path, solution: Solut
 def test_provenance_names_versions_but_neither_people_nor_places(file: Path) -> None:
     with h5py.File(file) as stored:
         provenance = dict(stored["provenance"].attrs)
-        assert stored.attrs["schema_version"] == 6
+        assert stored.attrs["schema_version"] == 7
     assert set(provenance) == {"bemkit", "python", "numpy", "scipy", "h5py", "platform", "created"}
     text = " ".join(map(str, provenance.values()))
     assert str(Path.home()) not in text
@@ -301,7 +301,7 @@ def test_a_damaged_list_of_contents_is_named() -> None:
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        (attribute("/", "schema_version", 3), "has layout version 3, this bemkit .* reads version 6: use the bemkit"),
+        (attribute("/", "schema_version", 3), "has layout version 3, this bemkit .* reads version 7: use the bemkit"),
         (attribute("/", "format", "other"), "not a bemkit result"),
         (said("outcome", "status", "GREAT"), "inconsistent content .*GREAT"),
         (said("outcome", "energies", ["much"]), "inconsistent content"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import html
 import io
 import json
@@ -18,16 +19,47 @@ import bemkit as bk
 from bemkit.cli.console import print_summary
 from bemkit.report.page import report
 from bemkit.results.summary_rows import DIGITS, summary_rows
-from bemkit.results.tables import table_of, to_json
+from bemkit.results.tables import table_of, to_csv, to_json
 from bemkit.scene.toml import with_overrides
 
 UNITS = bk.UnitNames("mm", "MPa")
 
 
-@pytest.fixture(scope="module", params=["paper-1", "wedged-leg"])
+def blocks() -> bk.Scene:
+    """Return a block that a force presses on another one, both of a thickness."""
+    block = bk.Body(
+        name="upper",
+        shape=bk.Rectangle(1.0, 1.0),
+        material=bk.Material(1e4, 0.3),
+        parts=(bk.Part("top", bk.Force(20.0, -400.0, 3.0), ("top",)),),
+        placement=bk.Placement(shift=(0.5, 1.0)),
+    )
+    base = bk.Part("base", bk.Clamped(), ("bottom",))
+    lower = replace(block, name="lower", shape=bk.Rectangle(2.0, 1.0), parts=(base,), placement=bk.Placement())
+    pair = bk.ContactPair(("upper.bottom", "lower.top"))
+    return bk.Scene(
+        title="Blocks",
+        bodies=(lower, block),
+        contacts=(pair,),
+        law=bk.Coulomb(0.3),
+        mesh=bk.MeshOptions(elements=24),
+        thickness=10.0,
+    )
+
+
+SCENES: dict[str, Callable[[], bk.Scene]] = {
+    "obstacle": lambda: with_overrides(bk.load_scene("paper-1"), elements=40),
+    "bodies": blocks,
+    "rigid body": lambda: bk.load_scene("wedged-leg"),
+    "driven rigid body": lambda: with_overrides(bk.load_scene("tilted-punch"), elements=24),
+    "half-plane": lambda: with_overrides(bk.load_scene("cylinder-on-half-plane"), elements=24),
+    "history": lambda: with_overrides(bk.load_scene("friction-loop"), elements=24),
+}
+
+
+@pytest.fixture(scope="module", params=SCENES)
 def solution(request: pytest.FixtureRequest) -> bk.Solution:
-    scene = bk.load_scene(request.param)
-    return bk.run(replace(with_overrides(scene, elements=40) if request.param == "paper-1" else scene, units=UNITS))
+    return bk.run(replace(SCENES[request.param](), units=UNITS))
 
 
 def text_of(page: str) -> str:
@@ -51,24 +83,122 @@ def test_all_ways_out_have_the_same_rows(solution: bk.Solution, without: Callabl
 
 
 def test_the_numbers_of_the_summary_are_those_of_json(solution: bk.Solution) -> None:
-    rows, summary = str(solution), json.loads(to_json(solution))
-    force, energy = UNITS.as_dict()["force"], UNITS.energy
-    expected = [f"{summary['energy']:.{DIGITS}g} {energy}", f"{summary['force_normal']:.{DIGITS}g} {force}"]
+    text, summary = str(solution), json.loads(to_json(solution))
+    names = summary["units"]
+
+    def shown(value: float, quantity: str) -> str:
+        return f"{value:.{DIGITS}g} {names[quantity]}"
+
+    def pair(x: float, y: float, quantity: str) -> str:
+        return f"({x:.{DIGITS}g}, {y:.{DIGITS}g}) {names[quantity]}"
+
+    expected = [shown(summary["energy"], "energy")]
+    expected += [shown(summary[key], "force") for key in ("force_normal", "force_tangential")]
     largest = sorted(summary["contacts"], key=lambda contact: -contact["force_normal"])[:8]
     for contact in largest:
+        expected += [shown(contact[key], "force") for key in ("force_normal", "force_tangential")]
         expected += [
-            f"{contact['contact_length']:.{DIGITS}g} mm ({100.0 * contact['contact_fraction']:.4g} %)",
-            f"{contact['peak_pressure']:.{DIGITS}g} MPa at "
-            f"({contact['peak_x']:.{DIGITS}g}, {contact['peak_y']:.{DIGITS}g}) mm",
-            f"{contact['largest_slip']:.{DIGITS}g} mm",
+            f"{shown(contact['contact_length'], 'length')} ({100.0 * contact['contact_fraction']:.4g} %)",
+            f"{shown(contact['peak_pressure'], 'stress')} at {pair(contact['peak_x'], contact['peak_y'], 'length')}",
+            shown(contact["largest_slip"], "length"),
         ]
-    for body in list(summary.get("rigid", {}).values())[:8]:
-        expected += [f"({body['x']:.{DIGITS}g}, {body['y']:.{DIGITS}g}) mm", f"{body['turn']:.{DIGITS}g} rad"]
-    for fact in solution.forces.as_dicts()[:8]:
-        expected.append(f"({fact['force_x']:.{DIGITS}g}, {fact['force_y']:.{DIGITS}g}) {force}")
-        expected.append(f"moment {fact['moment']:.{DIGITS}g} {energy}")
+    for body in list(summary["rigid"].values())[:8]:
+        expected += [pair(body["x"], body["y"], "length"), f"{body['turn']:.{DIGITS}g} rad"]
+        expected += [pair(body["force_x"], body["force_y"], "force"), f"moment {shown(body['moment'], 'energy')}"]
+    for fact in summary["parts"][:8]:
+        expected += [pair(fact["force_x"], fact["force_y"], "force"), f"moment {shown(fact['moment'], 'energy')}"]
+    for place in summary["transitions"][:6]:
+        expected.append(f"{pair(place['x'], place['y'], 'length')}, s = {shown(place['s'], 'length')}")
+    for key in ("external_work", "dissipation") if summary["steps"] else ():
+        expected.append(shown(sum(step[key] for step in summary["steps"]), "energy"))
     for number in expected:
-        assert number in rows
+        assert number in text
+
+
+def test_the_tables_are_those_of_json(solution: bk.Solution) -> None:
+    summary = json.loads(to_json(solution))
+    assert rows_of(to_csv(solution, "forces")) == [texts(part) for part in summary["parts"]]
+    if summary["steps"]:
+        assert rows_of(to_csv(solution, "steps")) == [texts(step) for step in summary["steps"]]
+        last = summary["steps"][-1]
+        assert [last[key] for key in ("force_normal", "force_tangential", "elastic_energy")] == [
+            summary[key] for key in ("force_normal", "force_tangential", "energy")
+        ]
+    table = table_of(solution, "contact").as_dicts()
+    weights = solution.contact.weight * (summary["thickness"] or 1.0)
+    for contact in summary["contacts"]:
+        own = [(row, weight) for row, weight in zip(table, weights, strict=True) if row["part"] == contact["name"]]
+        assert contact["peak_pressure"] == max(-row["sigma_n"] for row, _ in own)
+        # sums in another order differ by round-off
+        assert contact["force_normal"] == pytest.approx(-sum(weight * row["sigma_n"] for row, weight in own), rel=1e-12)
+    for key in ("force_normal", "force_tangential"):
+        assert summary[key] == pytest.approx(sum(contact[key] for contact in summary["contacts"]), rel=1e-12)
+
+
+def test_a_part_in_contact_carries_what_its_contacts_do(solution: bk.Solution) -> None:
+    """With the same digits on the side with the nodes, and the opposite force on its partner."""
+    parts = {(part.get("body", ""), part["name"]): part for part in json.loads(to_json(solution))["parts"]}
+    contacts = {contact.name: contact for contact in solution.contacts}
+    for name, (side, *partners) in solution.contact_sides.items():
+        keys = ("force_x", "force_y", "moment")
+        found = [[parts[tuple(each)][key] for key in keys] for each in (side, *partners)]
+        assert found[0] == [getattr(contacts[name], key) for key in keys]
+        for other in found[1:]:
+            assert other == pytest.approx([-value for value in found[0]], rel=1e-9, abs=1e-12 * max(map(abs, found[0])))
+
+
+def test_bodies_are_in_equilibrium_to_round_off(solution: bk.Solution) -> None:
+    """Forces and moments of the parts of each body, whose weight is zero here; a half-plane is held far away."""
+    for body in solution.bodies.values():
+        if body.mesh.surface is None:
+            forces = [(part.force_x, part.force_y, part.moment) for part in body.part_forces]
+            size = max(abs(value) for force in forces for value in force)
+            assert [sum(values) for values in zip(*forces, strict=True)] == pytest.approx([0.0] * 3, abs=1e-9 * size)
+
+
+def test_the_tables_of_the_report_are_those_of_json(solution: bk.Solution, without: Callable[..., None]) -> None:
+    without("matplotlib")
+    summary, page = json.loads(to_json(solution)), report(solution)
+    for caption, key in (
+        ("What each contact transmits", "contacts"),
+        ("Resultants on each part", "parts"),
+        ("Where the contact status changes", "transitions"),
+    ):
+        found = re.search(rf"<caption>{caption}</caption>(.*?)</table>", page, re.DOTALL)
+        assert (found is None) == (not summary[key])
+        if found is None:
+            continue
+        heads = re.findall(r"<th\b[^>]*>(.*?)</th>", found[1])
+        assert heads == [with_unit_of(name, summary["units"]) for name in summary[key][0]]
+        cells = [html.unescape(cell) for cell in re.findall(r"<td\b[^>]*>(.*?)</td>", found[1])]
+        values = [value for row in summary[key] for value in row.values()]
+        assert cells == [f"{value:.6g}" if isinstance(value, float) else str(value) for value in values]
+
+
+def with_unit_of(name: str, units: dict[str, str]) -> str:
+    quantity = {"force": "force", "moment": "energy", "contact_length": "length", "peak_pressure": "stress"} | {
+        key: "length" for key in ("peak_x", "peak_y", "largest_slip", "x", "y", "s")
+    }
+    found = quantity.get(name) or quantity.get(name.split("_")[0])
+    return name.replace("_", " ") + (f" [{units[found]}]" if found else "")
+
+
+@pytest.mark.parametrize("table", ["contact", "boundary", "forces", "steps"])
+def test_every_number_of_a_table_has_the_unit_of_the_scene(solution: bk.Solution, table: str) -> None:
+    if table == "steps" and solution.loading is None:
+        return
+    found, units = table_of(solution, table), solution.summary()["units"]
+    for head in found.columns:
+        is_number = isinstance(found.values(head.name)[0], float)
+        assert head.unit in ({"s"} if head.name == "time" else set(units.values()) if is_number else {""}), head.name
+
+
+def rows_of(text: str) -> list[dict[str, str]]:
+    return list(csv.DictReader(io.StringIO(text)))
+
+
+def texts(row: dict[str, object]) -> dict[str, str]:
+    return {key: str(value) for key, value in row.items()}
 
 
 def test_the_peak_is_where_the_contact_table_has_it(solution: bk.Solution) -> None:
@@ -78,12 +208,6 @@ def test_the_peak_is_where_the_contact_table_has_it(solution: bk.Solution) -> No
         (peak,) = [row for row in rows if (row["x"], row["y"]) == (contact["peak_x"], contact["peak_y"])][:1]
         assert -peak["sigma_n"] == max(-row["sigma_n"] for row in rows)
         assert 0.0 <= contact["contact_fraction"] <= 1.0 + 1e-12
-
-
-def test_the_forces_are_those_of_the_parts(solution: bk.Solution) -> None:
-    expected = [force.force_x for body in solution.bodies.values() for force in body.part_forces]
-    # sums of nodal forces and integrals of the tractions that they make differ by round-off
-    assert list(solution.forces.values("force_x")) == pytest.approx(expected, rel=1e-9, abs=1e-12 * max(expected))
 
 
 def test_a_solution_is_explored(tmp_path: Path) -> None:

@@ -67,5 +67,5 @@ def draw_all(over: str, shown: Sequence[str], sweep: Sweep) -> dict[str, Figure]
 
 
 def _named(column: str, sweep: Sweep) -> str:
-    unit = unit_of_column(column, sweep.scene.units)
+    unit = unit_of_column(column, sweep.scene.result_units)
     return f"{column.replace('_', ' ') if column in QUANTITIES else column}{f' [{unit}]' if unit else ''}"

@@ -7,7 +7,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 
-from bemkit.results.part_forces import contact_sizes
 from bemkit.results.solution import Solution
 from bemkit.scene.unit_names import UnitNames, unit_of
 from bemkit.studies.engine import Attempt
@@ -97,15 +96,14 @@ def row_of(values: tuple[float, ...], found: Attempt) -> SweepRow:
 
 
 def _numbers(solution: Solution) -> dict[str, float]:
-    table, error = solution.contact, solution.estimated_error
-    contacts = [contact_sizes(table, part, solution.transitions) for part in table.parts]
+    contacts, error = solution.contacts, solution.estimated_error
     return {
         "force_normal": solution.force_normal,
         "force_tangential": solution.force_tangential,
         "energy": solution.energy,
-        "contact_length": sum(contact["contact_length"] for contact in contacts),
-        "peak_pressure": max((contact["peak_pressure"] for contact in contacts), default=0.0),
-        "largest_slip": max((contact["largest_slip"] for contact in contacts), default=0.0),
+        "contact_length": sum(contact.contact_length for contact in contacts),
+        "peak_pressure": max((contact.peak_pressure for contact in contacts), default=0.0),
+        "largest_slip": max((contact.largest_slip for contact in contacts), default=0.0),
         "estimated_error": math.nan if error is None else error,
     }
 

@@ -84,7 +84,7 @@ class Sweep:
 
     def as_table(self) -> Table:
         """Return all rows with the keys in front; numbers of failed rows are nan."""
-        units = self.scene.units
+        units = self.scene.result_units
         results = [replace(head, unit=unit_of_column(head.name, units)) for head in columns_of(SweepRow)]
         keys = [Column(key, "", "varied", "g") for key in self.keys]
         rows = ((*row.values, *(getattr(row, name) for name in RESULTS)) for row in self.rows)
@@ -136,7 +136,7 @@ class Sweep:
         for name in QUANTITIES:
             values = np.full([axis.size for axis in axes], np.nan)
             values[places] = self.column(name)
-            data[name] = (self.keys, values, {"units": unit_of_column(name, self.scene.units)})
+            data[name] = (self.keys, values, {"units": unit_of_column(name, self.scene.result_units)})
         return xr.Dataset(data, coords=dict(zip(self.keys, axes, strict=True)), attrs={"title": self.scene.title})
 
     def _as_dict(self, row: SweepRow, names: Sequence[str]) -> dict[str, Any]:

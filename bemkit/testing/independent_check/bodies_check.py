@@ -132,8 +132,11 @@ def rigid_mismatch(joints: Interfaces) -> float:
             scales = joints.side(joints.owner(name)).body.scales
             size += float(np.abs(force).sum()) + scales.stress * float(table.weight[rows].min())
         reach = np.array([1.0, 1.0, max(each.result.mesh.diameter for each in joints.bodies.values())])
-        reaction = np.array([found.force_x, found.force_y, found.moment])
-        unexplained = (reaction - total, np.where(body.is_load_controlled, reaction - body.load, 0.0))
+        reaction = np.array([found.force_x, found.force_y, found.moment]) / solution.scene.depth
+        unexplained = (
+            reaction - total,
+            np.where(body.is_load_controlled, reaction - solution.scene.load_on(body), 0.0),
+        )
         worst += [float(np.abs(each / reach).max()) / (size or 1.0) for each in unexplained]
         motion = np.array([found.x, found.y, found.turn])
         worst.append(float(np.abs(np.where(body.is_load_controlled, 0.0, motion - body.motion)).max()))
@@ -181,7 +184,8 @@ def energy_mismatch(joints: Interfaces) -> float:
     table = joints.solution.contact
     each = table.weight[:, None] * np.column_stack([table.sigma_n * table.u_n, table.sigma_t * table.u_t])
     work, size = work + 0.5 * float(each.sum()), size + 0.5 * float(np.abs(each).sum())
+    depth = joints.solution.scene.depth
     for found in joints.solution.rigid.values():  # relative displacements exclude the motion of obstacles
-        of_motion = found.force_x * found.x, found.force_y * found.y, found.moment * found.turn
-        work, size = work + 0.5 * sum(of_motion), size + 0.5 * float(np.abs(of_motion).sum())
-    return abs(joints.solution.energy - work) / size if size > 0.0 else 0.0
+        of_motion = np.array([found.force_x * found.x, found.force_y * found.y, found.moment * found.turn]) / depth
+        work, size = work + 0.5 * float(of_motion.sum()), size + 0.5 * float(np.abs(of_motion).sum())
+    return abs(joints.solution.energy / depth - work) / size if size > 0.0 else 0.0

@@ -163,9 +163,10 @@ def _beside_corners(solution: BodyView, boundary: Boundary) -> BoolArray:
 def resultant_mismatch(solution: Solution) -> float:
     """Return the difference [-] of the reported forces from sums over the table."""
     table = solution.contact
-    size = float(table.weight @ np.hypot(table.sigma_n, table.sigma_t)) or 1.0
-    normal = abs(solution.force_normal + float(table.weight @ table.sigma_n))
-    tangential = abs(solution.force_tangential - float(table.weight @ table.sigma_t))
+    areas = solution.scene.depth * table.weight
+    size = float(areas @ np.hypot(table.sigma_n, table.sigma_t)) or 1.0
+    normal = abs(solution.force_normal + float(areas @ table.sigma_n))
+    tangential = abs(solution.force_tangential - float(areas @ table.sigma_t))
     return max(normal, tangential) / size
 
 

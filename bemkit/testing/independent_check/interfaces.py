@@ -13,7 +13,7 @@ from bemkit.contact.laws import FrictionLaw
 from bemkit.results.contact_table import ContactTable
 from bemkit.results.solution import Solution
 from bemkit.results.solved_body import SideName
-from bemkit.scene.contacts import ContactPair
+from bemkit.scene.contacts import ContactPair, name_at_obstacle
 from bemkit.testing.independent_check.bodies import BodyMeasurements
 from bemkit.testing.independent_check.boundary import trusted_stress
 from bemkit.testing.independent_check.check import ContactMeasurements, measure
@@ -123,7 +123,7 @@ class Interfaces:
             others = [
                 side.body.boundary.nodes[side.body.result.mesh.part(part.name)].ravel()
                 for part in side.body.result.scene.contact_parts
-                if side.body.result.contact_name(part.name) != name
+                if name_at_obstacle(side.body.result.name, part.name) != name
             ]
             nodes = np.unique(np.concatenate([nodes, *others]))
         at = side.body.result.boundary.points[nodes]

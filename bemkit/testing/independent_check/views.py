@@ -15,6 +15,7 @@ from bemkit.results.solution import Solution
 from bemkit.results.solved_body import BoundaryFields, SolvedBody
 from bemkit.scene.body_scene import BodyScene
 from bemkit.scene.conditions import Contact, Free
+from bemkit.scene.contacts import name_at_obstacle
 
 _NO_TABLE = ContactTable((), *(np.zeros(0),) * 9, status=np.zeros(0, np.intp), weight=np.zeros(0))
 
@@ -35,8 +36,10 @@ class BodyView:
 def view_of(solution: Solution) -> BodyView:
     """Return the only body of a solution with its contacts at fixed obstacles."""
     body = solution.body
-    table = solution.contact.renamed({body.contact_name(name): name for name in obstacles_of(body.scene)})
-    return BodyView(body.scene, body.mesh, body.boundary, body.energy, body.particular, table, solution.motion)
+    table = solution.contact.renamed({name_at_obstacle(body.name, name): name for name in obstacles_of(body.scene)})
+    return BodyView(
+        body.scene, body.mesh, body.boundary, body.energy / body.scene.depth, body.particular, table, solution.motion
+    )
 
 
 def freed(body: SolvedBody) -> BodyView:
@@ -44,7 +47,7 @@ def freed(body: SolvedBody) -> BodyView:
     obstacles = obstacles_of(body.scene)
     parts = tuple(replace(part, condition=Free()) if part.name in obstacles else part for part in body.scene.parts)
     scene = replace(body.scene, parts=parts, law=Frictionless())
-    return BodyView(scene, body.mesh, body.boundary, body.energy, body.particular)
+    return BodyView(scene, body.mesh, body.boundary, body.energy / body.scene.depth, body.particular)
 
 
 def obstacles_of(scene: BodyScene) -> list[str]:
