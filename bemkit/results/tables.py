@@ -110,7 +110,9 @@ def table_of(solution: Solution, table: str) -> Table:
 def in_units(head: Column, solution: Solution) -> Column:
     """Return a column with the name of its unit in the scene, without names in SI units."""
     names = solution.units or UnitNames("m", "Pa").over_thickness(solution.scene.thickness)
-    return replace(head, unit=unit_of(QUANTITIES[head.unit], names)) if head.unit in QUANTITIES else head
+    unit = head.unit.removeprefix("1/")
+    inverse = head.unit.removesuffix(unit)
+    return replace(head, unit=inverse + unit_of(QUANTITIES[unit], names)) if unit in QUANTITIES else head
 
 
 def columns_of(

@@ -69,6 +69,16 @@ def test_mistakes_name_key_value_and_remedy() -> None:
         )
 
 
+def test_forces_have_the_units_of_a_scene_with_or_without_a_thickness() -> None:
+    text = BLOCK.format(units=UNITS, **WITH_UNITS).replace('{ kind = "pressure"', '{ kind = "force"')
+    plain, moved = ('y = "-35 kN/mm"', 'moment = "2 kN m/m"'), ('y = "-350 kN"', 'moment = "2 kN m"')
+    for thickness, loads, expected in (("", plain, (-35e3, 2e3)), ('thickness = "10 mm"', moved, (-350e3, 2e6))):
+        changed = text.replace('pressure = "5 N/mm^2", shear = "0.1 * x"', ", ".join(loads))
+        scene = bk.scene_from_toml(changed.replace(UNITS, f"{UNITS}\n{thickness}"))
+        assert scene.thickness == (10.0 if thickness else None)
+        assert (scene.parts[1].condition.y, scene.parts[1].condition.moment) == pytest.approx(expected, rel=1e-15)
+
+
 def test_values_set_at_a_place_may_have_units() -> None:
     scene = bk.scene_from_toml(BLOCK.format(units=UNITS, **PLAIN))
     assert with_value(scene, Key("material.youngs_modulus"), "70 GPa").material.youngs_modulus == pytest.approx(70e3)
