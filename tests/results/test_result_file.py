@@ -332,7 +332,7 @@ def test_a_damaged_list_of_contents_is_named() -> None:
         (replaced("meshes/0/part_elements", data=np.full(3, -5)), "inconsistent content"),
         (replaced("scene", data=np.bytes_(b"title = 3")), "scene inside: title: 3 does not fit"),
         (replaced("scene", data=np.bytes_(b"\xff\xfe")), "scene is not UTF-8"),
-        (replaced("scene", data=np.bytes_(b"x" * 1_000_001)), "scene is not a text of at most"),
+        (replaced("plan", data=np.bytes_(b"x" * 1_000_001)), "plan is not a text of at most"),
         (replaced("scene", data="text of variable length"), "scene holds .*object"),
         # bombs: huge but compressed, huge but never stored
         (replaced("points", shape=(10**9,), dtype="f8", compression="gzip"), "points is not stored plainly"),
