@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from itertools import zip_longest
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bemkit.arrays import FloatArray
+from bemkit.arrays import FloatArray, IntArray
 from bemkit.errors import InputError
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.spaces import BoundarySpace, element_nodes
@@ -32,7 +33,7 @@ from bemkit.operators.steklov_poincare.nodal_conditions import (
     supported,
 )
 from bemkit.scene.body_scene import BodyScene
-from bemkit.scene.conditions import Clamped, Load, Part, PrescribedDisplacement, Roller
+from bemkit.scene.conditions import Clamped, Force, Load, Part, PrescribedDisplacement, RigidConnection, Roller
 
 if TYPE_CHECKING:
     from bemkit.operators.half_plane.far_drive import FarMotion
@@ -48,10 +49,32 @@ def held_nodes(scene: BodyScene, mesh: BoundaryMesh, units: Units, space: Bounda
         If parts contradict each other at a node; the message names its point in metres.
     """
     try:
-        return supported(space, _supports_on(scene, mesh, units, space))
+        held = supported(space, _supports_on(scene, mesh, units, space))
+        return replace(held, connected=_connected(scene, mesh, space))
     except ConflictingSupportsError as error:
         x, y = units.to_physical(np.array(error.point)).tolist()
         raise ConflictingSupportsError(error.part, (x, y)) from None
+
+
+def _connected(scene: BodyScene, mesh: BoundaryMesh, space: BoundarySpace) -> tuple[IntArray, ...]:
+    """Return the nodes of each rigid connection.
+
+    Raises
+    ------
+    InputError
+        If one shares a node with a part that has another condition than a load.
+    """
+    parts = [(part, np.unique(space.element_dofs[elements])) for part, elements in scene.parts_on(mesh)]
+    connected = [(part.name, nodes) for part, nodes in parts if isinstance(part.condition, RigidConnection)]
+    for name, nodes in connected:
+        for part, others in parts:
+            may_share = isinstance(part.condition, Load) and not isinstance(part.condition, RigidConnection)
+            if part.name != name and not may_share and np.intersect1d(nodes, others).size:
+                raise InputError(
+                    f"part {name!r} is rigid and meets part {part.name!r}: leave a piece of the boundary between them "
+                    "that is free or loaded"
+                )
+    return tuple(nodes for _, nodes in connected)
 
 
 def _supports_on(scene: BodyScene, mesh: BoundaryMesh, units: Units, space: BoundarySpace) -> list[Support]:
@@ -63,7 +86,7 @@ def _supports_on(scene: BodyScene, mesh: BoundaryMesh, units: Units, space: Boun
         if isinstance(condition, Roller):
             normals = mesh.normals_at(elements, element_nodes(space)[elements])
             result.append(Support(part.name, elements, normals[:, :, None, :]))
-        elif isinstance(condition, Clamped):
+        elif isinstance(condition, Clamped | RigidConnection):
             result.append(Support(part.name, elements, axes))
         elif isinstance(condition, PrescribedDisplacement):
             result.append(
@@ -188,7 +211,11 @@ def _driven(scene: BodyScene) -> list[bool]:
 
 def _layout(part: Part) -> tuple[object, ...]:
     condition = part.condition
-    components = condition.is_prescribed if isinstance(condition, PrescribedDisplacement) else ()
+    components: tuple[bool, ...] = ()
+    if isinstance(condition, PrescribedDisplacement):
+        components = condition.is_prescribed
+    elif isinstance(condition, Force):
+        components = (condition.is_rigid,)
     return part.name, part.sides, part.where, type(condition), components
 
 

@@ -171,7 +171,8 @@ class Model:
         """Return the forces (n_nodes, 2) [N/m] of supports on all nodes of each body, in the axes of the scene."""
         reactions = []
         for body, (_, force, _) in zip(self.prepared.bodies, self._beyond_contact(state), strict=True):
-            held = supporting_forces(body.conditions, np.zeros_like(force), force - body.force).reshape(-1, 2)
+            supports = replace(body.conditions, is_fixed=body.conditions.is_supported)
+            held = supporting_forces(supports, np.zeros_like(force), force - body.force).reshape(-1, 2)
             reactions.append(np.asarray(body.turn.turned(held)) * self.prepared.force_unit)
         return reactions
 

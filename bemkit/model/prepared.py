@@ -43,6 +43,7 @@ from bemkit.operators.steklov_poincare.nodal_conditions import (
     free_modes,
     turning,
 )
+from bemkit.operators.steklov_poincare.rigid_connection import RigidlyConnected
 from bemkit.result_warning import ResultWarning
 from bemkit.scene.mesh_options import thinness_warnings
 from bemkit.scene.scene import Scene
@@ -160,6 +161,8 @@ class Prepared:
         """Return the map of a body without forces inside, by its linear solver; nothing is assembled yet."""
         chosen = self.linear_solver(body)
         elastic = driven_by(self._map_of(body, chosen.solver), body.drive)
+        if body.conditions.connected:
+            return RigidlyConnected.of(elastic, body.scene.discretisation.method)
         if chosen.hierarchical is None:
             return elastic
         from bemkit.operators.steklov_poincare.collocation import CollocationElasticity

@@ -21,7 +21,7 @@ from bemkit.geometry.shapes import Shape
 from bemkit.geometry.symmetry import Symmetry
 from bemkit.operators.material import Material
 from bemkit.scene.body_forces import BodyForce
-from bemkit.scene.conditions import Clamped, Contact, Free, Part, PrescribedDisplacement, Roller
+from bemkit.scene.conditions import Clamped, Contact, Free, Part, PrescribedDisplacement, RigidConnection, Roller
 from bemkit.scene.discretisation import Discretisation, Galerkin
 from bemkit.scene.mesh_options import MeshOptions
 from bemkit.scene.plane_motion import FarField
@@ -89,6 +89,12 @@ class BodyScene:
         outline = self.shape.outline()
         if outline.surface is not None or self.far is not None:
             _check_half_plane(outline, self.far, self.discretisation, self.mesh, self.parts)
+        rigid = [part.name for part in self.parts if isinstance(part.condition, RigidConnection)]
+        if rigid and (outline.surface is not None or self.symmetry is not None):
+            where = "a half-plane" if self.symmetry is None else "a symmetric body"
+            raise InputError(
+                f"part {rigid[0]!r} is a rigid connection, which {where} cannot have: give is_rigid = false"
+            )
         if self.units is not None and outline.drawing is not None:
             check_length_of_file(outline.drawing.unit, self.units)
         if self.units is not None:

@@ -140,9 +140,9 @@ class Pressure(Load):
 
 @dataclass(frozen=True)
 class Force:
-    """A resultant force and moment of tractions that are uniform, or grow linearly from the middle of the part.
+    """A resultant force and moment on a part: a load that is uniform or linear, or a rigid connection.
 
-    The traction is ``F / L + M J (x - c) / I`` with the length L of the part, its middle c, the second moment
+    The load is the traction ``F / L + M J (x - c) / I`` with the length L of the part, its middle c, the second moment
     ``I`` of the length about it, and J a quarter turn anticlockwise.
 
     Parameters
@@ -151,6 +151,9 @@ class Force:
         The force on the whole part, per unit of thickness unless the scene has a thickness.
     moment : float [N m/m]
         About the middle of the part, anticlockwise.
+    is_rigid : bool
+        Whether the part moves as a rigid body, as if a stiff piece were glued to it. Tractions follow; only their
+        resultants are given.
 
     Raises
     ------
@@ -161,6 +164,7 @@ class Force:
     x: float = 0.0
     y: float = 0.0
     moment: float = 0.0
+    is_rigid: bool = False
 
     def __post_init__(self) -> None:
         for name in ("x", "y", "moment"):
@@ -169,13 +173,19 @@ class Force:
                 raise InputError(f"{name} is {value!r}: give a finite number, the resultant on the whole part")
 
     def over(self, area: float, middle: FloatArray, second_moment: float) -> Traction:
-        """Return the tractions on a part of an area [m^2], middle (2,) [m] and second moment of its area [m^4]."""
+        """Return the load on a part of an area [m^2], middle (2,) [m] and second moment of its area [m^4]."""
 
         def component(axis: int, x: FloatArray, y: FloatArray) -> FloatArray:
             turning = self.moment / second_moment * turned_left(np.column_stack([x, y]) - middle)
             return np.asarray((self.x, self.y)[axis] / area + turning[:, axis])
 
-        return Traction(partial(component, 0), partial(component, 1))
+        kind = RigidConnection if self.is_rigid else Traction
+        return kind(partial(component, 0), partial(component, 1))
+
+
+@dataclass(frozen=True)
+class RigidConnection(Traction):
+    """The part moves as a rigid body, with the resultants of a traction: a placed `Force`."""
 
 
 @dataclass(frozen=True)
@@ -219,7 +229,8 @@ def with_fields(
         case Pressure(pressure, shear):
             return Pressure(load(pressure), load(shear))
         case Force(x, y, moment):
-            return Force(*(cast(float, load(value)) for value in (x, y, moment)))
+            x, y, moment = (cast(float, load(value)) for value in (x, y, moment))
+            return Force(x, y, moment, condition.is_rigid)
         case PrescribedDisplacement(x, y):
             return PrescribedDisplacement(*(None if value is None else motion(value) for value in (x, y)))
     return condition

@@ -98,6 +98,9 @@ class NodalConditions:
         drive it there; none unless it is a half-plane.
     later : tuple of GivenData
         What load steps after this one give.
+    connected : tuple of int arrays
+        Nodes of each rigid connection: all fixed, but to a rigid body whose three motions are unknown, and on which the
+        given forces at these nodes act; see `RigidlyConnected`.
     """
 
     frame: FloatArray
@@ -106,6 +109,15 @@ class NodalConditions:
     is_retained: BoolArray
     driven: tuple[int, ...] = ()
     later: tuple[GivenData, ...] = ()
+    connected: tuple[IntArray, ...] = ()
+
+    @property
+    def is_supported(self) -> BoolArray:
+        """Directions that supports hold, (n_nodes, 2): those that are fixed but for connections."""
+        supported = self.is_fixed.copy()
+        for nodes in self.connected:
+            supported[nodes] = False
+        return supported
 
     @property
     def is_free(self) -> BoolArray:
@@ -323,7 +335,7 @@ def free_modes(space: BoundarySpace, conditions: NodalConditions) -> FloatArray:
     centre = 0.5 * (points.min(axis=0) + points.max(axis=0))
     motions = rigid_motions(points, centre, float(np.ptp(points, axis=0).max()))
     motions = motions[:, :, [*admissible_modes(space.mesh), *conditions.driven]]
-    fixed = np.einsum("nkc,ncm->nkm", conditions.frame, motions)[conditions.is_fixed]
+    fixed = np.einsum("nkc,ncm->nkm", conditions.frame, motions)[conditions.is_supported]
     if fixed.size:
         _, sizes, directions = np.linalg.svd(np.linalg.qr(fixed, mode="r"), full_matrices=True)
         n_held = int(np.count_nonzero(sizes >= FREE_MOTION_TOLERANCE * np.sqrt(len(fixed))))

@@ -10,7 +10,8 @@ import numpy as np
 
 from bemkit.arrays import FloatArray, IntArray
 from bemkit.geometry.spaces import element_nodes
-from bemkit.scene.conditions import Clamped, Contact, Load, PrescribedDisplacement, Roller
+from bemkit.operators.rigid_modes import rigid_motions
+from bemkit.scene.conditions import Clamped, Contact, Load, PrescribedDisplacement, RigidConnection, Roller
 from bemkit.testing.independent_check.views import BodyView
 
 CONTACT_LIMIT = 1e-6
@@ -134,7 +135,7 @@ def _tractions(solution: BodyView, points: FloatArray, normals: FloatArray) -> F
     traction = np.zeros_like(points)
     for part in solution.scene.parts:
         elements = solution.mesh.part(part.name)
-        if isinstance(part.condition, Load):
+        if isinstance(part.condition, Load) and not isinstance(part.condition, RigidConnection):
             load = part.condition.at(points[elements].reshape(-1, 2), normals[elements].reshape(-1, 2))
             traction[elements] = load.reshape(traction[elements].shape)
         elif not isinstance(part.condition, Contact):
@@ -153,6 +154,8 @@ def _held(solution: BodyView, node_points: FloatArray, node_normals: FloatArray)
             case PrescribedDisplacement(is_prescribed=is_prescribed) as condition:
                 given = condition.at(points.reshape(-1, 2)).reshape(points.shape)
                 components = np.flatnonzero(is_prescribed).tolist()
+            case RigidConnection():
+                given, components = _rigidly_moved(solution, elements, points), [0, 1]
             case Roller():
                 yield Support(elements, node_normals[elements], np.zeros(points.shape[:2]))
                 continue
@@ -160,6 +163,15 @@ def _held(solution: BodyView, node_points: FloatArray, node_normals: FloatArray)
                 continue
         for component in components:
             yield Support(elements, np.broadcast_to(np.eye(2)[component], points.shape), given[:, :, component])
+
+
+def _rigidly_moved(solution: BodyView, elements: IntArray, points: FloatArray) -> FloatArray:
+    """Return the rigid motion (n_elements, n_local, 2) nearest to the displacements of some elements."""
+    space = solution.scene.discretisation.displacement_space(solution.mesh)
+    displacement = solution.boundary.displacement[space.element_dofs[elements]]
+    motions = rigid_motions(points.reshape(-1, 2), points.mean(axis=(0, 1)), solution.mesh.diameter).reshape(-1, 3)
+    amounts = np.linalg.lstsq(motions, displacement.ravel(), rcond=None)[0]
+    return np.asarray((motions @ amounts).reshape(points.shape))
 
 
 class Scales(NamedTuple):

@@ -1,0 +1,197 @@
+"""Parts of a boundary that move as rigid bodies under given resultants, eliminated from a condensed map."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from bemkit.arrays import FloatArray, IntArray
+from bemkit.errors import InputError
+from bemkit.geometry.spaces import BoundarySpace, dof_points
+from bemkit.operators.counts import OperationCounts
+from bemkit.operators.material import Material
+from bemkit.operators.pair_form import Tag
+from bemkit.operators.rigid_modes import rigid_motions
+from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions
+from bemkit.operators.steklov_poincare.protocol import BoundaryMap, CondensedMap, SteklovPoincare
+
+if TYPE_CHECKING:
+    from bemkit.operators.steklov_poincare.needs import BodyCase, BodyNeeds
+
+
+@dataclass(frozen=True, eq=False)
+class RigidlyConnected(BoundaryMap):
+    """An elastic map with rigid connections; fulfils `SteklovPoincare`.
+
+    The nodes of each connection are fixed for the map inside. Their three motions q are unknown, and the resultants of
+    the forces that the connection exerts are those of the given nodal forces there, however these are distributed.
+
+    Parameters
+    ----------
+    elastic : SteklovPoincare
+        A symmetric map.
+    """
+
+    elastic: SteklovPoincare
+
+    @classmethod
+    def of(cls, elastic: SteklovPoincare, method: str) -> RigidlyConnected:
+        """Return a map with rigid connections; `method` names its discretisation.
+
+        Raises
+        ------
+        InputError
+            If it is not symmetric.
+        """
+        if Tag.SYMMETRIC not in elastic.tags:
+            raise InputError(
+                f"a part is a rigid connection, but the map of discretisation {method} is not symmetric: choose "
+                "'linear', 'quadratic' or a degree"
+            )
+        return cls(elastic)
+
+    @property
+    def tags(self) -> frozenset[Tag]:
+        """Promises of the map inside."""
+        return self.elastic.tags
+
+    def needs(self, case: BodyCase) -> BodyNeeds:
+        """Return what the map inside takes, and the responses to the motions of connections."""
+        needs = self.elastic.needs(case)
+        responses = OperationCounts(right_hand_sides=3 * len(case.conditions.connected))
+        return replace(needs, work=needs.work + responses)
+
+    @property
+    def material(self) -> Material:
+        """The material of the body."""
+        return self.elastic.material
+
+    @property
+    def displacement_space(self) -> BoundarySpace:
+        """The space of the displacements."""
+        return self.elastic.displacement_space
+
+    @property
+    def traction_space(self) -> BoundarySpace:
+        """The space of the tractions."""
+        return self.elastic.traction_space
+
+    def condense(self, conditions: NodalConditions, force: FloatArray) -> CondensedMap:
+        """Condense the map and eliminate the motions of its connections; see `SteklovPoincare.condense`."""
+        fixed = self.elastic.condense(conditions, force)
+        connections = _Connections.of(fixed, conditions, dof_points(self.displacement_space))
+        return connections.under(fixed, force, fixed.work + connections.work)
+
+    def element_tractions(self, displacement: FloatArray, force: FloatArray) -> FloatArray:
+        """Return the tractions (n_elements, n_local, 2) [Pa]; see `SteklovPoincare.element_tractions`."""
+        return self.elastic.element_tractions(displacement, force)
+
+
+@dataclass(frozen=True, eq=False)
+class _Connections:
+    """The rigid connections of a condensed body, with the response to their k motions.
+
+    Parameters
+    ----------
+    motions : (n_nodes, 2, k) array
+        Displacements of the nodes in x and y by unit motions; zero on other nodes.
+    displacement, force : (n_nodes, 2, k) arrays
+        Of all nodes under unit motions, with retained directions at rest.
+    moved : tuple of k CondensedMap
+        The body under each unit motion and nothing else.
+    coupling : (n_retained, k) array
+        What unit motions press onto the retained directions.
+    influence : (k, k) array
+        Resultants of the connections under unit motions.
+    stiffness : (n_retained, n_retained) array
+        With the motions eliminated: K - L A^-1 L^T for the coupling L and the influence A.
+    """
+
+    motions: FloatArray
+    displacement: FloatArray
+    force: FloatArray
+    moved: tuple[CondensedMap, ...]
+    coupling: FloatArray
+    influence: FloatArray
+    stiffness: FloatArray
+
+    @classmethod
+    def of(cls, fixed: CondensedMap, conditions: NodalConditions, points: FloatArray) -> _Connections:
+        """Return the connections of a body whose nodes in them are fixed."""
+        motions = np.concatenate([_motions(nodes, points) for nodes in conditions.connected], axis=2)
+        nothing, rest = np.zeros_like(points), np.zeros(len(fixed.load))
+        moved = tuple(fixed.under(nothing, conditions.in_frames(motion)) for motion in np.moveaxis(motions, 2, 0))
+        fields = [each.recover(rest) for each in moved]
+        displacement, force = (np.stack([pair[k] for pair in fields], axis=2) for k in (0, 1))
+        coupling = np.stack([each.load for each in moved], axis=1)
+        influence = np.einsum("ncj,nck->jk", motions, force)
+        influence = 0.5 * (influence + influence.T)
+        stiffness = fixed.stiffness - coupling @ np.linalg.solve(influence, coupling.T)
+        return cls(motions, displacement, force, moved, coupling, influence, 0.5 * (stiffness + stiffness.T))
+
+    @property
+    def work(self) -> OperationCounts:
+        """Operation counts of the responses."""
+        return sum((each.work for each in self.moved), OperationCounts())
+
+    def under(self, fixed: CondensedMap, force: FloatArray, work: OperationCounts) -> CondensedMap:
+        """Return the body under the load of a map with fixed connections and given nodal forces (n_nodes, 2)."""
+        _, reaction = fixed.recover(np.zeros(len(fixed.load)))
+        at_rest = np.linalg.solve(self.influence, np.einsum("nck,nc->k", self.motions, force - reaction))
+        return _ConnectedMap(
+            stiffness=self.stiffness,
+            load=fixed.load + self.coupling @ at_rest,
+            sensitivity=fixed.sensitivity,
+            work=work,
+            volume_force=fixed.volume_force,
+            inner_force=fixed.inner_force,
+            fixed=fixed,
+            connections=self,
+            at_rest=at_rest,
+        )
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class _ConnectedMap(CondensedMap):
+    """A body with rigid connections under one load.
+
+    Parameters
+    ----------
+    fixed : CondensedMap
+        With the connections fixed.
+    connections : _Connections
+    at_rest : (k,) array
+        Motions with the retained directions at rest.
+    """
+
+    fixed: CondensedMap
+    connections: _Connections
+    at_rest: FloatArray
+
+    def recover(self, retained_displacement: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return displacement and force of all nodes."""
+        connections = self.connections
+        motion = self.at_rest + np.linalg.solve(connections.influence, connections.coupling.T @ retained_displacement)
+        displacement, force = self.fixed.recover(retained_displacement)
+        return displacement + connections.displacement @ motion, force + connections.force @ motion
+
+    def under(self, force: FloatArray, displacement: FloatArray) -> CondensedMap:
+        """Return the map under other loads."""
+        fixed = self.fixed.under(force, displacement)
+        return self.connections.under(fixed, force, fixed.work)
+
+    def follow(self, directions: IntArray) -> tuple[FloatArray, FloatArray]:
+        """Return what free directions do."""
+        connections, (response, at_rest) = self.connections, self.fixed.follow(directions)
+        by_motions = np.stack([each.follow(directions)[1] for each in connections.moved], axis=1)
+        by_retained = np.linalg.solve(connections.influence, connections.coupling.T)
+        return response + by_motions @ by_retained, at_rest + by_motions @ self.at_rest
+
+
+def _motions(nodes: IntArray, points: FloatArray) -> FloatArray:
+    """Return the displacements (n_nodes, 2, 3) of some nodes by their rigid motions; zero elsewhere."""
+    own, motions = points[nodes], np.zeros((*points.shape, 3))
+    motions[nodes] = rigid_motions(own, own.mean(axis=0), float(np.ptp(own, axis=0).max()))
+    return motions
