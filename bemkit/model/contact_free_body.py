@@ -61,8 +61,8 @@ class ContactFreeBody(LinearBody):
         """Return displacement (n_nodes, 2) and total force (n_nodes, 2) of all boundary nodes, in x and y."""
         return self.condensed.recover(np.zeros(0))
 
-    def under(self, displacement: FloatArray, force: FloatArray, inside: ForcesInside | None = None) -> ContactFreeBody:
-        """Return the same body under other displacements and forces; see `DirectBody.under`."""
+    def under(self, force: FloatArray, displacement: FloatArray, inside: ForcesInside | None = None) -> ContactFreeBody:
+        """Return the same body under other forces and displacements; see `DirectBody.under`."""
         conditions = replace(self.conditions, displacement=displacement)
         condensed = condensed_under(self.condensed, conditions, force, inside)
         condensed = replace(condensed, work=self.condensed.work + condensed.work)

@@ -101,7 +101,7 @@ class Model:
     def _single_under(self, prepared: Prepared, elastic: SteklovPoincare) -> SingleBody:
         before, body = self.prepared, prepared.only
         if body.drive == before.only.drive and before.is_coupled_like(prepared):
-            return self._single_body.under(body.conditions.displacement, body.force, body.inside)
+            return self._single_body.under(body.force, body.conditions.displacement, body.inside)
         return single_body(prepared, elastic)
 
     @property
@@ -139,7 +139,7 @@ class Model:
         force = blended(one.force, two.force, share)
         inside = two.inside if one.inside is None or two.inside is None else one.inside.blended(two.inside, share)
         if one.drive == two.drive:
-            return self._single_body.under(displacement, force, inside)
+            return self._single_body.under(force, displacement, inside)
         from bemkit.operators.half_plane.far_drive import FarMotion
 
         drive = (one.drive or FarMotion()).blended(two.drive or FarMotion(), share)

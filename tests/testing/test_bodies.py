@@ -36,7 +36,7 @@ def test_bodies_of_scenes(name, discretisation):
     scene = replace(SCENES[name](), discretisation=discretisation)
     model = build_model(prepare(scene, scene.build_mesh()))
     nodes, (elastic,) = model.body.conditions.displacement, model.elastic
-    reloaded = model.body.under(0.5 * nodes, np.ones((elastic.displacement_space.n_dofs // 2, 2)))
+    reloaded = model.body.under(np.ones((elastic.displacement_space.n_dofs // 2, 2)), 0.5 * nodes)
     check_body(model.body, is_symmetric=isinstance(discretisation, bk.Galerkin), reloaded=reloaded)
 
 

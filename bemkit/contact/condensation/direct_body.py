@@ -95,15 +95,15 @@ class WholeBody:
             size += float(np.abs(condensed.volume_force[:2]).sum()) + condensed.inner_force
         return with_work(condensed.load, self.motions, work, size)
 
-    def under(self, displacement: FloatArray, force: FloatArray, inside: ForcesInside | None = None) -> WholeBody:
+    def under(self, force: FloatArray, displacement: FloatArray, inside: ForcesInside | None = None) -> WholeBody:
         """Return the same body under another load, without another factorisation.
 
         Parameters
         ----------
-        displacement : (n_nodes, 2) array [m]
-            Prescribed displacements in the frames of the nodes, as in `NodalConditions`.
         force : (n_nodes, 2) array [N/m]
             Given nodal forces.
+        displacement : (n_nodes, 2) array [m]
+            Prescribed displacements in the frames of the nodes, as in `NodalConditions`.
         inside : ForcesInside, optional
             Body forces, if they change.
         """
@@ -219,9 +219,9 @@ class DirectBody(DenseBody):
         """Operation counts from the operators on."""
         return self.whole.condensed.work + OperationCounts(contact_unknowns=self.n_unknowns)
 
-    def under(self, displacement: FloatArray, force: FloatArray, inside: ForcesInside | None = None) -> DirectBody:
+    def under(self, force: FloatArray, displacement: FloatArray, inside: ForcesInside | None = None) -> DirectBody:
         """Return the same body under another load, without another factorisation; see `WholeBody.under`."""
-        whole = self.whole.under(displacement, force, inside)
+        whole = self.whole.under(force, displacement, inside)
         offset = _prescribed(whole.conditions, self.nodes)
         return replace(
             self,

@@ -194,9 +194,9 @@ class HierarchicalBody(LinearBody):
         return load
 
     def under(
-        self, displacement: FloatArray, force: FloatArray, inside: ForcesInside | None = None
+        self, force: FloatArray, displacement: FloatArray, inside: ForcesInside | None = None
     ) -> HierarchicalBody:
-        """Return the same body under other displacements, in the frames of the elements, and forces in x and y.
+        """Return the same body under other forces in x and y, and displacements in the frames of the elements.
 
         What acts inside the body stays as it is unless `inside` says otherwise.
         """

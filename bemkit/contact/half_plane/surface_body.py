@@ -80,8 +80,8 @@ class SurfaceBody(LinearBody):
         """Integrals of the surface, and the order of the contact system."""
         return self.elastic.work + OperationCounts(contact_unknowns=2 * self.n_contact)
 
-    def under(self, displacement: FloatArray, force: FloatArray, inside: ForcesInside | None = None) -> SurfaceBody:
-        """Return the same body under other displacements of supports, in their frames, and nodal forces in x and y."""
+    def under(self, force: FloatArray, displacement: FloatArray, inside: ForcesInside | None = None) -> SurfaceBody:
+        """Return the same body under other nodal forces in x and y, and displacements of supports in their frames."""
         return replace(self, force=force, conditions=replace(self.conditions, displacement=displacement))
 
     @cached_property
