@@ -10,7 +10,7 @@ from markers import between
 
 import bemkit as bk
 from bemkit.scene.toml import with_overrides
-from bemkit.studies.stability.axes import AXES
+from bemkit.studies.stability.axes import axes_of
 from bemkit.studies.stability.records import StabilityRecord, Verdict
 from bemkit.studies.stability.sweep import sweep
 from bemkit.table import Table, columns_of, markdown_table
@@ -26,7 +26,7 @@ def main() -> None:
     records: dict[tuple[str, str], list[StabilityRecord]] = {}
     for name, discretisation in RUNS:
         scene = with_overrides(bk.load_scene(name), discretisation=discretisation)
-        records[name, discretisation] = list(sweep(scene, AXES))
+        records[name, discretisation] = list(sweep(scene, axes_of(scene)))
         write_rows(DOCS / "tables" / f"stability-{name}-{discretisation}.csv", records[name, discretisation])
     text = between(PAGE.read_text("utf-8"), "summary", summary(records))
     PAGE.write_text(between(text, "axes", table_of_axes(records["paper-1", "linear"])), "utf-8")
@@ -53,7 +53,7 @@ def summary(records: dict[tuple[str, str], list[StabilityRecord]]) -> str:
 def table_of_axes(records: Sequence[StabilityRecord]) -> str:
     """Return what each axis varies, from where to where, its promise and its verdicts."""
     lines = []
-    for axis in AXES:
+    for axis in axes_of(bk.load_scene("paper-1")):
         rows = [record for record in records if record.axis == axis.name]
         values = sorted(row.value for row in rows)
         counts = Counter(row.verdict for row in rows)

@@ -45,16 +45,15 @@ def stability(
     with StudyProgress(quiet) as progress:
         from bemkit.cli.printed_stability import print_axis, print_left_out, print_verdicts
         from bemkit.scene.toml import load_scene, scene_to_toml, with_overrides
-        from bemkit.studies.stability.axes import AXES, find_axes
-        from bemkit.studies.stability.axes_of_bodies import AXES_OF_BODIES
+        from bemkit.studies.stability.axes import axes_of, find_axes
         from bemkit.studies.stability.figures import draw_axes, figure_name
         from bemkit.studies.stability.records import FILE, table_of, to_csv, to_markdown
         from bemkit.studies.stability.sweep import sweep
 
         chosen = with_overrides(load_scene(scene or "paper-1"), elements=elements, discretisation=discretisation)
-        every = find_axes(axis, AXES_OF_BODIES if chosen.bodies else AXES)
+        every = find_axes(axis)
         # an axis that is asked for by its name is refused by the sweep
-        axes = every if axis else tuple(each for each in every if not each.reason_against(chosen))
+        axes = every if axis else axes_of(chosen)
         rows, table = study_output(output, table_of)
         texts = (
             table,

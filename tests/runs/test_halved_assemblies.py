@@ -15,7 +15,6 @@ from bemkit.results.result_file import read_result, write_result
 from bemkit.results.solution import Solution
 from bemkit.scene.symmetry import AsymmetricSceneError
 from bemkit.studies.stability.axes import find_axes
-from bemkit.studies.stability.axes_of_bodies import AXES_OF_BODIES
 from bemkit.studies.stability.records import Verdict
 from bemkit.studies.stability.sweep import sweep
 from bemkit.testing.independent_check import violations_of_bodies
@@ -102,10 +101,10 @@ def test_half_of_the_bodies_answer_as_the_whole_ones() -> None:
 @pytest.mark.slow
 def test_similar_halves_answer_alike_where_all_sticks() -> None:
     """Relative displacements are round-off, and differ: those of the bodies are what differences are measured by."""
-    (row,) = sweep(blocks(), [replace(find_axes(["size"], AXES_OF_BODIES)[0], values=(1e-3,))])
+    (row,) = sweep(blocks(), [replace(find_axes(["size"])[0], values=(1e-3,))])
     assert Verdict(row.verdict) is Verdict.RIGHT, row
     for name in ("turn", "position"):
-        (axis,) = find_axes([name], AXES_OF_BODIES)
+        (axis,) = find_axes([name])
         assert "has a symmetry, so its bodies cannot be moved" in axis.reason_against(blocks())
 
 

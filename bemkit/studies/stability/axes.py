@@ -23,6 +23,7 @@ from bemkit.geometry.spaces import ConstantSpace
 from bemkit.operators.boundary import single_layer
 from bemkit.operators.material import Material
 from bemkit.results.solution import Solution
+from bemkit.scene.body import Body
 from bemkit.scene.conditions import Contact, Part, Pressure, Traction
 from bemkit.scene.load_history import with_changed_steps
 from bemkit.scene.mesh_options import MeshOptions
@@ -70,19 +71,24 @@ class Axis:
         return min(self.values) >= 0.0 and max(size) / min(size) > 100.0
 
 
-def find_axes(names: Sequence[str], axes: Sequence[Axis]) -> tuple[Axis, ...]:
-    """Return those of some axes that have the given names; all if there are no names.
+def find_axes(names: Sequence[str]) -> tuple[Axis, ...]:
+    """Return the axes that have the given names; all if there are no names.
 
     Raises
     ------
     UnknownAxisError
         The message lists the names.
     """
-    known = {axis.name: axis for axis in axes}
+    known = {axis.name: axis for axis in AXES}
     for name in names:
         if name not in known:
             raise UnknownAxisError(f"axis is {name!r}: the axes are {', '.join(known)}")
-    return tuple(known[name] for name in names) if names else tuple(axes)
+    return tuple(known[name] for name in names) if names else AXES
+
+
+def axes_of(scene: Scene) -> tuple[Axis, ...]:
+    """Return the axes that apply to a scene."""
+    return tuple(axis for axis in AXES if not axis.reason_against(scene))
 
 
 class UnknownAxisError(InputError):
@@ -112,28 +118,39 @@ def _similar_case(
     return Case(value, scene, similarity, precision=precision, deviation_limit=precision, keeps_steps=keeps_steps)
 
 
-def similar(kind: type[Similarity | BodiesSimilarity], factor: str) -> Callable[[Solution, float], Case]:
+def _similar(factor: str) -> Callable[[Solution, float], Case]:
     """Return what makes a case in which one factor is the value."""
 
     def make(baseline: Solution, value: float) -> Case:
         number: dict[str, Any] = {factor: value}
-        return _similar_case(baseline, value, kind(**number))
+        return _similar_case(baseline, value, _kind_of(baseline)(**number))
 
     return make
 
 
-def moved(kind: type[Similarity | BodiesSimilarity]) -> Callable[[Solution, float], Case]:
-    """Return what makes a case as far from the origin as the value says, in diameters."""
-
-    def make(baseline: Solution, value: float) -> Case:
-        distance = value * max(body.mesh.diameter for body in baseline.bodies.values())
-        similarity = kind(shift=(0.8 * distance, -0.6 * distance))
-        return _similar_case(baseline, value, similarity, precision_elsewhere(baseline, distance))
-
-    return make
+def _kind_of(baseline: Solution) -> type[Similarity | BodiesSimilarity]:
+    return BodiesSimilarity if baseline.scene.bodies else Similarity
 
 
-def friction(baseline: Solution, value: float) -> Case:
+def _moved(baseline: Solution, value: float) -> Case:
+    """Return the case as far from the origin as the value says, in diameters."""
+    distance = value * max(body.mesh.diameter for body in baseline.bodies.values())
+    similarity = _kind_of(baseline)(shift=(0.8 * distance, -0.6 * distance))
+    return _similar_case(baseline, value, similarity, precision_elsewhere(baseline, distance))
+
+
+def _stiffened(baseline: Solution, value: float) -> Case:
+    def stiffened(scene: Scene) -> Scene:
+        first, *others = scene.bodies
+        material = replace(first.material, youngs_modulus=value * first.material.youngs_modulus)
+        return replace(scene, bodies=(replace(first, material=material), *others))
+
+    # displacements of the soft bodies hold eps of themselves, forces of stiff pairs as much times the ratio
+    precision = PRECISION * max(1.0, value, 1.0 / value) ** 0.5
+    return Case(value, changed(baseline, stiffened), precision=precision)
+
+
+def _friction(baseline: Solution, value: float) -> Case:
     """Return the case in which all contacts have one friction coefficient."""
     return Case(value, changed(baseline, partial(with_friction, coefficient=value)))
 
@@ -211,8 +228,23 @@ def _penalised(solver: Callable[[float], ContactSolver]) -> Callable[[Solution, 
 
 
 def _elements(baseline: Solution, value: float) -> Case:
-    options = replace(baseline.scene.mesh, elements=max(3, round(value * baseline.mesh.whole.n_elements)))
-    return Case(value, replace(baseline.scene, mesh=options))
+    """Return the case with the value times as many elements of each body."""
+    common = baseline.scene.mesh
+
+    def options(stated: MeshOptions | None, body: str) -> MeshOptions:
+        n_elements = max(3, round(value * baseline.bodies[body].mesh.whole.n_elements))
+        return MeshOptions(n_elements, (stated or common).grading, (stated or common).density)
+
+    def divided(body: Body) -> Body:
+        return replace(body, mesh=options(body.mesh, next(iter(body.copied())).name))
+
+    def of_step(scene: Scene) -> Scene:
+        if not scene.bodies:
+            return replace(scene, mesh=options(None, ""))
+        mesh = replace(common, accuracy=None)
+        return replace(scene, mesh=mesh, bodies=tuple(divided(body) for body in scene.bodies))
+
+    return Case(value, changed(baseline, of_step))
 
 
 def _graded(baseline: Solution, value: float) -> Case:
@@ -263,52 +295,80 @@ def _of_half_planes(reason: str, *, only_periodic: bool = False) -> Callable[[Sc
     return given
 
 
-def read_axes(
-    group: str,
-    makes: Mapping[str, Callable[[Any, float], Case]],
-    reasons: Mapping[str, Callable[[Any], str]],
+def _of_one_body(reason: Callable[[Scene], str] = lambda scene: "") -> Callable[[Scene], str]:
+    """Return what gives a reason against several bodies, and another one against single bodies."""
+    return lambda scene: "it is about one body" if scene.bodies else reason(scene)
+
+
+def _of_bodies(similarity: BodiesSimilarity, *, is_of_one: bool = False) -> Callable[[Scene], str]:
+    """Return what gives a reason against a scene of bodies without a similar one, and against single bodies."""
+
+    def reason(scene: Scene) -> str:
+        if not scene.bodies:
+            return "" if is_of_one else "it is about several bodies"
+        try:
+            similarity.apply(scene)
+        except InputError as error:
+            return str(error)
+        return ""
+
+    return reason
+
+
+def _read_axes(
+    kinds: Mapping[str, tuple[Callable[[Any, float], Case], Callable[[Any], str]]],
 ) -> tuple[Axis, ...]:
-    """Return the axes of a group in ``axes.toml``, with what makes their cases and the reasons to skip them."""
+    """Return the axes in ``axes.toml``, with what makes their cases and the reasons to skip them."""
     text = (resources.files("bemkit") / "studies" / "stability" / "axes.toml").read_text("utf-8")
     return tuple(
         Axis(
-            name=name,
-            label=table["label"],
-            promise=table["promise"],
-            values=tuple(table["values"]),
-            make=makes[name],
-            reference=table.get("reference"),
-            reason_against=reasons.get(name, lambda scene: ""),
+            name,
+            table["label"],
+            table["promise"],
+            tuple(table["values"]),
+            kinds[name][0],
+            table.get("reference"),
+            kinds[name][1],
         )
-        for name, table in tomllib.loads(text)[group].items()
+        for name, table in tomllib.loads(text).items()
     )
 
 
-AXES: tuple[Axis, ...] = read_axes(
-    "one-body",
+def _always(scene: Scene) -> str:
+    return ""
+
+
+AXES: tuple[Axis, ...] = _read_axes(
     {
-        "youngs-modulus": similar(Similarity, "modulus"),
-        "load": similar(Similarity, "stress"),
-        "size": similar(Similarity, "length"),
-        "position": moved(Similarity),
-        "degenerate-size": _degenerate,
-        "poisson-ratio": _poisson,
-        "friction": friction,
-        "gap": _gap,
-        "load-direction": _turned,
-        "sliding": _pushed,
-        "aspect-ratio": _stretched,
-        "rho-newton": _penalised(lambda rho: SemismoothNewton(rho=rho)),
-        "rho-augmented": _penalised(lambda rho: AugmentedLagrangian(rho_n=rho, rho_t=rho)),
-        "elements": _elements,
-        "grading": _graded,
-    },
-    {
-        "degenerate-size": _of_half_planes(
-            "the flexibility of a half-plane, measured by its strip, is singular at no size"
+        "youngs-modulus": (_similar("modulus"), _of_one_body()),
+        "load": (_similar("stress"), _of_one_body()),
+        "size": (_similar("length"), _always),
+        "position": (_moved, _of_bodies(BodiesSimilarity(shift=(1.0, 0.0)), is_of_one=True)),
+        "degenerate-size": (
+            _degenerate,
+            _of_one_body(
+                _of_half_planes("the flexibility of a half-plane, measured by its strip, is singular at no size")
+            ),
         ),
-        "aspect-ratio": _of_half_planes("a half-plane has no thickness to compare its length with"),
-        "grading": _of_half_planes("the elements of a periodic half-plane are equal", only_periodic=True),
-    },
+        "poisson-ratio": (_poisson, _of_one_body()),
+        "friction": (_friction, _always),
+        "gap": (_gap, _of_one_body()),
+        "load-direction": (_turned, _of_one_body()),
+        "sliding": (_pushed, _of_one_body()),
+        "aspect-ratio": (
+            _stretched,
+            _of_one_body(_of_half_planes("a half-plane has no thickness to compare its length with")),
+        ),
+        "rho-newton": (_penalised(lambda rho: SemismoothNewton(rho=rho)), _of_one_body()),
+        "rho-augmented": (_penalised(lambda rho: AugmentedLagrangian(rho_n=rho, rho_t=rho)), _of_one_body()),
+        "elements": (_elements, _always),
+        "grading": (
+            _graded,
+            _of_one_body(_of_half_planes("the elements of a periodic half-plane are equal", only_periodic=True)),
+        ),
+        "stress": (_similar("stress"), _of_bodies(BodiesSimilarity())),
+        "turn": (_similar("turn"), _of_bodies(BodiesSimilarity(turn=30.0))),
+        "stiffness": (_stiffened, _of_bodies(BodiesSimilarity())),
+    }
 )
-"""Every axis, in the order of the report."""
+"""Every axis, in the order of the report; those that are not about a scene give a reason against it."""

@@ -13,10 +13,9 @@ from bemkit.runs.run import run
 from bemkit.scene.load_history import load_steps
 from bemkit.scene.scene import Scene
 from bemkit.scene.toml import load_scene, with_overrides
-from bemkit.studies.stability.axes import UnknownAxisError, find_axes
-from bemkit.studies.stability.axes_of_bodies import AXES_OF_BODIES
+from bemkit.studies.stability.axes import axes_of, find_axes
 from bemkit.studies.stability.records import Verdict
-from bemkit.studies.stability.sweep import TWIN_OF_BODIES, difference, sweep
+from bemkit.studies.stability.sweep import TWIN_OF_BODIES, StabilityError, difference, sweep
 from tests.slow import slow_except
 
 EXTREMES = {
@@ -38,15 +37,17 @@ def pin():
     return scene
 
 
-def test_every_axis_is_tested_here():
-    assert {axis.name for axis in AXES_OF_BODIES} == set(EXTREMES)
-    with pytest.raises(UnknownAxisError, match="'gap': the axes are stress, size, turn"):
-        find_axes(["gap"], AXES_OF_BODIES)
+def test_every_axis_is_tested_here(pin):
+    assert {axis.name for axis in axes_of(pin)} == set(EXTREMES)
+    with pytest.raises(StabilityError, match="axis 'gap' does not apply to this scene: it is about one body; remove"):
+        list(sweep(pin, find_axes(["gap"])))
+    with pytest.raises(StabilityError, match="axis 'turn' does not apply to this scene: it is about several bodies"):
+        list(sweep(load_scene("paper-1"), find_axes(["turn"])))
 
 
 @pytest.mark.parametrize("name", slow_except(EXTREMES, "turn", "elements"))
 def test_the_ends_of_every_axis_are_right_or_named(pin, name):
-    (axis,) = find_axes([name], AXES_OF_BODIES)
+    (axis,) = find_axes([name])
     for row in sweep(pin, [dataclasses.replace(axis, values=EXTREMES[name])]):
         verdict = Verdict(row.verdict)
         assert verdict in (Verdict.RIGHT, Verdict.NAMED), row
@@ -60,7 +61,7 @@ def test_parts_chosen_by_a_region_follow_the_body(name):
     cylinders = with_overrides(load_scene("two-cylinders"), elements=40)
     assert isinstance(cylinders, Scene)
     assert any(part.where for body in cylinders.bodies for part in body.parts)
-    (axis,) = find_axes([name], AXES_OF_BODIES)
+    (axis,) = find_axes([name])
     (row,) = sweep(cylinders, [dataclasses.replace(axis, values=EXTREMES[name][-1:])])
     assert Verdict(row.verdict) is Verdict.RIGHT
     assert row.deviation < 1e-10
@@ -68,7 +69,7 @@ def test_parts_chosen_by_a_region_follow_the_body(name):
 
 def test_curved_bodies_far_away_are_what_they_are_at_home():
     cylinders = with_overrides(load_scene("two-cylinders"), elements=40)
-    (axis,) = find_axes(["position"], AXES_OF_BODIES)
+    (axis,) = find_axes(["position"])
     rows = list(sweep(cylinders, [dataclasses.replace(axis, values=(1e6, 1e8))]))
     assert [row.verdict for row in rows] == ["right", "named"]
     assert "body 'upper' lies" in rows[-1].message
@@ -112,7 +113,7 @@ def sheared():
 
 @pytest.mark.parametrize("name", slow_except(("stress", "size", "turn", "stiffness", "elements"), "turn"))
 def test_rigid_bodies_and_load_steps_have_similar_ones(sheared, name):
-    (axis,) = find_axes([name], AXES_OF_BODIES)
+    (axis,) = find_axes([name])
     values = {"stiffness": (2.0,), "elements": (1.5,)}.get(name, EXTREMES[name][-1:])
     (row,) = sweep(sheared, [dataclasses.replace(axis, values=values)])
     assert Verdict(row.verdict) is Verdict.RIGHT, row
@@ -134,7 +135,7 @@ def test_steps_count_in_similar_assemblies(sheared):
 
 def test_what_has_no_similar_assembly_is_refused(sheared):
     (punch,) = sheared.rigid
-    (turn,) = find_axes(["turn"], AXES_OF_BODIES)
+    (turn,) = find_axes(["turn"])
     pressed = load_scene("tilted-punch")
     assert "rigid body 'punch' is driven by a force along only one axis" in turn.reason_against(pressed)
     assert turn.reason_against(sheared) == ""

@@ -10,7 +10,7 @@ import pytest
 from click.testing import CliRunner, Result
 
 from bemkit.cli.main import commands
-from bemkit.studies.stability.axes import AXES, find_axes
+from bemkit.studies.stability.axes import find_axes
 from bemkit.studies.stability.figures import draw_axis
 from bemkit.studies.stability.records import FILE, StabilityRecord, cells, to_csv, to_markdown
 
@@ -93,6 +93,6 @@ def test_tables_leave_out_what_does_not_exist() -> None:
     nan = float("nan")
     row = StabilityRecord("sliding", 2.0, "named", "refused", 0, nan, nan, nan, nan, nan, nan, 0.1, "it slides")
     assert cells(row) == ["2", "named", "refused", "", "", "", "", "", "", ""]
-    axes = find_axes(["sliding"], AXES)
+    axes = find_axes(["sliding"])
     assert "| 2 | named | refused |" in to_markdown(axes, [row])
     assert draw_axis(axes[0], [row]).axes[0].get_title(loc="left") == "sliding"

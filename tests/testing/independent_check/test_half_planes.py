@@ -164,7 +164,8 @@ def test_of_many_elements_some_displacements_are_looked_at_and_all_tractions() -
 
 
 def names_against(scene: bk.Scene) -> list[str]:
-    return [axis.name for axis in AXES if axis.reason_against(scene)]
+    """Return the axes of one body that say nothing of a scene."""
+    return [axis.name for axis in AXES if axis.reason_against(scene) not in ("", "it is about several bodies")]
 
 
 def test_axes_say_where_they_say_nothing() -> None:
@@ -174,7 +175,7 @@ def test_axes_say_where_they_say_nothing() -> None:
     with pytest.raises(
         StabilityError, match=r"axis 'aspect-ratio' does not apply to this scene: .* no thickness .*; remove it"
     ):
-        list(sweep(PUNCH, find_axes(["aspect-ratio"], AXES)))
+        list(sweep(PUNCH, find_axes(["aspect-ratio"])))
 
 
 @pytest.mark.parametrize("name", slow_except(["driven", "rough"], "driven"))
@@ -190,7 +191,7 @@ def test_no_row_is_wrong_along_axes_that_say_something(name: str) -> None:
 
 def test_a_half_plane_is_pushed_to_the_edge_of_sliding() -> None:
     baseline = bk.run(replace(WAVY, mesh=bk.MeshOptions(elements=64)))
-    (axis,) = find_axes(["sliding"], AXES)
+    (axis,) = find_axes(["sliding"])
     for value, verdict in ((0.5, "right"), (0.9999, "right"), (1.01, "named")):
         case = axis.make(baseline, value)
         assert solve_and_judge("sliding", case, None).verdict == verdict
