@@ -1,0 +1,1 @@
+"""Estimated errors of random scenes over their true errors, by degree."""
