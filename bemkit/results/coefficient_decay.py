@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.polynomial import legendre
@@ -21,11 +22,10 @@ from bemkit.geometry.quadrature import gauss_legendre
 from bemkit.geometry.spaces import BoundarySpace, dof_points, local_coefficients
 from bemkit.operators.rigid_modes import without_motion
 
-ENERGY_CALIBRATION = 0.08
-"""Factor between h^2 a^2 / (E' (p + 1) (2 p + 1)), a the first missing coefficient, and the squared error: on the
-shipped scenes with a reference the square root of the sum then lies between 0.5 and 2 times the error."""
 SLOWEST = 0.95
-"""Largest ratio of successive coefficients in the sum of all that are missing."""
+"""Largest ratio of successive coefficients in the sum of those that are missing."""
+_N_MISSING = 64
+"""Coefficients in that sum: at the largest ratio the rest is a thousandth."""
 FASTEST = 0.05
 """Least factor of the error by a further degree."""
 _MORE_POINTS = 2
@@ -90,26 +90,27 @@ def coefficient_errors(
         At the local nodes of the traction space, element by element.
     plane_modulus : float [Pa]
         E'.
+
+    Notes
+    -----
+    On a half-plane <V t, t> is |t|^2 / (E' |k|) at the wave number k, and <W u, u> a quarter of |E' u'|^2 / (E' |k|).
+    With |k| = (2 k + 1) / h for the Legendre polynomial k on an element of length h, a coefficient a has the squared
+    norm h |a|^2 / (2 k + 1) in L2, in the energy norm h^2 |a|^2 / (E' (2 k + 1)^2), a quarter of that if of E' u'.
     """
     mesh, degree = displacement_space.mesh, element_degrees(displacement_space)
     strained = without_motion(mesh, dof_points(displacement_space), displacement)
     slopes = plane_modulus * _slope_coefficients(displacement_space, values_on_elements(displacement_space, strained))
     tractions = np.einsum("lk,elc->ekc", local_coefficients(traction_space), traction)
-    of_slopes, slope_decay, of_tractions, traction_decay = np.empty((4, degree.size))
-    for p in np.unique(degree).tolist():
-        chosen = degree == p
-        for fields, missing, decay in ((slopes, of_slopes, slope_decay), (tractions, of_tractions, traction_decay)):
-            missing[chosen], decay[chosen] = _missing(np.linalg.norm(fields[chosen, :p], axis=2))
-    scale = ENERGY_CALIBRATION / (plane_modulus * (degree + 1) * (2 * degree + 1))
+    of_slopes, of_tractions = (_missing(fields, degree) for fields in (slopes, tractions))
+    energies = 0.25 * of_slopes.energy, of_tractions.energy
+    total = energies[0] + energies[1]
+    squared_decay = energies[0] * of_slopes.decay**2 + energies[1] * of_tractions.decay**2
     return CoefficientErrors(
-        energy=scale * mesh.lengths**2 * (of_slopes + of_tractions),
-        traction=mesh.lengths / (2 * degree + 1) * of_tractions,
+        energy=mesh.lengths**2 / plane_modulus * total,
+        traction=mesh.lengths * of_tractions.mean_square,
         # weighted by the errors: coefficients of tractions that vanish are round-off, which does not fall
-        energy_decay=np.sqrt(
-            (of_slopes * slope_decay**2 + of_tractions * traction_decay**2)
-            / np.maximum(of_slopes + of_tractions, np.finfo(float).tiny)
-        ),
-        traction_decay=traction_decay,
+        energy_decay=np.sqrt(squared_decay / np.maximum(total, np.finfo(float).tiny)),
+        traction_decay=of_tractions.decay,
     )
 
 
@@ -125,17 +126,31 @@ def _slope_coefficients(space: BoundarySpace, displacement: FloatArray) -> Float
     return np.asarray(np.einsum("qk,eqc->ekc", projection, slopes))
 
 
-def _missing(sizes: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the sum of the squares (n,) of the coefficients that follow, and the ratio (n,) at which they fall.
+class _Missing(NamedTuple):
+    """Sums (n,) of a^2 / (2 k + 1)^2 and a^2 / (2 k + 1) of the missing coefficients a, and their ratio (n,)."""
+
+    energy: FloatArray
+    mean_square: FloatArray
+    decay: FloatArray
+
+
+def _missing(coefficients: FloatArray, degrees: IntArray) -> _Missing:
+    """Continue the Legendre coefficients (n, largest degree, 2) of elements.
 
     A geometric sequence is fitted to the second half of the coefficients. Each is taken as large as any after it, since
     every other coefficient of an odd or even field is zero.
     """
-    n_known = sizes.shape[1]
-    bounds = np.maximum.accumulate(sizes[:, ::-1], axis=1)[:, ::-1]
-    n_fitted = max(2, min(n_known - 1, n_known // 2 + 1))
-    k = np.arange(n_fitted) - 0.5 * (n_fitted - 1)
-    logarithms = np.log(np.maximum(bounds[:, n_known - n_fitted :], np.finfo(float).tiny))
-    ratio = np.exp(np.minimum(logarithms @ k / (k @ k), 0.0))
-    first = bounds[:, -1] * ratio
-    return first**2 / np.maximum(1.0 - ratio**2, 1.0 - SLOWEST**2), ratio
+    energy, mean_square, decay = np.empty((3, degrees.size))
+    for n_known in np.unique(degrees).tolist():
+        chosen = degrees == n_known
+        sizes = np.linalg.norm(coefficients[chosen, :n_known], axis=2)
+        bounds = np.maximum.accumulate(sizes[:, ::-1], axis=1)[:, ::-1]
+        n_fitted = max(2, min(n_known - 1, n_known // 2 + 1))
+        k = np.arange(n_fitted) - 0.5 * (n_fitted - 1)
+        logarithms = np.log(np.maximum(bounds[:, n_known - n_fitted :], np.finfo(float).tiny))
+        ratio = np.exp(np.minimum(logarithms @ k / (k @ k), 0.0))
+        following = np.arange(_N_MISSING)
+        missing = (bounds[:, -1] * ratio)[:, None] * np.minimum(ratio, SLOWEST)[:, None] ** following
+        odd = 2.0 * (n_known + following) + 1.0
+        energy[chosen], mean_square[chosen], decay[chosen] = missing**2 @ odd**-2.0, missing**2 @ (1.0 / odd), ratio
+    return _Missing(energy, mean_square, decay)

@@ -9,16 +9,21 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bemkit.arrays import FloatArray, IntArray
+from bemkit.arrays import BoolArray, FloatArray, IntArray
 from bemkit.contact.body import SlipHistory
+from bemkit.geometry.mesh import BoundaryMesh
+from bemkit.geometry.vectors import norms
 from bemkit.results.contact_table import resolved_transitions, unresolved_contacts
-from bemkit.results.zone_ends import Side, ZoneEnd
+from bemkit.results.zone_ends import LYING_AT, Side, ZoneEnd
 from bemkit.scene.contacts import name_at_obstacle
 from bemkit.solvers.active_sets import NodeStatus
 
 if TYPE_CHECKING:
     from bemkit.results.singular_corners import SingularCorner
     from bemkit.results.solved_scene import SolvedScene
+
+LARGEST_REACH = 0.15
+"""Share of a contact up to which the elements at a singular point count as near it: longer ones have estimates."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,22 +56,41 @@ class ContactPlaces:
         return sides
 
     def elements(self, name: str) -> IntArray:
-        """Return the elements of a body that may touch other bodies or obstacles.
+        """Return the elements of a body that may touch others or obstacles, without those near `singular_points`."""
+        mesh, elements = self.solution.bodies[name].mesh, self._touching(name)
+        return elements[~(self._is_near(mesh.start[elements]) | self._is_near(mesh.end[elements]))]
 
-        Without those at edges that press into another side, and from degree 3 on those at singular corners: tractions
-        there have no bound.
-        """
+    def _touching(self, name: str) -> IntArray:
         body = self.solution.bodies[name]
         listed = self.solution.scene.listed_parts(name)
         parts = dict.fromkeys([*listed, *(part.name for part in body.scene.contact_parts)])
-        left_out = [
-            side.elements_at(point) for one, two, point, _ in self._edges for side in (one, two) if side.body == name
-        ]
-        if body.coefficient_errors is not None:
-            left_out += [np.array(corner.elements) for corner in self.corners[name]]
-        none = np.zeros(0, np.intp)
-        elements = np.concatenate([none, *(body.mesh.part(part) for part in parts)])
-        return np.setdiff1d(elements, np.concatenate([none, *left_out]))
+        return np.unique(np.concatenate([np.zeros(0, np.intp), *(body.mesh.part(part) for part in parts)]))
+
+    @cached_property
+    def singular_points(self) -> list[tuple[FloatArray, float]]:
+        """Points (2,) at which tractions have no bound, singular corners and edges, and lengths [m] of elements there.
+
+        On both sides of a contact it is that of the longer elements: an error of one side is one of the other. No
+        points where that is more than `LARGEST_REACH`.
+        """
+        points = []
+        for name, corners in self.corners.items():
+            mesh = self.solution.bodies[name].mesh
+            length = float(mesh.lengths[self._touching(name)].sum())
+            for corner in corners:
+                point = np.array([corner.x, corner.y])
+                points.append((point, _reach(mesh, np.array(corner.elements), point), length))
+        for one, two, point, _ in self._edges:
+            reach = max(_reach(side.mesh, side.elements_at(point), point) for side in (one, two))
+            points.append((point, reach, min(one.length, two.length)))
+        return [(point, reach) for point, reach, length in points if reach <= LARGEST_REACH * length]
+
+    def _is_near(self, points: FloatArray) -> BoolArray:
+        """Return whether points (n, 2) are on the elements of a singular point, and no end of theirs."""
+        is_near = np.zeros(len(points), bool)
+        for point, reach in self.singular_points:
+            is_near |= norms(points - point) < (1.0 - LYING_AT) * reach
+        return is_near
 
     @cached_property
     def corners(self) -> Mapping[str, tuple[SingularCorner, ...]]:
@@ -138,20 +162,30 @@ class ContactPlaces:
     def squared_traction_error(self) -> float | None:
         """Return the estimated squared error of the contact tractions of all bodies in L2 [Pa^2 m].
 
-        By the coefficients of elements of degree 3 and more, without those that `elements` excludes; None if a body has
-        lower degrees.
+        By the coefficients of elements of degree 3 and more, if a body has lower degrees by the nodes, without those
+        near `singular_points`. None if there are too few.
         """
-        from bemkit.results.error_indicators import transition_error
+        from bemkit.results.error_indicators import nodal_error, transition_error
 
         solution, squared = self.solution, 0.0
+        spaces = [body.scene.discretisation.displacement_space(body.mesh) for body in solution.bodies.values()]
+        if (degree := min(space.degree for space in spaces)) <= 2:
+            table = solution.contact
+            return nodal_error(table, degree, solution.n_sides, self._is_near(np.column_stack([table.x, table.y])))
         elements = {name: self.elements(name) for name in solution.bodies}
+        if not any(chosen.size for chosen in elements.values()):
+            return None
         for name, body in solution.bodies.items():
-            if body.coefficient_errors is None:
-                return None
-            squared += float(body.coefficient_errors.traction[elements[name]].sum())
+            if body.coefficient_errors is not None:
+                squared += float(body.coefficient_errors.traction[elements[name]].sum())
         for transition in solution.transitions:
             for side in self.sides(transition.part):
                 end = side.near(np.array([transition.x, transition.y]))
                 if end.element in elements[side.body]:
                     squared += transition_error(solution.contact, transition, solution.transitions, end)
         return squared
+
+
+def _reach(mesh: BoundaryMesh, elements: IntArray, point: FloatArray) -> float:
+    """Return the distance [m] of the furthest end of some elements from a point."""
+    return float(max(norms(end[elements] - point).max() for end in (mesh.start, mesh.end)))

@@ -155,9 +155,9 @@ class Solution(SolvedScene, Explorable):
     def estimated_traction_error(self) -> float | None:
         """Estimated error of the contact tractions of all bodies in L2, relative to their norm.
 
-        From degree 3 on without those at edges that press into another side, and at `singular_corners`. Of a half-plane
-        that of all tractions but loads, in the mean. None without an estimate, without such tractions, and where fewer
-        than three nodes carry them.
+        Without those at `singular_corners` and at edges that press into another side. Of a half-plane that of all
+        tractions but loads, in the mean. None without an estimate, without such tractions, and where fewer than three
+        nodes carry them.
         """
         bodies = tuple(self.bodies.values())
         if len(bodies) == 1 and bodies[0].surface_errors is not None:
@@ -165,14 +165,13 @@ class Solution(SolvedScene, Explorable):
         size = self.contact_traction_size
         if size == 0.0 or not all(body.scene.discretisation.estimates_error for body in bodies):
             return None
-        if any(body.coefficient_errors is None for body in bodies):
-            from bemkit.results.error_indicators import nodal_error
+        from bemkit.results.error_indicators import stiffness_error
 
-            degree = min(body.scene.discretisation.displacement_space(body.mesh).degree for body in bodies)
-            squared = nodal_error(self.contact, degree, self.n_sides)
-        else:
-            squared = self.places.squared_traction_error()
-        return None if squared is None else float(np.sqrt(squared)) / size
+        squared = self.places.squared_traction_error()
+        if squared is None:
+            return None
+        degree = min(body.scene.discretisation.displacement_space(body.mesh).degree for body in bodies)
+        return float(np.hypot(np.sqrt(squared) / size, stiffness_error(self.estimated_error or 0.0, degree)))
 
     @cached_property
     def estimated_local_traction_error(self) -> float | None:

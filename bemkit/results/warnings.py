@@ -108,7 +108,7 @@ def _unbounded_tractions(solution: Solution) -> Iterator[ResultWarning]:
     """Warn of singular contact tractions, whose estimated error excludes the corner; once of one of two bodies."""
     corners: dict[tuple[float, float, tuple[str, ...]], tuple[float, float]] = {}
     for name, body in solution.bodies.items():
-        if body.coefficient_errors is None:
+        if not body.scene.discretisation.estimates_error:
             continue
         for corner in solution.places.corners[name]:
             key = (corner.x, corner.y, tuple(sorted(filter(None, (name, corner.partner)))))
@@ -116,13 +116,14 @@ def _unbounded_tractions(solution: Solution) -> Iterator[ResultWarning]:
             corners[key] = (corner.exponent - 1.0, length + corners.get(key, (0.0, 0.0))[1])
     for (x, y, names), (power, length) in corners.items():
         bodies = " and ".join(map(repr, names))
+        is_excluded = any(np.array_equal(point, (x, y)) for point, _ in solution.places.singular_points)
+        excluded = f"The estimated error of tractions excludes {amount(length, 'length', solution.units, 2)} there."
         prefix = f"{'Bodies' if len(names) > 1 else 'Body'} {bodies}: " if names else ""
         yield ResultWarning(
             "singular contact traction",
             f"{' '.join(names)} ({x:.12g}, {y:.12g})".strip(),
             f"{prefix}Contact tractions are singular at ({x:.4g}, {y:.4g}) (r^{power:.2g}). Use forces instead of peak "
-            f"values, or round the corner. The estimated error of tractions excludes "
-            f"{amount(length, 'length', solution.units, 2)} there.",
+            f"values, or round the corner. {excluded if is_excluded else 'Use more elements.'}",
             power,
         )
 

@@ -37,7 +37,7 @@ from bemkit.runs.mesh_sequence import Level, Member, zone_cuts
 from bemkit.scene.discretisation import Discretisation
 from bemkit.solvers.base import Status
 
-SAFETY = 0.4
+SAFETY = 0.36
 """The next mesh is planned for this part of the error asked for."""
 FEWEST_LEVELS = 4
 """Meshes in layers before the error may be found to fall no longer: the first ones are coarse on purpose."""
@@ -53,7 +53,7 @@ two digits more at once. Degree 3 takes hardly less time."""
 COARSE = 2e-3
 """Accuracy that the first mesh in layers may reach with degree 4; for less, if it may be the last, it has a degree
 more, and a layer more where loads jump."""
-NEXT_ERROR = 0.04
+NEXT_ERROR = 0.032
 """Part of the error of contact tractions that the next mesh keeps, at any degree: points where the status changes
 have moved away from their nodes (0.01 to 0.1 on the scenes with a reference)."""
 LAST_TIPS = 10.0

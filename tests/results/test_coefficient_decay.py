@@ -1,0 +1,62 @@
+"""Estimated errors of elements of high degree against the norms of what their polynomials miss."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.polynomial import legendre
+
+import bemkit as bk
+from bemkit.arrays import FloatArray
+from bemkit.geometry.spaces import LagrangeSpace
+from bemkit.operators.boundary import hypersingular, single_layer
+from bemkit.results.coefficient_decay import CoefficientErrors, coefficient_errors
+
+MATERIAL = bk.Material(3.0, 0.3)
+MESH = bk.discretise(bk.Rectangle(2.0, 2.0).outline(), n_elements=12)
+ELEMENT, RATIO, DEGREE, HIGHEST = 1, 0.4, 4, 12
+SERIES = RATIO ** np.arange(HIGHEST)
+"""Legendre coefficients of a field on one element; the last one is a ten thousandth of the first that is missing."""
+
+
+def tractions(degree: int) -> LagrangeSpace:
+    return LagrangeSpace(MESH, np.ones(MESH.n_nodes, bool), degree=degree)
+
+
+def field(space: LagrangeSpace, coefficients: FloatArray) -> FloatArray:
+    """Return the dofs (n_scalar, 2) of a field along x on `ELEMENT`, zero elsewhere."""
+    values = np.zeros((space.n_dofs // 2, 2))
+    values[space.element_dofs[ELEMENT], 0] = legendre.legval(space.local_nodes, coefficients)
+    return values
+
+
+def estimated(displacement: FloatArray, traction: FloatArray) -> CoefficientErrors:
+    space = tractions(DEGREE - 1)
+    at_nodes = traction[space.element_dofs]
+    return coefficient_errors(LagrangeSpace(MESH, degree=DEGREE), space, displacement, at_nodes, MATERIAL.plane_modulus)
+
+
+def test_missing_tractions_have_the_norm_of_the_single_layer() -> None:
+    displacement = np.zeros((MESH.n_elements * DEGREE, 2))
+    errors = estimated(displacement, field(tractions(DEGREE - 1), SERIES[:DEGREE]))
+    space = tractions(HIGHEST)
+    missing = field(space, np.where(np.arange(HIGHEST) < DEGREE, 0.0, SERIES))
+    norm = missing.ravel() @ single_layer(space, space, MATERIAL).matrix() @ missing.ravel()
+    # 0.55 of the estimate for a field on one element alone, which leaves room for the displacements that it causes
+    assert 0.5 < norm / errors.energy.sum() < 0.6
+    k = np.arange(DEGREE, HIGHEST)
+    squared = MESH.lengths[ELEMENT] * np.sum(SERIES[DEGREE:] ** 2 / (2 * k + 1))
+    assert errors.traction.sum() == pytest.approx(squared, rel=1e-3)
+    assert errors.traction_decay[ELEMENT] == pytest.approx(RATIO)
+
+
+def test_missing_strains_have_the_norm_of_the_hypersingular_operator() -> None:
+    def displacement(degree: int, slopes: FloatArray) -> tuple[LagrangeSpace, FloatArray]:
+        space = LagrangeSpace(MESH, degree=degree)
+        return space, field(space, legendre.legint(slopes, lbnd=-1) * 0.5 * MESH.lengths[ELEMENT])
+
+    smooth = np.where(np.arange(HIGHEST) < 1, 0.0, SERIES)  # no mean slope: the displacement ends at zero
+    errors = estimated(displacement(DEGREE, smooth[:DEGREE])[1], np.zeros((MESH.n_elements * DEGREE, 2)))
+    space, missing = displacement(HIGHEST, np.where(np.arange(HIGHEST) < DEGREE, 0.0, SERIES))
+    norm = missing.ravel() @ hypersingular(space, space, MATERIAL).matrix() @ missing.ravel()
+    assert 0.55 < norm / errors.energy.sum() < 0.7
