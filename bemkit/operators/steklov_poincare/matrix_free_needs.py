@@ -13,7 +13,7 @@ from bemkit.operators.steklov_poincare.needs import BodyCase, BodyNeeds, PlanIte
 _FEWEST_ELEMENTS = 200
 _MOST_LOOPS = 20
 """Each closed curve of the boundary has an equation of its own, which is evaluated for each product."""
-_BYTES, _BYTES_OF_GROUPS = 1.35e3, 5e6
+_BYTES, _BYTES_OF_GROUPS = 1.5e3, 5e6
 """Bytes of an element: mesh, directions of the iteration, series, conditions and fields; and once, mostly
 for the equations of groups of elements."""
 _EVALUATIONS, _EVALUATIONS_COMPILED = 4.5e3, 0.3e3
