@@ -97,7 +97,7 @@ class HierarchicalCollocation(CollocationElasticity):
     def needs(self, case: BodyCase) -> BodyNeeds:
         """Return memory and time of the map; ranks, and with them counts, are not predicted."""
         if isinstance(self.options, MatrixFree):
-            from bemkit.operators.steklov_poincare.matrix_free_needs import matrix_free_needs
+            from bemkit.operators.matrix_free.needs import matrix_free_needs
 
             return matrix_free_needs(case, self.options, takes_slopes=self.slopes)
         return hierarchical_needs(case, self.options, takes_slopes=self.slopes)

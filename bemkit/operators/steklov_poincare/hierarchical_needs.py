@@ -121,7 +121,7 @@ def choose_collocation_solver(
         The compressed equations if they are asked for, or promise to be at least twice as fast, or nothing else fits.
     """
     if isinstance(requested, MatrixFree):
-        from bemkit.operators.steklov_poincare.matrix_free_needs import why_stored
+        from bemkit.operators.matrix_free.needs import why_stored
 
         if not (stored := hindrance or why_stored(case)):
             return ChosenLinearSolver(_DIRECT, "asked for", requested)
