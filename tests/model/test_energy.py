@@ -33,7 +33,8 @@ def test_a_body_that_pushes_back_the_wrong_way_is_a_named_failure(law: bk.Fricti
 
 def test_slopes_that_keep_means_bend_the_same_ring_the_right_way() -> None:
     solution = bk.run(thin_ring(0.8, 40, FLOOR, LOAD, discretisation=bk.ConstantCollocation()))
-    assert solution.is_converged
+    # two nodes carry the ring, and the lowest point between them is deep in the floor
+    assert solution.status is bk.Status.MISSED_CONTACT
     top = np.argmax(solution.boundary.points[:, 1])
     assert solution.boundary.displacement[top, 1] < 0.0 < solution.energy
 

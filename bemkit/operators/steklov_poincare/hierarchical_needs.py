@@ -57,8 +57,6 @@ class _Costs:
         Memory, and that of an element in contact besides, where both tractions and displacements are.
     of_top : float
         Memory besides for the largest clusters, whose ranks hardly depend on the number of elements.
-    in_numpy : float
-        Memory besides where integrals are arrays, up to `_MOST_IN_NUMPY` in all.
     """
 
     evaluations: float
@@ -68,12 +66,9 @@ class _Costs:
     n_bytes: float
     of_contact: float
     of_top: float
-    in_numpy: float
 
 
-_COLLOCATION = _Costs(14e3, 3e3, 0.4e6, 25e3, 8.8e3, 3.5e3, 16e6, 6.5e3)
-_MOST_IN_NUMPY = 38e6
-"""Bytes of the integrals that exist at the same time."""
+_COLLOCATION = _Costs(14e3, 3e3, 0.4e6, 25e3, 8.6e3, 3.5e3, 9e6)
 _FLOPS_OF_STEP = 2e8
 """Flops of a contact step on a mesh of any size, besides those that grow with the mesh."""
 _BYTES_OF_STATE, _FLOPS_OF_STATE = 40.0, 2e3
@@ -185,8 +180,7 @@ def _needs(case: BodyCase, options: Hierarchical, *, is_compiled: bool | None = 
     n_both = int(np.count_nonzero(case.conditions.is_retained.any(axis=1)))
     if is_compiled is None:
         is_compiled, _ = compiled.expected(n)
-    of_integrals = 0.0 if is_compiled else min(costs.in_numpy * n, _MOST_IN_NUMPY)
-    memory = int(digits * (costs.of_top + of_integrals + costs.n_bytes * n + costs.of_contact * n_both))
+    memory = int(digits * (costs.of_top + costs.n_bytes * n + costs.of_contact * n_both))
     evaluations = digits * n * (costs.compiled if is_compiled else costs.evaluations)
     flops = costs.flops * n
     if n_both:
