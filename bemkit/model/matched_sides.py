@@ -24,7 +24,7 @@ def matching_densities(
     Parameters
     ----------
     contacts : iterable of ContactPair
-        Between elastic bodies.
+        Between elastic bodies, with friction: without it a body on alike meshes would turn nearly freely.
     bodies : mapping of str to BodyScene
         The placed bodies by name.
     meshes : mapping of str to BoundaryMesh

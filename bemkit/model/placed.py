@@ -167,7 +167,8 @@ def _drawn(scene: Scene, given: Mapping[str, BoundaryMesh]) -> dict[str, Boundar
         if id(own_scene) not in by_scene:
             by_scene[id(own_scene)] = _divided(own_scene, scene, body)
     meshes = {**given, **{body.name: by_scene[id(own_scenes[body.name])] for body in divided}}
-    densities = matching_densities(scene.elastic_contacts, own_scenes, meshes)
+    rough = [pair for pair in scene.elastic_contacts if not scene.law_of(pair).is_frictionless]
+    densities = matching_densities(rough, own_scenes, meshes)
     matched: dict[int, BoundaryMesh] = {}
     for body in divided:
         own_scene = own_scenes[body.name]

@@ -35,14 +35,13 @@ def sizes(scene: bk.Scene) -> list[int]:
     return [body.mesh.part(side).size for body, side in zip(place(scene), sides, strict=True)]
 
 
-@pytest.mark.parametrize("law", [bk.Frictionless(), bk.Coulomb(0.2)])
-def test_a_uniform_pressure_is_uniform(law: bk.FrictionLaw) -> None:
-    scene = rings(law)
+def test_a_uniform_pressure_is_uniform() -> None:
+    scene = rings(bk.Coulomb(0.2))
     assert sizes(scene) == [52, 52]
     solution = bk.run(scene)
     table = solution.contact
     mean = np.average(table.sigma_n, weights=table.weight)
-    assert np.abs(table.sigma_n / mean - 1.0).max() < 1e-8  # round-off of solves; 4e-2 on elements of 1 to 2
+    assert np.abs(table.sigma_n / mean - 1.0).max() < 1e-8  # round-off of solves; 4e-4 on elements of 1 to 2
     # the pressure of quadratic elements on 320 elements; unmatched elements miss it by 1.3e-2 with friction
     assert mean == pytest.approx(-1.8158e-4, rel=2e-3)
 
@@ -59,13 +58,16 @@ def test_the_rest_of_a_boundary_keeps_half_of_its_elements() -> None:
 @pytest.mark.parametrize(
     ("scene", "expected"),
     [
+        (rings(bk.Frictionless()), [52, 28]),  # the inner ring would turn nearly freely
         (rings(bk.Coulomb(0.2), discretisation=bk.Galerkin(2)), [52, 28]),
         (rings(bk.Coulomb(0.2), radius=1.05), [52, 28]),  # a gap: the sides do not fit
         (rings(bk.Coulomb(0.2), mesh=bk.MeshOptions(elements=80, grading=bk.Algebraic(1.5))), [52, 28]),
         (rings(bk.Coulomb(0.2), mesh=bk.MeshOptions(elements=80, density={"outer": 1.0})), [52, 28]),
     ],
 )
-def test_lengths_are_matched_only_for_linear_elements_on_sides_that_fit(scene: bk.Scene, expected: list[int]) -> None:
+def test_lengths_are_matched_only_for_linear_elements_on_rough_sides_that_fit(
+    scene: bk.Scene, expected: list[int]
+) -> None:
     assert sizes(scene) == expected
 
 
