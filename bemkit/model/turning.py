@@ -28,6 +28,8 @@ _ROUND_OFF = 1e-9
 """Distance, relative to the diameter, by which normals of arcs may miss their centre."""
 _BALANCED = 1e-6
 """Share of the moment of all loads, each taken by its size, that counts as none."""
+_UNSETTLED = (Status.STALLED, Status.CYCLING, Status.MAX_STEPS, Status.INNER_FAILED, Status.SINGULAR)
+"""Failures of a solve whose cause may be a motion that nothing holds."""
 
 
 _Side: TypeAlias = tuple[PlacedBody, IntArray]
@@ -37,13 +39,17 @@ _Side: TypeAlias = tuple[PlacedBody, IntArray]
 def with_turning_checked(model: Model, result: ContactSolution) -> ContactSolution:
     """Return the outcome of a solve, named UNSOLVABLE_LOAD if nothing but meshes keeps a body from turning.
 
-    Bodies that friction joins are judged together; those with forces inside are not.
+    A failed solve is named SINGULAR if a body may turn under any load. Bodies that friction joins are
+    judged together; the loads of those with forces inside are not.
     """
-    if not result.is_converged:
+    if not (result.is_converged or result.status in _UNSETTLED):
         return result
     groups = _joined_by_friction(model.prepared)
-    reason = next(filter(None, (_turned(model.prepared, *group) for group in groups)), "")
-    status = Status.UNSOLVABLE_LOAD
+    if result.is_converged:
+        status, reasons = Status.UNSOLVABLE_LOAD, (_turned(model.prepared, *group) for group in groups)
+    else:
+        status, reasons = Status.SINGULAR, (_loose(*group) for group in groups)
+    reason = next(filter(None, reasons), "")
     return replace(result, status=status, message=f"{status.value} [{reason}]") if reason else result
 
 
@@ -71,32 +77,54 @@ def _joined_by_friction(prepared: Prepared) -> list[tuple[list[PlacedBody], list
 
 def _turned(prepared: Prepared, bodies: list[PlacedBody], sides: list[_Side]) -> str:
     """Say how the load turns bodies that may turn by these sides; empty if it does not."""
-    if not all(_may_turn(body) for body in bodies):
-        return ""
-    centre = _common_centre(sides)
-    if centre is None:
+    centre = _centre_of_turning(bodies, sides)
+    if centre is None or any(body.scene.body_forces for body in bodies):
         return ""
     moment, size = (sum(values) for values in zip(*(_moment(body, centre) for body in bodies), strict=True))
     if abs(moment) <= _BALANCED * size:
         return ""
-    diameter = max(body.mesh.diameter for body in bodies)
-    x, y = np.where(np.abs(centre) < _ROUND_OFF * diameter, 0.0, centre).tolist()
     by = amount(prepared.scene.depth * abs(moment), "energy", prepared.scene.result_units)
     sense = "anticlockwise" if moment > 0.0 else "clockwise"
-    names = " and ".join(repr(body.name) for body in bodies)
     return (
-        f"the load turns {'body' if len(bodies) == 1 else 'bodies'} {names} {sense} about ({x:.4g}, {y:.4g}) with "
-        f"{by}, and contacts that are round and without friction do not resist: give them friction, hold what turns by "
-        "a support, or change the load"
+        f"the load turns {_titles(bodies)} {sense} about {_place(bodies, centre)} with {by}, and contacts that are "
+        "round and without friction do not resist: give them friction, hold what turns by a support, or change the load"
     )
 
 
+def _loose(bodies: list[PlacedBody], sides: list[_Side]) -> str:
+    """Say that bodies may turn by these sides; empty if they may not."""
+    centre = _centre_of_turning(bodies, sides)
+    if centre is None:
+        return ""
+    return (
+        f"nothing but the mesh keeps {_titles(bodies)} from turning about {_place(bodies, centre)}, since the contacts "
+        "are round and without friction: give them friction, or hold what turns by a support or by symmetry"
+    )
+
+
+def _titles(bodies: list[PlacedBody]) -> str:
+    if len(bodies) == 1:
+        return bodies[0].title
+    return "bodies " + " and ".join(repr(body.name) for body in bodies)
+
+
+def _place(bodies: list[PlacedBody], centre: FloatArray) -> str:
+    diameter = max(body.mesh.diameter for body in bodies)
+    x, y = np.where(np.abs(centre) < _ROUND_OFF * diameter, 0.0, centre).tolist()
+    return f"({x:.4g}, {y:.4g})"
+
+
+def _centre_of_turning(bodies: list[PlacedBody], sides: list[_Side]) -> FloatArray | None:
+    """Return the point (2,) [m] about which bodies may turn by these sides; None if they may not."""
+    return _common_centre(sides) if all(_may_turn(body) for body in bodies) else None
+
+
 def _may_turn(body: PlacedBody) -> bool:
-    """Whether no support, symmetry or infinity keeps a body from turning, and nothing acts inside it."""
+    """Whether no support, symmetry or infinity keeps a body from turning."""
     is_held = any(isinstance(part.condition, Clamped | Roller | PrescribedDisplacement) for part in body.scene.parts)
     mesh = body.mesh
     is_bounded = not mesh.is_exterior and mesh.surface is None
-    return is_bounded and mesh.symmetry is None and not is_held and not body.scene.body_forces
+    return is_bounded and mesh.symmetry is None and not is_held
 
 
 def _common_centre(sides: list[_Side]) -> FloatArray | None:

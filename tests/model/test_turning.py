@@ -96,3 +96,31 @@ def test_a_later_step_that_turns_the_body_ends_the_history() -> None:
     assert solution.status is bk.Status.UNSOLVABLE_LOAD
     assert solution.message.count("No contact tractions can balance this load") == 1
     assert np.abs(solution.bodies["lining"].boundary.displacement).max() < 1e-2  # of the step before
+
+
+def disc_in_cavity(n_elements: int, radius: float = 1.001, degree: int = 2) -> bk.Scene:
+    """A heavy disc in a round rigid cavity, a little larger than itself."""
+    cavity = bk.Part(
+        "rim", bk.Contact(bk.RigidCavity((0.0, 0.0), radius)), sides=tuple(f"arc-{k}" for k in range(1, 5))
+    )
+    return bk.Scene(
+        title="disc in a cavity",
+        shape=bk.Disk(1.0),
+        material=STEEL,
+        law=bk.Frictionless(),
+        parts=(cavity,),
+        body_forces=(bk.Gravity(1.0, (0.0, -1.0)),),
+        discretisation=bk.Galerkin(degree),
+        mesh=bk.MeshOptions(n_elements),
+    )
+
+
+@pytest.mark.parametrize("degree", [1, 2])
+def test_a_disc_that_may_turn_in_a_cavity_ends_by_name(degree: int) -> None:
+    """A mesh that is not symmetric turns the disc; a symmetric one leaves it where it is."""
+    assert bk.run(disc_in_cavity(40, degree=degree)).is_converged
+    solution = bk.run(disc_in_cavity(41, degree=degree))
+    assert solution.status is bk.Status.SINGULAR
+    assert "nothing but the mesh keeps the body from turning about (0, 0)" in solution.message
+    assert "give them friction" in solution.message
+    assert bk.run(replace(disc_in_cavity(41, degree=degree), law=bk.Coulomb(0.3))).is_converged
