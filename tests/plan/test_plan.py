@@ -5,7 +5,8 @@ from __future__ import annotations
 import dataclasses
 import re
 import tracemalloc
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
+from typing import Any
 
 import pytest
 
@@ -241,9 +242,9 @@ def test_a_million_elements_are_refused_before_the_mesh_is_made(
     built: list[int | None] = []
     divided = BodyScene.divided
 
-    def watched(scene: BodyScene, contact: Sequence[str]) -> bk.BoundaryMesh:
+    def watched(scene: BodyScene, *arguments: Any) -> bk.BoundaryMesh:
         built.append(scene.mesh.elements)
-        return divided(scene, contact)
+        return divided(scene, *arguments)
 
     monkeypatch.setattr(BodyScene, "divided", watched)
     with pytest.raises(SystemExit, match="2"):
