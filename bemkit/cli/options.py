@@ -68,7 +68,7 @@ what_option = click.option(
     "--what", metavar="NAME,...", callback=pictures_of, help="Pictures to draw; bemkit plot --help lists them."
 )
 inside_option = click.option(
-    "--inside", type=int, default=0, metavar="N", help="Stress inside on N points across, in a .vtu or .vtp."
+    "--inside", type=int, default=0, metavar="N", help="Stress inside on N points across, in a .vtu."
 )
 quiet_option = click.option("-q", "--quiet", is_flag=True, help="Print only errors.")
 
@@ -106,7 +106,7 @@ def result_target(output: str | None, inside: int) -> list[Path]:
     """Return the file of ``-o``, checked for its ending; ``--inside`` goes with it."""
     if output is None:
         if inside:
-            raise click.UsageError("--inside goes into a file: give -o with a name that ends in .vtu or .vtp")
+            raise click.UsageError("--inside goes into a file: give -o with a name that ends in .vtu")
         return []
     from bemkit.results.export import format_of
 

@@ -27,7 +27,7 @@ _COARSEST = 40
 
 @click.command()
 @click.argument("scene")
-@click.option("-o", "--output", metavar="FILE", help="Write the result: .h5, .json, .csv, .npz, .vtu or .vtp.")
+@click.option("-o", "--output", metavar="FILE", help="Write the result: .h5, .json, .csv, .npz or .vtu.")
 @options.inside_option
 @options.json_option
 @options.csv_option

@@ -25,7 +25,7 @@ from bemkit.cli.streams import print_data
 @options.what_option
 @click.option("--scene", "shows_scene", is_flag=True, help="Print the scene of the result as TOML.")
 @click.option("--step", type=int, metavar="N", help="Show load step N, counted from 1.")
-@click.option("-o", "--output", metavar="FILE", help="Write another format: .json, .csv, .npz, .vtu or .vtp.")
+@click.option("-o", "--output", metavar="FILE", help="Write another format: .json, .csv, .npz or .vtu.")
 @options.inside_option
 def show(
     result: str,

@@ -1,4 +1,4 @@
-"""Results in the format that the ending of a file name asks for: .h5, .json, .csv, .npz, .vtu, .vtp."""
+"""Results in the format that the ending of a file name asks for: .h5, .json, .csv, .npz, .vtu."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ def format_of(path: str | Path, inside: int = 0) -> Format:
         raise OutputFileError(f"{path}: the ending {ending!r} names no format of results: give one of {known}")
     chosen = FORMATS[ending]
     if inside and chosen.write_inside is None:
-        raise OutputFileError(f"{path}: {ending} holds no fields inside the body: give .vtu or .vtp, or no inside")
+        raise OutputFileError(f"{path}: {ending} holds no fields inside the body: give .vtu, or no inside")
     if inside and not 2 <= inside <= MOST_ACROSS:
         raise OutputFileError(f"{path}: inside is {inside}: give from 2 to {MOST_ACROSS} points across the body")
     return chosen
@@ -76,8 +76,8 @@ def export_result(path: str | Path, solution: Solution, *, inside: int = 0) -> N
     ----------
     path : str or Path
         ``.h5`` or ``.hdf5``: everything, see `bemkit.results.result_file`; ``.json``: the summary; ``.csv``: the
-        contact table; ``.npz``: contact table and fields on boundaries as numpy arrays; ``.vtu`` and ``.vtp``:
-        boundaries as lines with displacement and traction, contact nodes as vertices, for ParaView and the like.
+        contact table; ``.npz``: contact table and fields on boundaries as numpy arrays; ``.vtu``: boundaries as lines
+        with displacement and traction, contact nodes as vertices, for ParaView and the like.
     solution : Solution
     inside : int
         Points across each body, along its longer extent, on which they hold displacement and stress inside; 0 for
@@ -148,7 +148,6 @@ def _text(text: Callable[[Solution], str]) -> Format:
     return Format(check_target, lambda path, solution: write_text(path, text(solution)))
 
 
-_VTK = Format(check_target, write_vtk, write_vtk)
 _HDF5 = Format(_check_hdf5, _write_hdf5)
 FORMATS: Mapping[str, Format] = MappingProxyType(
     {
@@ -157,8 +156,7 @@ FORMATS: Mapping[str, Format] = MappingProxyType(
         ".json": _text(to_json),
         ".csv": _text(lambda each: to_csv(each, "contact")),
         ".npz": Format(check_target, _write_npz),
-        ".vtu": _VTK,
-        ".vtp": _VTK,
+        ".vtu": Format(check_target, write_vtk, write_vtk),
     }
 )
 """By ending."""

@@ -1,7 +1,7 @@
 """Results for ParaView and the like: boundaries as lines, contact nodes as vertices, triangles inside.
 
-The XML files of VTK are unstructured grids (.vtu) and polygonal data (.vtp). Arrays are written in base64, each behind
-the number of its bytes; see "VTK XML file formats" in the documentation of VTK.
+The files are unstructured grids in the XML of VTK. Arrays are written in base64, each behind the number of its bytes;
+see "VTK XML file formats" in the documentation of VTK.
 """
 
 from __future__ import annotations
@@ -27,8 +27,7 @@ from bemkit.results.solved_body import SolvedBody
 from bemkit.results.stress_mesh import stress_mesh
 from bemkit.solvers.active_sets import NodeStatus
 
-_KINDS = {"vertex": (1, "Verts"), "line": (3, "Lines"), "triangle": (5, "Polys")}
-"""Cells in the order that polygonal data want: the number of their type in grids, their place in polygonal data."""
+_CELL_TYPES = {"vertex": 1, "line": 3, "triangle": 5}
 _TYPES = {"float64": "Float64", "int64": "Int64", "uint8": "UInt8"}
 _POINTS_OF_CURVE = 9
 """Points of an element whose displacement or shape is curved."""
@@ -50,31 +49,24 @@ class Block:
 
 
 def write_vtk_xml(path: Path, blocks: Sequence[Block]) -> None:
-    """Write blocks of cells into a file that ends in ``.vtu``, or in ``.vtp`` for polygonal data.
+    """Write blocks of cells into a file.
 
     Raises
     ------
     OutputFileError
         If the system refuses.
     """
-    is_grid = path.suffix.lower() == ".vtu"
-    blocks = sorted((block for block in blocks if len(block.cells)), key=lambda block: list(_KINDS).index(block.kind))
+    blocks = [block for block in blocks if len(block.cells)]
     counts = [len(block.points) for block in blocks]
     starts = (np.cumsum(counts) - counts).tolist()
     cells = [block.cells + start for block, start in zip(blocks, starts, strict=True)]
-    kind = "UnstructuredGrid" if is_grid else "PolyData"
+    kind = "UnstructuredGrid"
     root = ElementTree.Element("VTKFile", type=kind, version="1.0", byte_order="LittleEndian", header_type="UInt64")
     piece = ElementTree.SubElement(ElementTree.SubElement(root, kind), "Piece", NumberOfPoints=str(sum(counts)))
     _add(piece, "Points", {"Points": in_space(np.concatenate([block.points for block in blocks]))})
-    if is_grid:
-        piece.set("NumberOfCells", str(sum(map(len, cells))))
-        types = np.concatenate([np.full(len(block.cells), _KINDS[block.kind][0], np.uint8) for block in blocks])
-        _add(piece, "Cells", {**_joined(cells), "types": types})
-    else:
-        for name, (_, place) in _KINDS.items():
-            own = [each for each, block in zip(cells, blocks, strict=True) if block.kind == name]
-            piece.set(f"NumberOf{place}", str(sum(map(len, own))))
-            _add(piece, place, _joined(own))
+    piece.set("NumberOfCells", str(sum(map(len, cells))))
+    types = np.concatenate([np.full(len(block.cells), _CELL_TYPES[block.kind], np.uint8) for block in blocks])
+    _add(piece, "Cells", {**_joined(cells), "types": types})
     _add(piece, "PointData", _values(blocks, lambda block: block.point_data, counts))
     _add(piece, "CellData", _values(blocks, lambda block: block.cell_data, list(map(len, cells))))
     with replacing(path.resolve()) as temporary:
@@ -126,7 +118,7 @@ def bodies_of(solution: Solution) -> Mapping[str, SolvedBody]:
 
 
 def write_vtk(path: Path, solution: Solution, inside: int = 0) -> None:
-    """Write a .vtu or .vtp file.
+    """Write a .vtu file.
 
     Parameters
     ----------
@@ -144,9 +136,8 @@ def write_vtk(path: Path, solution: Solution, inside: int = 0) -> None:
     end at the boundary; an exterior and a half-plane are cut at half their size from it.
     """
     bodies = list(bodies_of(solution).values())
-    blocks = [_boundary(body, number) for number, body in enumerate(bodies)]
-    if solution.contact.n_contact:
-        blocks.append(_contact_nodes(solution, bodies))
+    blocks = [_contact_nodes(solution, bodies)] if solution.contact.n_contact else []
+    blocks += [_boundary(body, number) for number, body in enumerate(bodies)]
     if inside:
         blocks += [_inside(body, number, inside) for number, body in enumerate(bodies)]
     write_vtk_xml(path, blocks)
