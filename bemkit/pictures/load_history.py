@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from bemkit.errors import InputError
-from bemkit.pictures.abscissa import Abscissa, common_direction
+from bemkit.pictures.abscissa import Abscissa
 from bemkit.pictures.contact_axes import STATUS_COLOURS
 from bemkit.pictures.drawing import (
     BLUE,
@@ -54,7 +54,7 @@ def draw_friction_loop(solution: Result, axes: Axes | None = None, *, units: Uni
     """
     loading, units = history_of(solution), units or solution.units
     axes = axes_or_new(axes, 6.0, 4.2)
-    direction = common_direction(solution.contact)
+    direction = solution.contact.common_direction
     sign, over = direction or 1.0, " along $x$" if direction else ""
     places = sign * np.array([0.0, *(step.mean_displacement for step in loading.steps)])
     forces = sign * np.array([0.0, *(step.force_tangential for step in loading.steps)])

@@ -44,6 +44,8 @@ FLICKER = 1e-8
 """Changes of status within this share of a side count as one. Clearances grow like d**1.5 with the distance d from the
 edge, so that they are round-off there, and the status may change from node to node."""
 
+_STRAIGHT = 1e-9
+"""Distance of nodes from a horizontal line, by the length of the contact, that is round-off."""
 FEW_NODES = 3
 """Pressed nodes up to which the sides of a contact may meet elsewhere than at its nodes, or nowhere."""
 
@@ -121,6 +123,26 @@ class ContactTable:
     def parts(self) -> tuple[str, ...]:
         """The names of the contact parts, in their order."""
         return tuple(dict.fromkeys(self.part))
+
+    @property
+    def common_direction(self) -> float:
+        """1 or -1 if all parts run to the right or to the left along horizontal lines, 0 otherwise."""
+        directions = {self.direction(part) for part in self.parts}
+        return directions.pop() if len(directions) == 1 else 0.0
+
+    def direction(self, part: str) -> float:
+        """Return 1 if a part runs to the right along a horizontal line, -1 to the left, 0 otherwise.
+
+        Slip and friction along the boundary are positive along x in the first case, negative in the second.
+        """
+        rows = self.rows(part)
+        x, y, s = self.x[rows], self.y[rows], self.s[rows]
+        if x.size < 2:
+            return 0.0
+        tolerance = _STRAIGHT * max(float(np.ptp(s)), float(np.abs(x).max()), float(np.abs(y).max()))
+        sign = float(np.sign((x[-1] - x[0]) * (s[-1] - s[0])))
+        is_straight = np.ptp(y) <= tolerance and np.abs(x - x[0] - sign * (s - s[0])).max() <= tolerance
+        return sign if is_straight else 0.0
 
     def rows(self, part: str) -> BoolArray:
         """Return (n_contact,) bool: the nodes of one part."""

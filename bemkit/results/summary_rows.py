@@ -19,6 +19,7 @@ from bemkit.solvers.fallbacks import drivers_at_work
 
 DIGITS = 8
 """Digits of the numbers of a summary."""
+_TOWARDS = {1.0: "towards +x", -1.0: "towards -x", 0.0: "along the boundary"}
 _MANY_TRANSITIONS, _MANY_CONTACTS = 6, 8
 
 
@@ -94,7 +95,8 @@ def _force_rows(solution: Solution) -> Iterator[tuple[str, str]]:
     total, friction = solution.force_normal, solution.force_tangential
     per = "" if solution.scene.thickness else ", per unit thickness"
     yield "normal force", f"{_amount(total, 'force', units)}  pressing{per}"
-    yield "friction force", f"{_amount(friction, 'force', units)}  on the body, along the boundary"
+    direction = _TOWARDS[solution.contact.common_direction]
+    yield "friction force", f"{_amount(friction, 'force', units)}  on the body, {direction}"
     facts = sorted(contact_facts(solution), key=lambda fact: -fact["force_normal"])
     if len(facts) == 1:
         (fact,) = facts

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import bemkit as bk
-from bemkit.pictures.abscissa import Abscissa, common_direction
+from bemkit.pictures.abscissa import Abscissa
 from bemkit.pictures.contact_curves import draw_contact_displacement, draw_contact_traction
 from bemkit.pictures.load_history import draw_friction_loop
 from bemkit.scene.toml import with_overrides
@@ -46,7 +46,7 @@ def test_the_status_is_where_x_says(half_plane: bk.Solution) -> None:
 def test_other_contacts_are_drawn_over_the_arc_length() -> None:
     arc = bk.run(with_overrides(bk.load_scene("disc-between-plates"), elements=32))
     assert Abscissa.along(arc, arc.contact.parts[0]).name.startswith("arc length $s$ along")
-    assert common_direction(arc.contact) == 0.0
+    assert arc.contact.common_direction == 0.0
 
 
 def test_the_loop_of_a_surface_that_runs_to_the_left_is_not_mirrored(half_plane: bk.Solution) -> None:

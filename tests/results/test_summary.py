@@ -20,7 +20,7 @@ from bemkit.cli.console import print_summary
 from bemkit.report.page import report
 from bemkit.results.summary_rows import DIGITS, summary_rows
 from bemkit.results.tables import table_of, to_csv, to_json
-from bemkit.scene.toml import with_overrides
+from bemkit.scene.toml import load_scene, with_overrides
 
 UNITS = bk.UnitNames("mm", "MPa")
 
@@ -227,3 +227,17 @@ def test_a_solution_is_explored(tmp_path: Path) -> None:
         solution.plot("traction", "roof")
     with pytest.raises(bk.InputError, match="there is no picture 'friction-loop'"):
         solution.plot("friction-loop")
+
+
+@pytest.mark.parametrize(
+    ("name", "x_sign"), [("paper-1", 1.0), ("cylinder-on-half-plane", -1.0), ("two-cylinders", 0.0)]
+)
+def test_friction_names_its_direction_along_x(name: str, x_sign: float) -> None:
+    """The boundary runs to the right below a body, to the left along the surface of a half-plane."""
+    solution = bk.run(with_overrides(load_scene(name), elements=64))
+    words = dict(summary_rows(solution))["friction force"].split(", ")[1]
+    assert words == {1.0: "towards +x", -1.0: "towards -x", 0.0: "along the boundary"}[x_sign]
+    if x_sign:
+        (part,) = solution.contact.parts
+        (force,) = (fact for fact in solution.part_forces if fact.name == part)
+        assert x_sign * solution.force_tangential == pytest.approx(force.force_x, rel=1e-9)
