@@ -6,6 +6,7 @@ import pickle
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 
 class BemkitError(Exception):
@@ -48,6 +49,55 @@ def printable(text: str) -> str:
 def shown_path(path: Path) -> str:
     """Return the name of a file for messages."""
     return printable(str(path))[:200]
+
+
+def called(owner: object, method: str, arguments: tuple[Any, ...], remedy: str) -> Any:
+    """Return what a method of an object of one's own returns.
+
+    Parameters
+    ----------
+    owner : object
+    method : str
+    arguments : tuple
+    remedy : str
+        How the method is defined, to end the message with.
+
+    Raises
+    ------
+    InputError
+        If the method takes other arguments; an error inside it is raised as it is.
+    """
+    try:
+        return getattr(owner, method)(*arguments)
+    except TypeError as error:
+        if error.__traceback__ is None or error.__traceback__.tb_next is not None:  # raised inside the method
+            raise
+        raise InputError(f"{type(owner).__name__}.{method} cannot be called ({error}): define {remedy}") from error
+
+
+class Mistakes:
+    """Collects the errors of checks that do not depend on each other, so that all are reported at once."""
+
+    def __init__(self) -> None:
+        self._found: list[InputError] = []
+
+    @contextmanager
+    def collected(self) -> Iterator[None]:
+        """Keep an InputError of this context for later."""
+        try:
+            yield
+        except InputError as error:
+            self._found.append(error)
+
+    def raise_all(self) -> None:
+        """Raise the only error that was found, or one whose message has a line for each."""
+        if len(self._found) == 1:
+            raise self._found[0]
+        messages = list(dict.fromkeys(map(str, self._found)))
+        # one error may be found by a check of the scene and by one of its body
+        lines = [each for each in messages if not any(other in each and each != other for other in messages)]
+        if lines:
+            raise InputError("\n".join(lines)) from self._found[0]
 
 
 @contextmanager

@@ -13,7 +13,7 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 
 from bemkit.arrays import FloatArray
-from bemkit.errors import InputError
+from bemkit.errors import InputError, called
 from bemkit.formulas import ScalarField, check_field, evaluate_field
 
 FACING_TOLERANCE = 1e-3
@@ -97,20 +97,16 @@ def measure_contact(obstacle: Obstacle, points: FloatArray, normals: FloatArray)
 def _measured(
     obstacle: Obstacle, name: str, points: FloatArray, normals: FloatArray, shape: tuple[int, ...]
 ) -> FloatArray:
-    full_name = f"{type(obstacle).__name__}.{name}"
-    try:
-        values = getattr(obstacle, name)(points, normals)
-    except TypeError as error:
-        if error.__traceback__ is None or error.__traceback__.tb_next is not None:  # raised inside the method
-            raise
-        raise InputError(
-            f"{full_name} cannot be called with two arrays ({error}): define {name}(self, points, normals) for arrays "
-            f"of the shape (n, 2), which returns the shape {'(n,)' if len(shape) == 1 else '(n, 2)'}"
-        ) from error
+    remedy = (
+        f"{name}(self, points, normals) for arrays of the shape (n, 2), which returns the shape "
+        f"{'(n,)' if len(shape) == 1 else '(n, 2)'}"
+    )
+    values = called(obstacle, name, (points, normals), remedy)
     found = np.asarray(values, dtype=float)
     if found.shape != shape:
         raise InputError(
-            f"{full_name} returned an array of the shape {found.shape}: return the shape {shape} for {shape[0]} points"
+            f"{type(obstacle).__name__}.{name} returned an array of the shape {found.shape}: return the shape {shape} "
+            f"for {shape[0]} points"
         )
     return found
 

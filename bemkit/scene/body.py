@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -19,7 +19,7 @@ from bemkit.scene.conditions import Clamped, Contact, Free, Part, PrescribedDisp
 from bemkit.scene.copies import Copies
 from bemkit.scene.discretisation import Discretisation
 from bemkit.scene.mesh_options import MeshOptions
-from bemkit.scene.objects import check_objects
+from bemkit.scene.objects import check_objects, outline_of
 from bemkit.scene.plane_motion import FarField
 from bemkit.scene.steps import check_names
 
@@ -118,7 +118,7 @@ class Body:
                     kind = type(part.condition).__name__
                     raise InputError(f"part {self.name}.{name} is {kind}: a part in contact with a body must be free")
                 return part
-        known = [*(part.name for part in self.parts), *(sides := self.shape.outline().selectable_names)]
+        known = [*(part.name for part in self.parts), *(sides := outline_of(self.shape).selectable_names)]
         named = () if name == _ALL_SIDES else tuple(side.strip() for side in name.split(","))
         for side in named:
             if side not in sides:
@@ -135,6 +135,21 @@ def lines_across(body: Body, symmetry: Symmetry | None) -> Symmetry | None:
     places = zip((symmetry.x, symmetry.y), (low + margin).tolist(), (high - margin).tolist(), strict=True)
     x, y = (place if place is not None and below < place < above else None for place, below, above in places)
     return None if x is None and y is None else Symmetry(x, y)
+
+
+def check_accuracy(mesh: MeshOptions, bodies: Sequence[Body]) -> None:
+    """Raise InputError if an accuracy of all bodies goes with a degree or a mesh of one of them."""
+    for body in bodies if mesh.accuracy is not None else ():
+        if mesh.rising_degrees and body.discretisation is not None:
+            raise InputError(
+                f"body {body.name!r} has a fixed degree, the scene rising degrees: degrees rise for all bodies "
+                "or for none: give only the scene a discretisation"
+            )
+        if body.mesh is not None:
+            raise InputError(
+                f"mesh.accuracy is {mesh.accuracy}, and body {body.name!r} has mesh options of its own: give one of "
+                "them"
+            )
 
 
 def check_place(body: Body, symmetry: Symmetry) -> None:

@@ -11,7 +11,7 @@ import numpy as np
 from bemkit.arrays import FloatArray, IntArray
 from bemkit.contact.laws import FrictionLaw
 from bemkit.contact.problem import LawError
-from bemkit.errors import InputError
+from bemkit.errors import InputError, Mistakes
 from bemkit.formulas import choices
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.meshing.discretise import discretise
@@ -83,32 +83,43 @@ class BodyScene:
     depth: float
 
     def __post_init__(self) -> None:
-        check_laws({f"law of part {name!r}": law for name, law in self.laws.items()}, self.steps)
+        outline, mistakes = self.shape.outline(), Mistakes()
+        with mistakes.collected():
+            check_laws({f"law of part {name!r}": law for name, law in self.laws.items()}, self.steps)
         if self.mesh.accuracy is not None:
-            self._check_accuracy(self.mesh.accuracy)
-        outline = self.shape.outline()
+            with mistakes.collected():
+                self._check_accuracy(self.mesh.accuracy)
         if outline.surface is not None or self.far is not None:
-            _check_half_plane(outline, self.far, self.discretisation, self.mesh, self.parts)
+            with mistakes.collected():
+                _check_half_plane(outline, self.far, self.discretisation, self.mesh, self.parts)
+        with mistakes.collected():
+            self._check_rigid_connections(outline)
+        if self.units is not None:
+            with mistakes.collected():
+                if outline.drawing is not None:
+                    check_length_of_file(outline.drawing.unit, self.units)
+                check_profiles(self.parts, self.units)
+        with mistakes.collected():
+            self._check_body_forces(outline)
+        for part in self.parts:
+            with mistakes.collected():
+                _check_sides(part, outline.selectable_names)
+        mistakes.raise_all()
+
+    def _check_rigid_connections(self, outline: Outline) -> None:
         rigid = [part.name for part in self.parts if isinstance(part.condition, RigidConnection)]
         if rigid and (outline.surface is not None or self.symmetry is not None):
             where = "a half-plane" if self.symmetry is None else "a symmetric body"
             raise InputError(
                 f"part {rigid[0]!r} is a rigid connection, which {where} cannot have: give is_rigid = false"
             )
-        if self.units is not None and outline.drawing is not None:
-            check_length_of_file(outline.drawing.unit, self.units)
-        if self.units is not None:
-            check_profiles(self.parts, self.units)
+
+    def _check_body_forces(self, outline: Outline) -> None:
         if self.body_forces and outline.is_exterior:
             raise InputError(
                 f"body_forces is {self.body_forces!r}, but the body has no end: nothing holds its infinite weight, and "
                 "heat expands it without bound: remove the body forces, or give a bounded shape"
             )
-        names = outline.selectable_names
-        for part in self.parts:
-            for side in part.sides:
-                if side not in names:
-                    raise InputError(f"part {part.name!r}: unknown side {side!r}: the sides are {choices(side, names)}")
 
     def _check_accuracy(self, accuracy: float) -> None:
         if self.mesh.rising_degrees and not isinstance(self.discretisation, Galerkin):
@@ -237,6 +248,12 @@ class BodyScene:
 
             check_symmetry(self, mesh)
         return mesh
+
+
+def _check_sides(part: Part, names: tuple[str, ...]) -> None:
+    for side in part.sides:
+        if side not in names:
+            raise InputError(f"part {part.name!r}: unknown side {side!r}: the sides are {choices(side, names)}")
 
 
 def _check_half_plane(

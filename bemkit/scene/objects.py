@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping
 from types import MappingProxyType
 from typing import Any
 
-from bemkit.errors import InputError
+from bemkit.errors import InputError, called
 from bemkit.geometry.outline import Outline
 from bemkit.geometry.shapes import Shape
 
@@ -31,8 +31,8 @@ _SEVERAL = ("parts", "steps", "load_factors", "body_forces", "bodies", "rigid", 
 
 
 def outline_of(shape: Shape) -> Outline:
-    """Return the outline of a shape; InputError if a shape of one's own returns anything else."""
-    outline: object = shape.outline()
+    """Return the outline of a shape; InputError if that of one's own takes arguments or returns anything else."""
+    outline: object = called(shape, "outline", (), "outline(self), which returns a bemkit.geometry.outline.Outline")
     if not isinstance(outline, Outline):
         raise InputError(
             f"{type(shape).__name__}.outline returned a {type(outline).__name__}: "

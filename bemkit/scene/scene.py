@@ -15,14 +15,14 @@ import numpy as np
 
 from bemkit.arrays import FloatArray
 from bemkit.contact.laws import FrictionLaw, Frictionless
-from bemkit.errors import InputError
+from bemkit.errors import InputError, Mistakes
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.shapes import Shape
 from bemkit.geometry.symmetry import Symmetry
 from bemkit.notebook import ShownInNotebooks
 from bemkit.operators.linear.solvers import Automatic, LinearSolverChoice
 from bemkit.operators.material import Material
-from bemkit.scene.body import Body, check_place, lines_across
+from bemkit.scene.body import Body, check_accuracy, check_place, lines_across
 from bemkit.scene.body_forces import BodyForce
 from bemkit.scene.body_scene import BodyScene
 from bemkit.scene.conditions import Contact, Force, Free, Part
@@ -145,28 +145,41 @@ class Scene(ShownInNotebooks):
             raise InputError(f"thickness is {self.thickness}: give a positive length, or omit it")
         _ = self.result_units
         self._check_form()
-        check_steps(self.load_factors, self.steps)
+        mistakes = Mistakes()
+        with mistakes.collected():
+            check_steps(self.load_factors, self.steps)
+        with mistakes.collected():
+            check_accuracy(self.mesh, self.bodies)
+        for check in (self._check_names, self._check_contacts, self._check_symmetry):
+            with mistakes.collected():
+                check()
+        for body in self.placed_bodies:
+            with mistakes.collected():
+                scene = self.scene_of(body)  # parts and sides are checked
+                if len(self.placed_bodies) > 1:
+                    scene.check_among_others(body.name)
+        mistakes.raise_all()
+
+    def _check_names(self) -> None:
         for body in self.bodies:
             body.check_name()
         names = [*(body.name for body in self.placed_bodies), *(body.name for body in self.rigid)]
         check_names("bodies", names, "bodies")
         check_names("parts", (part.name for part in self.parts), "parts")
+
+    def _check_contacts(self) -> None:
         laws = {f"law of contact {pair.name!r}": self.law_of(pair) for pair in self.contacts}
         check_laws(({"law": self.law} if self.bodies else {}) | laws, self.steps)
         if not self.has_contact:
             self._check_without_contact()
         check_contacts(self.contacts, self.rigid, self._by_name, self._side_names)
+
+    def _check_symmetry(self) -> None:
         if self.symmetry is not None and self.bodies:
             if self.rigid:
                 raise InputError("symmetry goes only with elastic bodies: remove it, or the rigid bodies")
             for body in self.placed_bodies:
                 check_place(body, self.symmetry)
-        if self.mesh.accuracy is not None:
-            self._check_accuracy(self.mesh.accuracy)
-        for body in self.placed_bodies:
-            scene = self.scene_of(body)  # parts and sides are checked
-            if len(self.placed_bodies) > 1:
-                scene.check_among_others(body.name)
 
     def __getstate__(self) -> dict[str, Any]:
         """Pickle the fields only: what is cached is known by the identity of objects."""
@@ -195,23 +208,11 @@ class Scene(ShownInNotebooks):
             if getattr(self, name) != default:
                 raise InputError(f"{name} is {getattr(self, name)!r}, but {remedy.format(name=name)}")
 
-    def _check_accuracy(self, accuracy: float) -> None:
-        for body in self.bodies:
-            if self.mesh.rising_degrees and body.discretisation is not None:
-                raise InputError(
-                    f"body {body.name!r} has a fixed degree, the scene rising degrees: degrees rise for all bodies "
-                    "or for none: give only the scene a discretisation"
-                )
-            if body.mesh is not None:
-                raise InputError(
-                    f"mesh.accuracy is {accuracy}, and body {body.name!r} has mesh options of its own: give one of them"
-                )
-
     def _side_names(self, body: Body) -> tuple[tuple[str, str], ...]:
         """Return the name and the group of each side of a body; copies share them, since making an outline is slow."""
         if id(body.shape) not in self._sides:
             self._sides[id(body.shape)] = tuple(
-                (side.name, side.group or side.name) for side in body.shape.outline().sides
+                (side.name, side.group or side.name) for side in outline_of(body.shape).sides
             )
         return self._sides[id(body.shape)]
 
@@ -362,7 +363,8 @@ class Scene(ShownInNotebooks):
         except InputError as error:
             if not body.name:
                 raise
-            raise type(error)(f"body {body.name!r}: {error}") from error
+            lines = (f"body {body.name!r}: {line}" for line in str(error).splitlines())
+            raise type(error)("\n".join(lines)) from error
 
     def rigid_body_of(self, pair: ContactPair) -> RigidBody:
         """Return the rigid body of a contact that has one."""

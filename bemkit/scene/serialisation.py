@@ -117,7 +117,8 @@ def _made(at: _Place, function: Callable[..., Any], *arguments: Any, **values: A
     except (StructureError, RecursionError):
         raise
     except Exception as error:  # any error of a constructor rejects the text
-        raise StructureError([f"{at.path}: {error}" if at.path else str(error)]) from error
+        begin = f"{at.path}: " if at.path else ""
+        raise StructureError([begin + line for line in str(error).splitlines() or [""]]) from error
 
 
 def _structured_all(entries: Mapping[Any, tuple[object, Any, _Place]], mistakes: Iterable[str] = ()) -> dict[Any, Any]:

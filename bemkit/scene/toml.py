@@ -159,7 +159,7 @@ def scene_from_table(table: dict[str, Any], folder: Path | None = None) -> Scene
     except StructureError as error:
         raise SceneError("\n".join(map(printable, error.mistakes))) from error
     except InputError as error:
-        raise SceneError(printable(str(error))) from error
+        raise SceneError("\n".join(map(printable, str(error).splitlines()))) from error
     return scene
 
 

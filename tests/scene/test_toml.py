@@ -212,6 +212,21 @@ def test_friction_may_vary_from_node_to_node() -> None:
 CONTACT = '{ kind = "contact", obstacle = { kind = "half-plane", point = [0.0, 0.0], normal = [0.0, 1.0] } }'
 
 
+def test_mistakes_that_only_the_whole_scene_shows_are_listed_together() -> None:
+    text = (
+        BLOCK.replace('"bottom"', '"botom"').replace('"top"', '"tpo"')
+        + "\n[[steps]]\ntime = 1.0\n[[steps]]\ntime = 2.0\n"
+    )
+    text = f"load_factors = [1.0, 2.0]\n{text}"
+    with pytest.raises(SceneError) as caught:
+        scene_from_toml(text, name="my.toml")
+    heading, *mistakes = str(caught.value).splitlines()
+    assert heading == "my.toml: 3 mistakes"
+    assert mistakes[0].startswith("  load_factors is (1.0, 2.0) besides 2 steps: give each step its load_factor")
+    assert mistakes[1].startswith("  part 'foundation': unknown side 'botom'")
+    assert mistakes[2].startswith("  part 'top-load': unknown side 'tpo'")
+
+
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [

@@ -222,6 +222,24 @@ def test_a_shape_that_returns_no_outline_is_refused_before_the_run() -> None:
         _ = replace(bk.load_scene("paper-1"), shape=Own(lambda: 3)).only
 
 
+@dataclass(frozen=True)
+class WithArguments:
+    """A shape whose outline takes an argument."""
+
+    def outline(self, scale: float) -> Outline:
+        return bk.Rectangle(scale, scale).outline()
+
+
+def test_a_shape_whose_outline_takes_arguments_is_refused_before_the_run() -> None:
+    message = r"WithArguments.outline cannot be called \(.*'scale'\): define outline\(self\), which returns a bemkit"
+    scene, shape = bk.load_scene("paper-1"), WithArguments()
+    with pytest.raises(bk.InputError, match=message):
+        replace(scene, shape=shape)  # type: ignore[arg-type]
+    two = bk.load_scene("two-cylinders")
+    with pytest.raises(bk.InputError, match=message):
+        replace(two, bodies=tuple(replace(body, shape=shape) for body in two.bodies))  # type: ignore[arg-type]
+
+
 def test_a_single_point_has_a_distance() -> None:
     """Newton's steps are limited by the spread of points, which a single one does not have."""
     distance = bk.SignedDistance(bk.Expression("sqrt(x**2 + (y + 1)**2) - 0.5"))
