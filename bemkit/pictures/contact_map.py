@@ -43,7 +43,8 @@ def draw_contact_map(solution: Result, axes: Axes | None = None, *, units: UnitN
 
     scene, table = shown(solution), solution.contact
     units = units or solution.units
-    points, pressure = node_points(table), np.maximum(-table.sigma_n, 0.0)
+    nodes = contact_nodes(solution, scene, 0.0)
+    points, pressure = nodes.points, np.maximum(-table.sigma_n, 0.0)[nodes.rows]
     largest = float(pressure.max(initial=0.0))
     title = f"Contacts, pressure up to {amount(largest, 'stress', units)}\n{scene.title}"
     axes = plane_axes(axes, scene.frame, title, units)
@@ -52,8 +53,8 @@ def draw_contact_map(solution: Result, axes: Axes | None = None, *, units: UnitN
     draw_rigid_bodies(axes, scene, 0.0)
     draw_obstacles(axes, scene)
     length = _longest_tooth(scene) * pressure / (largest or 1.0)
-    tips = points - length[:, None] * solution.contact_directions
-    words = np.array(table.status_words())
+    tips = points - length[:, None] * nodes.directions
+    words = np.array(table.status_words())[nodes.rows]
     for word, colour in STATUS_COLOURS.items():
         own = words == word
         if own.any():
@@ -73,7 +74,7 @@ def _longest_tooth(scene: DrawnScene) -> float:
 def is_short(solution: Result) -> bool:
     """Return whether the contact that is closed takes a small share of the picture of all bodies."""
     scene = shown(solution)
-    frame = _zone(scene.contact)
+    frame = _zone(scene.contact, contact_nodes(solution, scene, 0.0))
     return frame is not None and float(np.hypot(*np.ptp(frame, axis=1))) < SHORT * scene.size
 
 
@@ -88,7 +89,7 @@ def draw_zoom(solution: Result, axes: Axes | None = None, *, units: UnitNames | 
         As for `bemkit.pictures.deformation.draw_deformation`.
     """
     scene = shown(solution)
-    frame = _zone(scene.contact)
+    frame = _zone(scene.contact, contact_nodes(solution, scene, 0.0))
     if frame is None:
         frame = joined_frame(node_points(scene.contact))
     size = max(float(np.ptp(frame, axis=1).max()), _NODES_AROUND * float(scene.contact.weight.max()))
@@ -101,15 +102,21 @@ def draw_zoom(solution: Result, axes: Axes | None = None, *, units: UnitNames | 
     draw_rigid_bodies(axes, scene, factor)
     set_frame(axes, frame, margin=0.0)
     draw_obstacles(axes, scene)
-    _draw_nodes(axes, contact_nodes(solution, scene, factor), np.array(scene.contact.status_words()), size)
+    nodes = contact_nodes(solution, scene, factor)
+    _draw_nodes(axes, nodes, np.array(scene.contact.status_words())[nodes.rows], size)
     legend_below(axes)
     return axes
 
 
-def _zone(contact: ContactTable) -> FloatArray | None:
-    """Return the frame of the nodes that touch, None if there are none."""
+def _zone(contact: ContactTable, nodes: Nodes) -> FloatArray | None:
+    """Return the frame of the nodes that touch, with images not farther away than its size; None if there are none."""
     closed = is_closed(contact)
-    return joined_frame(node_points(contact)[closed]) if closed.any() else None
+    if not closed.any():
+        return None
+    frame = joined_frame(node_points(contact)[closed])
+    reach = np.ptp(frame, axis=1).max()
+    is_near = np.all((nodes.points >= frame[:, 0] - reach) & (nodes.points <= frame[:, 1] + reach), axis=1)
+    return joined_frame(nodes.points[closed[nodes.rows] & is_near])
 
 
 def _draw_nodes(axes: Axes, nodes: Nodes, words: Any, size: float) -> None:

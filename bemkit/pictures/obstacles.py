@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -19,6 +20,7 @@ from bemkit.pictures.drawing import GREY, Axes
 from bemkit.pictures.plane import set_frame
 from bemkit.pictures.shown import DrawnScene
 from bemkit.scene.conditions import Contact
+from bemkit.scene.plane_motion import RigidBody
 
 if TYPE_CHECKING:
     from matplotlib.patches import Patch
@@ -38,23 +40,35 @@ def draw_obstacles(axes: Axes, shown: DrawnScene) -> None:
 
     One that is given by its gap is drawn where it faces the body: at the distance of the gap from each point.
     """
-    frame = _frame(axes)
+    frame, label = _frame(axes), "obstacle"
+    for loops, is_whole in fixed_obstacles(shown, frame):
+        if is_whole:
+            _draw_hatched(axes, loops, frame, label)
+        else:
+            _draw(axes, loops, _FILLED | {"hatch": "//", "edgecolor": _HATCH, "linewidth": 0.0}, label)
+            for band in loops:
+                axes.plot(*band[: len(band) // 2].T, color=_EDGE, linewidth=1.0, zorder=0.5)
+        label = ""
+    set_frame(axes, frame, margin=0.0)
+
+
+def fixed_obstacles(shown: DrawnScene, frame: FloatArray) -> Iterator[tuple[list[FloatArray], bool]]:
+    """Yield the loops (n, 2) [m] that the obstacles of all contact parts fill, and whether they are their outlines.
+
+    The outline of an obstacle of several parts is yielded once. Others are bands where they face a part.
+    """
     drawn: list[object] = []
     for body in shown.bodies:
         for part, elements in body.parts:
             if not isinstance(part.condition, Contact):
                 continue
-            obstacle, label = part.condition.obstacle, None if drawn else "obstacle"
+            obstacle = part.condition.obstacle
             if loops := outline_of(obstacle, frame):
                 if not any(obstacle is other for other in drawn):
-                    _draw_hatched(axes, _with_outside(loops, obstacle, frame), frame, label)
-                drawn.append(obstacle)
+                    drawn.append(obstacle)
+                    yield _with_outside(loops, obstacle, frame), True
             elif bands := facing_bands(obstacle, body.mesh, elements, _BAND * shown.size):
-                _draw(axes, bands, _FILLED | {"hatch": "//", "edgecolor": _HATCH, "linewidth": 0.0}, label)
-                for band in bands:
-                    axes.plot(*band[: len(band) // 2].T, color=_EDGE, linewidth=1.0, zorder=0.5)
-                drawn.append(obstacle)
-    set_frame(axes, frame, margin=0.0)
+                yield bands, False
 
 
 def facing_bands(obstacle: Obstacle, mesh: BoundaryMesh, elements: IntArray, thickness: float) -> list[FloatArray]:
@@ -108,23 +122,27 @@ def draw_rigid_bodies(axes: Axes, shown: DrawnScene, factor: float) -> None:
     frame = _frame(axes)
     farthest = 0.5 * float(np.ptp(frame, axis=1).max())
     widest = np.stack([frame[:, 0] - farthest, frame[:, 1] + farthest], axis=1)
-    is_labelled = False
-    for body, result in shown.rigid:
-        loops = outline_of(body.obstacle, widest)
-        if not loops:
-            continue
-        motion = factor * np.array([result.x, result.y, result.turn])
-        moved = [loop + body.motions_at(loop) @ motion for loop in loops]
-        _draw(axes, loops, _BEFORE, None)
-        filled = _with_outside(moved, body.obstacle, widest)
-        _draw_hatched(axes, filled, frame, None if is_labelled else "rigid body")
-        is_labelled = True
+    label = "rigid body"
+    for body, loops, moved in rigid_bodies(shown, factor, widest):
+        _draw(axes, loops, _BEFORE, "")
+        _draw_hatched(axes, _with_outside(moved, body.obstacle, widest), frame, label)
+        label = ""
         if not _is_endless(body.obstacle):
             places = np.clip(np.concatenate([*loops, *moved]), widest[:, 0], widest[:, 1])
             frame = np.stack(
                 [np.minimum(frame[:, 0], places.min(axis=0)), np.maximum(frame[:, 1], places.max(axis=0))], axis=1
             )
     set_frame(axes, frame, margin=0.0)
+
+
+def rigid_bodies(
+    shown: DrawnScene, factor: float, frame: FloatArray
+) -> Iterator[tuple[RigidBody, list[FloatArray], list[FloatArray]]]:
+    """Yield rigid bodies of known shape with their loops (n, 2) [m], and those moved by a factor times their motion."""
+    for body, result in shown.rigid:
+        if loops := outline_of(body.obstacle, frame):
+            motion = factor * np.array([result.x, result.y, result.turn])
+            yield body, loops, [loop + body.motions_at(loop) @ motion for loop in loops]
 
 
 def outline_of(obstacle: object, frame: FloatArray) -> list[FloatArray]:
@@ -208,7 +226,7 @@ def _is_endless(obstacle: object) -> bool:
     return isinstance(obstacle, RigidHalfPlane) or (isinstance(obstacle, RigidSpline) and not obstacle.is_closed)
 
 
-def _draw_hatched(axes: Axes, loops: list[FloatArray], frame: FloatArray, label: str | None) -> None:
+def _draw_hatched(axes: Axes, loops: list[FloatArray], frame: FloatArray, label: str) -> None:
     """Fill loops, and hatch what lies close to them: a zoom shows more of an obstacle than of the body."""
     from matplotlib.collections import PatchCollection
     from matplotlib.patches import PathPatch
@@ -233,7 +251,7 @@ def _draw_hatched(axes: Axes, loops: list[FloatArray], frame: FloatArray, label:
     hatching.set_clip_path(outline)
 
 
-def _draw(axes: Axes, loops: list[FloatArray], style: dict[str, Any], label: str | None) -> Patch:
+def _draw(axes: Axes, loops: list[FloatArray], style: dict[str, Any], label: str) -> Patch:
     from matplotlib.patches import PathPatch
     from matplotlib.path import Path
 

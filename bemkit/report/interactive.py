@@ -1,4 +1,4 @@
-"""A drawing to explore inside a page: outlines and contact tractions with their values, and a slider over load steps.
+"""A drawing to explore inside a page: bodies, obstacles, contact tractions, their values, a slider over load steps.
 
 plotly draws it in the browser. The page holds the library, compressed, and loads nothing from elsewhere.
 """
@@ -7,8 +7,9 @@ from __future__ import annotations
 
 import gzip
 from base64 import b64encode
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from importlib.util import find_spec
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -17,8 +18,11 @@ from bemkit.arrays import FloatArray
 from bemkit.errors import InputError
 from bemkit.pictures.abscissa import Abscissa
 from bemkit.pictures.contact_axes import STATUS_COLOURS
+from bemkit.pictures.contact_nodes import images_of
 from bemkit.pictures.drawing import BLUE, GREY, VERMILION
 from bemkit.pictures.magnification import magnification
+from bemkit.pictures.obstacles import fixed_obstacles, relief_frame, rigid_bodies
+from bemkit.pictures.plane import joined_frame
 from bemkit.pictures.shown import DrawnScene, Result, shown
 from bemkit.pictures.traction_curves import traction_curve
 from bemkit.report.html import Element, element
@@ -27,6 +31,10 @@ from bemkit.scene.unit_names import UnitNames, with_unit
 from bemkit.stopwatch import announce
 from bemkit.table import Column, Table
 
+_COMPONENTS: Mapping[str, tuple[int, ...]] = MappingProxyType(
+    {"u_x": (0,), "t_x": (0,), "u_y": (1,), "t_y": (1,), "sigma_xy": (0, 1)}
+)
+"""Components x and y in a column: those of which an image by symmetry changes the sign."""
 _UNPACK = """
 const packed = document.getElementById("packed-drawing").textContent;
 const bytes = Uint8Array.from(atob(packed), (letter) => letter.charCodeAt(0));
@@ -84,7 +92,12 @@ def interactive_figure(result: Result) -> Any:
     bodies = [shown(step) for step in steps]
     factor = min(map(magnification, bodies))
     parts = tuple(dict.fromkeys(part for step in steps for part in step.contact.parts))
-    frames = [_traces(step, body, factor, parts) for step, body in zip(steps, bodies, strict=True)]
+    relief = relief_frame(bodies[-1], factor)
+    frame = _with_margin(_frame(bodies, factor) if relief is None else relief)
+    frames = [
+        [*_obstacle_traces(body, factor, frame), *_traces(step, body, factor, parts)]
+        for step, body in zip(steps, bodies, strict=True)
+    ]
     n_rows = 2 if parts else 1
     figure: Figure = make_subplots(rows=n_rows, cols=1, row_heights=[0.6, 0.4][:n_rows], vertical_spacing=0.14)
     figure.add_traces(frames[-1])
@@ -92,8 +105,10 @@ def interactive_figure(result: Result) -> Any:
     figure.update_layout(
         height=450 * n_rows, title=name, hovermode="closest", template="plotly_white", margin={"l": 70, "r": 20}
     )
-    figure.update_xaxes(title=with_unit("x", "length", units), row=1, col=1)
-    figure.update_yaxes(title=with_unit("y", "length", units), scaleanchor="x", row=1, col=1)
+    along_x, along_y = frame.tolist()
+    figure.update_xaxes(title=with_unit("x", "length", units), range=along_x, row=1, col=1)
+    equal = "x" if relief is None else None
+    figure.update_yaxes(title=with_unit("y", "length", units), range=along_y, scaleanchor=equal, row=1, col=1)
     if parts:
         labels = {Abscissa.along(step, part).label(units) for step in steps for part in step.contact.parts}
         title = labels.pop().replace("$", "") if len(labels) == 1 else with_unit("x or arc length", "length", units)
@@ -116,20 +131,59 @@ def _slider(count: int) -> dict[str, Any]:
 
 
 def _traces(step: Result, bodies: DrawnScene, factor: float, parts: Sequence[str]) -> list[dict[str, Any]]:
-    """Return outlines, centres of elements and, for each contact, its tractions: as many for each step."""
-    boundary = table_of(step, "boundary")
+    """Return outlines, centres of elements, also of images by symmetry, and tractions of each contact."""
+    boundary = _with_images(table_of(step, "boundary"), step)
     at = np.array([boundary.values("x"), boundary.values("y")])
     at += factor * np.array([boundary.values("u_x"), boundary.values("u_y")])
     initial, deformed = (_joined(loop for body in bodies.bodies for loop in body.outlines(by)) for by in (0.0, factor))
-    without_hover = {"type": "scatter", "mode": "lines", "hoverinfo": "skip", "xaxis": "x", "yaxis": "y"}
     traces: list[dict[str, Any]] = [
-        without_hover | _along(initial) | {"name": "initial", "line": {"color": GREY, "dash": "dash", "width": 1}},
-        without_hover | _along(deformed) | {"name": "deformed", "line": {"color": BLUE}},
+        _line(initial, "initial", {"color": GREY, "dash": "dash", "width": 1}),
+        _line(deformed, "deformed", {"color": BLUE}),
         _markers(at[0], at[1], _texts(boundary, step.units), "elements", "y") | {"marker": {"size": 5, "color": BLUE}},
     ]
     for part in parts:
         traces += _contact_traces(step, part)
     return traces
+
+
+def _frame(steps: Sequence[DrawnScene], factor: float) -> FloatArray:
+    """Return the frame (2, 2) [m] of all bodies, elastic and rigid, in all steps; what has no end is cut."""
+    widest = steps[0].frame + 0.5 * np.ptp(steps[0].frame, axis=1).max() * np.array([-1.0, 1.0])
+    loops = [loop for step in steps for body in step.bodies for loop in body.outlines(factor)]
+    for step in steps:
+        for _, before, moved in rigid_bodies(step, factor, widest):
+            loops += [np.clip(loop, widest[:, 0], widest[:, 1]) for loop in (*before, *moved)]
+    return joined_frame(steps[0].frame.T, *loops)
+
+
+def _with_margin(frame: FloatArray) -> FloatArray:
+    return np.asarray(frame + 0.06 * np.ptp(frame, axis=1)[:, None] * np.array([-1.0, 1.0]))
+
+
+def _obstacle_traces(bodies: DrawnScene, factor: float, frame: FloatArray) -> list[dict[str, Any]]:
+    """Return the obstacles and the rigid bodies of a scene, if it has any, filled."""
+    fixed = [loop for loops, _ in fixed_obstacles(bodies, frame) for loop in loops]
+    rigid = [loop for _, _, moved in rigid_bodies(bodies, factor, frame) for loop in moved]
+    named, filled = {"obstacles": fixed, "rigid bodies": rigid}, {"fill": "toself", "fillcolor": "#EDEDED"}
+    edge = {"color": "#555555", "width": 1}
+    return [_line(_joined(loops), name, edge) | filled for name, loops in named.items() if loops]
+
+
+def _with_images(boundary: Table, step: Result) -> Table:
+    """Return the table of elements with the images by symmetry of those of each body."""
+    columns = {head.name: np.array(boundary.values(head.name)) for head in boundary.columns}
+    tables, first = [], 0
+    for body in step.bodies.values():
+        rows, first = slice(first, first + body.mesh.n_elements), first + body.mesh.n_elements
+        own = {name: column[rows] for name, column in columns.items()}
+        tables.append(own)
+        for image, places in images_of(body.mesh.symmetry, np.stack([own["x"], own["y"]], axis=1)):
+            signs = {name: image[list(components)].prod() for name, components in _COMPONENTS.items()}
+            reflected = {name: sign * own[name] for name, sign in signs.items()}
+            tables.append(own | {"x": places[:, 0], "y": places[:, 1]} | reflected)
+    return Table.from_arrays(
+        boundary.columns, {name: np.concatenate([each[name] for each in tables]) for name in columns}
+    )
 
 
 def _contact_traces(step: Result, part: str) -> list[dict[str, Any]]:
@@ -152,10 +206,7 @@ def _contact_traces(step: Result, part: str) -> list[dict[str, Any]]:
         ("pressure", pressure, -step.contact.sigma_n[rows], BLUE),
         ("tangential traction", friction, sign * step.contact.sigma_t[rows], VERMILION),
     ):
-        curve_of = {"x": along, "y": values, "name": f"{name}, {part}", "line": {"color": colour}}
-        traces.append(
-            {"type": "scatter", "mode": "lines", "hoverinfo": "skip", "xaxis": "x2", "yaxis": "y2"} | curve_of
-        )
+        traces.append(_line(np.stack([along, values], axis=1), f"{name}, {part}", {"color": colour}, "2"))
         marker = {"size": 6, "color": colours, "line": {"color": colour, "width": 1}}
         traces.append(
             _markers(nodes, at_nodes, texts, f"nodes of {part}", "y2") | {"marker": marker, "showlegend": False}
@@ -186,5 +237,8 @@ def _joined(loops: Iterable[FloatArray]) -> FloatArray:
     return np.concatenate([np.concatenate([loop, np.full((1, 2), np.nan)]) for loop in loops])
 
 
-def _along(points: FloatArray) -> dict[str, FloatArray]:
-    return {"x": points[:, 0].astype(np.float32), "y": points[:, 1].astype(np.float32)}
+def _line(points: FloatArray, name: str, style: dict[str, Any], panel: str = "") -> dict[str, Any]:
+    """Return the trace of a line through points (n, 2), without texts under the pointer."""
+    x, y = points.astype(np.float32).T
+    own = {"x": x, "y": y, "name": name, "line": style, "xaxis": f"x{panel}", "yaxis": f"y{panel}"}
+    return {"type": "scatter", "mode": "lines", "hoverinfo": "skip"} | own

@@ -9,7 +9,9 @@ import matplotlib.colors
 import numpy as np
 import pytest
 from matplotlib.axes import Axes
+from matplotlib.collections import PathCollection
 from matplotlib.figure import Figure
+from matplotlib.quiver import Quiver
 
 import bemkit as bk
 from bemkit.pictures import (
@@ -19,6 +21,7 @@ from bemkit.pictures import (
     draw_contact_traction,
     draw_convergence,
     draw_friction_cone,
+    draw_zoom,
 )
 from bemkit.pictures.contact_axes import STATUS_COLOURS
 from bemkit.pictures.crowds import marked
@@ -207,3 +210,30 @@ def test_of_a_crowd_of_points_the_largest_of_those_that_hide_each_other_are_mark
     assert 70 < len(rows) < 90  # 80 across the width
     assert (sizes[rows] == 2.0).all()
     assert len(marked(points[:300], sizes[:300], 1.0)) == 300
+
+
+def test_images_by_symmetry_are_marked_like_the_solved_side() -> None:
+    block = bk.Scene(
+        title="block",
+        shape=bk.Rectangle(1.0, 1.0),
+        material=bk.Material(10.0, 0.2),
+        law=bk.Coulomb(0.5),
+        symmetry=bk.Symmetry(x=0.5),
+        parts=(
+            bk.Part("base", bk.Contact(bk.RigidHalfPlane()), ("bottom",)),
+            bk.Part("load", bk.Traction(y=-1.0), ("top",), bk.Expression("abs(x - 0.5) < 0.2")),
+        ),
+        mesh=bk.MeshOptions(elements=40),
+    )
+    solution = run(block)
+    n_nodes = 2 * solution.contact.n_contact - 1  # the node on the line is its own image
+    dots = [each for each in draw_contact_map(solution).collections if isinstance(each, PathCollection)]
+    x = np.sort(np.concatenate([np.asarray(each.get_offsets())[:, 0] for each in dots]))
+    assert x.size == n_nodes
+    np.testing.assert_allclose(x + x[::-1], 1.0, atol=1e-12)
+    axes = draw_zoom(solution)
+    np.testing.assert_allclose(np.mean(axes.get_xlim()), 0.5, atol=1e-12)
+    (arrows,) = [each for each in axes.collections if isinstance(each, Quiver)]
+    order = np.argsort(arrows.X + arrows.U)
+    np.testing.assert_allclose((arrows.U + arrows.U[order[::-1]][np.argsort(order)]), 0.0, atol=1e-12)
+    assert np.abs(arrows.U).max() > 0.01

@@ -24,6 +24,21 @@ from tests.report.test_page import CHROMIUM, QUIET, Page
 pytest.importorskip("plotly")
 from bemkit.report.interactive import interactive_figure
 
+PRESSED = """
+title = "die"
+mesh = { elements = 40 }
+law = { kind = "coulomb", friction_coefficient = 0.3 }
+[bodies.block]
+shape = { kind = "rectangle", width = 1.0, height = 1.0 }
+material = { youngs_modulus = 100.0, poisson_ratio = 0.3 }
+parts.base = { sides = ["bottom"], condition = "clamped" }
+[rigid.die]
+obstacle = { kind = "circle", centre = [0.5, 1.5], radius = 0.5 }
+y = -1e-4
+[[contacts]]
+sides = ["block.top", "die"]
+"""
+
 
 @pytest.fixture(scope="module")
 def solution() -> bk.Solution:
@@ -86,6 +101,64 @@ def test_bodies_without_contact_have_one_panel() -> None:
     figure = interactive_figure(bk.run(with_overrides(bk.load_scene("bending"), elements=20)))
     assert len(figure.data) == 3
     assert len(figure.data[2].text) == 20
+
+
+def named(figure: Any, name: str) -> Any:
+    return next(trace for trace in figure.data if trace.name == name)
+
+
+def test_obstacles_are_drawn_where_they_are(figure: Any) -> None:
+    floor = named(figure, "obstacles")
+    assert floor.fill == "toself"
+    assert np.nanmax(floor.y) == 0.0
+    low, high = figure.layout.xaxis.range
+    assert np.nanmin(floor.x) < low < 0.0 < 1.0 < high < np.nanmax(floor.x)
+    assert figure.layout.yaxis.scaleanchor == "x"
+
+
+def test_rigid_bodies_are_drawn_where_they_move() -> None:
+    """A rigid circle is pushed down into a block; displacements are drawn as large as the title states."""
+    scene = bk.scene_from_toml(PRESSED)
+    solution = bk.run(scene)
+    figure = interactive_figure(solution)
+    factor = float(figure.layout.title.text.split("\u00d7")[1])
+    circle = named(figure, "rigid bodies")
+    moved = solution.rigid["die"]
+    assert factor > 1.0
+    assert moved.y < 0.0
+    points = np.stack([circle.x, circle.y], axis=1).astype(float)
+    distance = np.hypot(*(points[~np.isnan(points[:, 0])] - [0.5, 1.5 + factor * moved.y]).T)
+    np.testing.assert_allclose(distance, 0.5, atol=1e-6)  # single precision
+
+
+def test_images_by_symmetry_have_values() -> None:
+    block = bk.scene_from_toml(PRESSED).bodies[0]
+    half = bk.Scene(
+        title="half",
+        shape=block.shape,
+        material=block.material,
+        parts=(*block.parts, bk.Part("load", bk.Traction(y=-1.0), ("top",), bk.Expression("abs(x - 0.5) < 0.25"))),
+        symmetry=bk.Symmetry(x=0.5),
+        mesh=bk.MeshOptions(elements=40),
+    )
+    solution = bk.run(half)
+    elements = named(interactive_figure(solution), "elements")
+    n = solution.mesh.n_elements
+    assert len(elements.x) == len(elements.text) == 2 * n
+    np.testing.assert_allclose(elements.x[n:], 1.0 - elements.x[:n], atol=1e-15)
+    np.testing.assert_array_equal(elements.y[n:], elements.y[:n])
+    for text, image in zip(elements.text[:n], elements.text[n:], strict=True):
+        own, other = lines(text), lines(image)
+        assert float(other["x"]) == pytest.approx(1.0 - float(own["x"]), abs=1e-4)  # four digits
+        for name, sign in (("u_x", -1), ("t_x", -1), ("sigma_xy", -1), ("u_y", 1), ("t_y", 1), ("von_mises", 1)):
+            assert float(other[name]) == sign * float(own[name])
+
+
+def test_a_rough_surface_fills_the_height() -> None:
+    figure = interactive_figure(bk.run(with_overrides(bk.load_scene("rough-surface"), elements=128)))
+    assert figure.layout.yaxis.scaleanchor is None
+    low, high = figure.layout.yaxis.range
+    assert high - low < 0.05
 
 
 @pytest.mark.slow
