@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import TYPE_CHECKING
+
+from bemkit.errors import BemkitError, NoResultError
 
 if TYPE_CHECKING:
     from bemkit.results.solution import Solution
@@ -21,3 +24,13 @@ def exit_code_of(solution: Solution) -> int:
     if solution.is_converged:
         return 0
     return INACCURATE if solution.is_certified else NOT_CONVERGED
+
+
+def exit_code_of_error(error: BemkitError) -> int:
+    """Return the exit code of a command that an error ends."""
+    return NOT_CONVERGED if isinstance(error, NoResultError) else BAD_INPUT
+
+
+def most_serious(codes: Iterable[int]) -> int:
+    """Return the exit code of a command that did several things: bad input is more serious than no convergence."""
+    return max(codes, key=(0, INACCURATE, NOT_CONVERGED, BAD_INPUT).index)

@@ -16,9 +16,9 @@ from typing import NoReturn
 
 import click
 
-from bemkit.cli.exit_codes import BAD_INPUT, INTERRUPTED, NOT_CONVERGED, PIPE_CLOSED, TERMINATED
-from bemkit.cli.streams import PipeClosedError, guarded_streams
-from bemkit.errors import BemkitError, NoResultError, one_line, printable
+from bemkit.cli.exit_codes import BAD_INPUT, INTERRUPTED, PIPE_CLOSED, TERMINATED, exit_code_of_error
+from bemkit.cli.streams import PipeClosedError, complain, guarded_streams
+from bemkit.errors import BemkitError, one_line
 from bemkit.version import __version__
 
 _COMMANDS = {
@@ -33,7 +33,7 @@ _COMMANDS = {
     "plan": ("plan", "List the steps of a solve with time and memory, and skipped steps with the reason."),
     "plot": ("plot", "Draw a result or a scene."),
     "report": ("report", "Write an HTML page on a result or a scene."),
-    "run": ("run", "Solve a scene."),
+    "run": ("run", "Solve scenes."),
     "scenes": ("listings", "List the scenes that come with bemkit."),
     "schema": ("listings", "Print the JSON schema of scene files, for editors."),
     "show": ("show", "Show a result file."),
@@ -69,19 +69,19 @@ def _run_to_end(arguments: list[str] | None) -> int:
     except click.ClickException as error:
         context = getattr(error, "ctx", None)
         hint = f" (see {context.command_path} --help)" if context is not None else ""
-        _complain(error.format_message() + hint)
+        complain(error.format_message() + hint)
         code = BAD_INPUT
     except PipeClosedError:  # the reader, such as head, has seen enough
         code = PIPE_CLOSED
     except BemkitError as error:
-        _complain(one_line(error))
-        code = NOT_CONVERGED if isinstance(error, NoResultError) else BAD_INPUT
+        complain(one_line(error))
+        code = exit_code_of_error(error)
     except (click.Abort, KeyboardInterrupt) as error:
         is_ctrl_c = (error.__cause__ or error) is not _TERMINATION
-        _complain("interrupted" if is_ctrl_c else "terminated")
+        complain("interrupted" if is_ctrl_c else "terminated")
         code = INTERRUPTED if is_ctrl_c else TERMINATED
     except MemoryError:
-        _complain("not enough memory: use fewer elements (--elements N)")
+        complain("not enough memory: use fewer elements (--elements N)")
         code = BAD_INPUT
     return code if isinstance(code, int) else 0
 
@@ -135,8 +135,3 @@ class _Commands(click.Group):
 @click.version_option(__version__, prog_name="bemkit")
 def commands() -> None:
     """Frictional contact of elastic bodies by boundary elements."""
-
-
-def _complain(message: str) -> None:
-    lines = [printable(line) for line in message.splitlines() if line.strip()]
-    print("\n".join([f"bemkit: error: {lines[0] if lines else ''}", *lines[1:]]), file=sys.stderr)

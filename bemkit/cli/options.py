@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Literal
 
 import click
 
-from bemkit.cli.outputs import Content, Outputs, TableFile, TextFile
+from bemkit.cli.outputs import STDOUT, Content, Outputs, TableFile, TextFile
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -42,6 +42,11 @@ def pictures_of(context: click.Context, parameter: click.Parameter, value: str |
 
     names = tuple(name.strip() for name in value.split(",") if name.strip())
     return tuple(name if name == ANIMATION else find_picture(name).name for name in names)
+
+
+def names_of(context: click.Context, parameter: click.Parameter, values: tuple[str, ...]) -> tuple[str, ...]:
+    """Return the names in an option that may be repeated and may hold several names with commas."""
+    return tuple(name.strip() for value in values for name in value.split(",") if name.strip())
 
 
 elements_option = click.option("--elements", type=int, metavar="N", help="Number of boundary elements.")
@@ -100,6 +105,33 @@ def outputs_of(
         TextFile(csv_file, as_csv),
     )
     return Outputs(texts, folder, pictures, "deformation")
+
+
+def names_of_scenes(scenes: Sequence[str], *, writes: bool) -> list[str]:
+    """Return what the outputs of each scene are called after; empty for a single scene.
+
+    Parameters
+    ----------
+    scenes : sequence of str
+        Files or names of scenes.
+    writes : bool
+        Whether there are outputs, which would overwrite each other if two scenes had one name.
+    """
+    names = [Path(scene).stem if Path(scene).suffix.lower() == ".toml" else scene for scene in scenes]
+    for name in names if writes else ():
+        if names.count(name) > 1:
+            raise click.UsageError(f"two scenes are called {name!r}, and so would be their outputs: rename one")
+    return names if len(scenes) > 1 else [""]
+
+
+def place_of(place: str | None, name: str) -> str | None:
+    """Return the file of an output, with the name of its scene before the ending where there are several."""
+    if place is None or not name:
+        return place
+    if place == STDOUT:
+        raise click.UsageError("- is standard output, which takes one scene: give a file, or run one scene")
+    path = Path(place)
+    return str(path.with_name(f"{path.stem}-{name}{path.suffix}"))
 
 
 def result_target(output: str | None, inside: int) -> list[Path]:

@@ -22,7 +22,13 @@ if TYPE_CHECKING:
 @click.option("-o", "--output", metavar="SCENE", help="Write a scene to start from (TOML).")
 @options.plot_option
 @click.option("--scale", type=float, metavar="F", help="Factor of all coordinates in the file.")
-@click.option("--only", multiple=True, metavar="NAME", help="Surface, layer or id of the body; repeatable.")
+@click.option(
+    "--only",
+    multiple=True,
+    metavar="NAME,...",
+    callback=options.names_of,
+    help="Surfaces, layers or ids of the body.",
+)
 @click.option(
     "--corner-angle", type=float, metavar="A", help="Degrees by which chords of a smooth curve may turn (25)."
 )

@@ -6,15 +6,18 @@ import time
 import tracemalloc
 from collections.abc import Callable
 from contextlib import ExitStack
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 import click
 
 from bemkit.cli import options
-from bemkit.cli.exit_codes import exit_code_of
-from bemkit.cli.options import outputs_of, reserve, result_target, shown_progress, write_animation
-from bemkit.errors import concerning
+from bemkit.cli.exit_codes import exit_code_of, exit_code_of_error, most_serious
+from bemkit.cli.options import outputs_of, place_of, reserve, result_target, shown_progress, write_animation
+from bemkit.cli.outputs import Outputs
+from bemkit.cli.streams import complain
+from bemkit.errors import BemkitError, concerning, one_line
 
 if TYPE_CHECKING:
     from bemkit.results.solution import Solution
@@ -25,8 +28,22 @@ _COARSEST = 40
 """Elements of the coarsest mesh of `--cascade`, at least."""
 
 
+@dataclass(frozen=True)
+class _Run:
+    """How a scene is solved, and where its result goes."""
+
+    changed: Callable[[Scene], Scene]
+    output: str | None
+    inside: int
+    outputs: Outputs[Solution]
+    what: tuple[str, ...] | None
+    cascade: bool
+    explain: bool
+    quiet: bool
+
+
 @click.command()
-@click.argument("scene")
+@click.argument("scenes", metavar="SCENE...", nargs=-1, required=True)
 @click.option("-o", "--output", metavar="FILE", help="Write the result: .h5, .json, .csv, .npz or .vtu.")
 @options.inside_option
 @options.json_option
@@ -44,7 +61,7 @@ _COARSEST = 40
 @click.option("--explain", is_flag=True, help="Print planned and measured time and memory, and what was skipped.")
 @options.quiet_option
 def run(
-    scene: str,
+    scenes: tuple[str, ...],
     output: str | None,
     inside: int,
     json_file: str | None,
@@ -62,16 +79,18 @@ def run(
     explain: bool,
     quiet: bool,
 ) -> int:
-    """Solve SCENE, a TOML file or the name of a shipped scene."""
-    with ExitStack() as stack:
-        callback = stack.enter_context(shown_progress(quiet))  # shown before anything is loaded
-        from bemkit.scene.keys import with_settings
-        from bemkit.scene.toml import load_scene, with_overrides
+    """Solve each SCENE, a TOML file or the name of a shipped scene.
 
-        outputs = outputs_of(json_file, csv_file, folder, what=what)
-        reserve(outputs.check(result_target(output, inside)))
-        chosen = with_overrides(
-            with_settings(load_scene(scene), settings),
+    With several scenes the names of files and folders end with that of the scene, and an error of one does not stop
+    the others; the exit code is the most serious one.
+    """
+
+    def changed(scene: Scene) -> Scene:
+        from bemkit.scene.keys import with_settings
+        from bemkit.scene.toml import with_overrides
+
+        return with_overrides(
+            with_settings(scene, settings),
             elements=elements,
             accuracy=accuracy,
             discretisation=discretisation,
@@ -79,32 +98,59 @@ def run(
             solver=solver,
             rho=rho,
         )
+
+    names = options.names_of_scenes(scenes, writes=any((output, json_file, csv_file, folder)))
+    runs = []
+    for name in names:
+        place = place_of(output, name)
+        outputs = outputs_of(place_of(json_file, name), place_of(csv_file, name), place_of(folder, name), what=what)
+        reserve(outputs.check(result_target(place, inside)))
+        runs.append(_Run(changed, place, inside, outputs, what, cascade, explain, quiet))
+    if len(scenes) == 1:
+        return _solve_and_write(scenes[0], runs[0])
+    codes = []
+    for scene, own in zip(scenes, runs, strict=True):
+        try:
+            codes.append(_solve_and_write(scene, own))
+        except BemkitError as error:
+            complain(one_line(error))
+            codes.append(exit_code_of_error(error))
+    return most_serious(codes)
+
+
+def _solve_and_write(scene: str, own: _Run) -> int:
+    """Solve a scene, write and print its result, and return the exit code."""
+    with ExitStack() as stack:
+        callback = stack.enter_context(shown_progress(own.quiet))  # shown before anything is loaded
+        from bemkit.scene.toml import load_scene
+
+        chosen = own.changed(load_scene(scene))
         with concerning(scene):
-            history_file = _history_file(chosen, output)
-            if explain:
+            history_file = _history_file(chosen, own.output)
+            if own.explain:
                 _start_tracing()
             try:
-                solution = _solve(chosen, cascade=cascade, callback=callback, history_file=history_file)
+                solution = _solve(chosen, cascade=own.cascade, callback=callback, history_file=history_file)
             finally:
                 tracemalloc.stop()
-        if outputs.uses_stdout:
+        if own.outputs.uses_stdout:
             stack.close()  # no bar among the data
         begin = time.perf_counter()
-        if output is not None and history_file is None:
+        if own.output is not None and history_file is None:
             from bemkit.results.export import export_result
 
-            export_result(output, solution, inside=inside)
-        outputs.write(solution)
-        write_animation(solution, folder, what)
+            export_result(own.output, solution, inside=own.inside)
+        own.outputs.write(solution)
+        write_animation(solution, own.outputs.folder, own.what)
         output_seconds = time.perf_counter() - begin
-    if not quiet and not outputs.uses_stdout:
+    if not own.quiet and not own.outputs.uses_stdout:
         from bemkit.cli.console import print_summary
 
         print_summary(solution)
-    if explain:
+    if own.explain:
         from bemkit.cli.console import print_explanation
 
-        print_explanation(solution, output_seconds, to_stderr=outputs.uses_stdout)
+        print_explanation(solution, output_seconds, to_stderr=own.outputs.uses_stdout)
     return exit_code_of(solution)
 
 

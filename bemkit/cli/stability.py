@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 @click.command()
 @click.argument("scene", required=False)
-@click.option("--axis", "axis", multiple=True, metavar="NAME", help="Only this axis; may be given several times.")
+@click.option("--axis", "axis", multiple=True, metavar="NAME,...", callback=options.names_of, help="Only these axes.")
 @options.rows_option
 @options.csv_option
 @options.markdown_option

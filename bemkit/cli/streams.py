@@ -7,9 +7,9 @@ import os
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import TextIO
+from typing import BinaryIO, TextIO
 
-from bemkit.errors import BemkitError
+from bemkit.errors import BemkitError, printable
 
 _CLOSED = io.TextIOWrapper(io.BytesIO())
 _CLOSED.close()
@@ -49,6 +49,12 @@ def print_data(text: str) -> None:
         stream.write(text)
 
 
+def complain(message: str) -> None:
+    """Write an error to standard error, its first line after the name of the program."""
+    lines = [printable(line) for line in message.splitlines() if line.strip()]
+    print("\n".join([f"bemkit: error: {lines[0] if lines else ''}", *lines[1:]]), file=sys.stderr)
+
+
 class GuardedStream(io.TextIOBase):
     r"""A stream that shows letters which its encoding lacks as ``\xe9``, and whose failures have names.
 
@@ -68,6 +74,11 @@ class GuardedStream(io.TextIOBase):
     def encoding(self) -> str:  # type: ignore[override]  # the base class has an attribute that is never set
         """Encoding of the stream."""
         return getattr(self._stream, "encoding", None) or "utf-8"
+
+    @property
+    def buffer(self) -> BinaryIO | None:
+        """The stream of bytes below, if there is one, to which click writes what shells complete commands with."""
+        return getattr(self._stream, "buffer", None)
 
     def isatty(self) -> bool:
         """Whether a person looks at it."""

@@ -33,7 +33,13 @@ DEFAULT_SHOWN = "force_tangential"
 @options.json_option
 @options.plot_option
 @click.option("--over", metavar="KEY", help="Abscissa of the figures (the first key).")
-@click.option("--show", multiple=True, metavar="NAME", help=f"Result to draw ({DEFAULT_SHOWN}); repeatable.")
+@click.option(
+    "--show",
+    multiple=True,
+    metavar="NAME,...",
+    callback=options.names_of,
+    help=f"Results to draw ({DEFAULT_SHOWN}).",
+)
 @options.elements_option
 @options.accuracy_option
 @options.discretisation_option

@@ -23,6 +23,7 @@ import bemkit.operators.hierarchy.skeletons
 import bemkit.results.result_file
 import bemkit.runs.run
 from bemkit.cli.console import ConvergenceTable, format_size
+from bemkit.cli.exit_codes import BAD_INPUT, INACCURATE, NOT_CONVERGED, most_serious
 from bemkit.cli.main import commands, main
 from bemkit.operators.linear.solvers import Hierarchical
 from bemkit.results.result_file import read_result
@@ -51,6 +52,51 @@ def test_run_prints_a_summary(capsys: pytest.CaptureFixture[str]) -> None:
     for word in ("converged", "contact nodes", "normal force", "friction force", "separated to slip", "certificate"):
         assert word in output.out
     assert output.err == ""  # no convergence table unless a person is watching
+
+
+def test_several_scenes_are_solved_and_a_bad_one_loses_none(capsys: pytest.CaptureFixture[str]) -> None:
+    Path("a.toml").write_text(scene_to_toml(dataclasses.replace(load_scene("bending"), title="First")), "utf-8")
+    Path("bad.toml").write_text("title = 3", "utf-8")
+    few = ["--elements", "24"]
+    assert call("run", "a.toml", "bad.toml", "bending", *few, "-o", "r.h5", "--json", "n.json") == 2
+    printed = capsys.readouterr()
+    assert printed.out.index("First") < printed.out.index(load_scene("bending").title)
+    assert printed.err.startswith("bemkit: error: bad.toml: ")
+    assert sorted(path.name for path in Path().glob("[rn]-*")) == [
+        *("n-a.json", "n-bending.json", "r-a.h5", "r-bending.h5")
+    ]
+    assert json.loads(Path("n-a.json").read_text())["title"] == "First"
+    assert read_result("r-bending.h5").n_elements == 24
+
+
+def test_outputs_of_several_scenes_do_not_meet(capsys: pytest.CaptureFixture[str]) -> None:
+    Path("b").mkdir()
+    for path in ("a.toml", "b/a.toml"):
+        Path(path).write_text(scene_to_toml(load_scene("bending")), "utf-8")
+    assert call("run", "a.toml", "b/a.toml", "-o", "r.h5") == 2
+    assert "two scenes are called 'a', and so would be their outputs: rename one" in capsys.readouterr().err
+    assert call("run", "a.toml", "bending", "--csv", "-") == 2
+    assert "- is standard output, which takes one scene: give a file" in capsys.readouterr().err
+    assert not list(Path().glob("r*"))
+
+
+def test_the_exit_code_of_several_scenes_is_the_most_serious() -> None:
+    assert most_serious([0, INACCURATE, 0]) == INACCURATE
+    assert most_serious([NOT_CONVERGED, INACCURATE]) == NOT_CONVERGED
+    assert most_serious([0, BAD_INPUT, NOT_CONVERGED]) == BAD_INPUT
+    assert most_serious([0, 0]) == 0
+
+
+def test_shells_complete_commands_and_options() -> None:
+    def completed(words: str, number: int) -> list[str]:
+        variables = {"COMP_WORDS": words, "COMP_CWORD": str(number), "_BEMKIT_COMPLETE": "bash_complete"}
+        variables["PYTHONPATH"] = str(Path(bemkit.__file__).parents[1])  # this package, from any folder
+        command = [sys.executable, "-m", "bemkit"]
+        done = subprocess.run(command, env=os.environ | variables, capture_output=True, text=True, check=True)
+        return done.stdout.split()
+
+    assert completed("bemkit ru", 1) == ["plain,run"]
+    assert completed("bemkit run paper-1 --elem", 3) == ["plain,--elements"]
 
 
 def test_the_summary_of_a_history_says_what_coarse_increments_leave(capsys: pytest.CaptureFixture[str]) -> None:

@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import json
+import shlex
 from pathlib import Path
 
+import click
 import pytest
 from click.testing import CliRunner, Result
 
 from bemkit.cli.main import _run_to_end, commands
+from bemkit.cli.options import names_of
+from bemkit.geometry.errors import GeometryError
 from bemkit.geometry.files.gmsh_files import why_no_gmsh
-from tests.geometry.files.parts import DATA, MESHES, PART_DXF, PART_SVG, dxf, why_no
+from tests.geometry.files.parts import DATA, MESHES, PART_DXF, PART_SVG, dxf, line, needs_ezdxf, why_no
 from tests.slow import slow_except
 
 FILES = (*MESHES, "part.dxf", "part.svg")
@@ -94,3 +98,30 @@ def test_refused_in_one_line(arguments: list[str], message: str, tmp_path, capsy
     assert message in error
     assert error.count("\n") == 1
     assert Path("notes.txt").read_text() == "mine"
+
+
+def test_names_are_given_with_commas_or_one_by_one() -> None:
+    read = list[tuple[str, ...]]()
+
+    @click.command()
+    @click.option("--only", multiple=True, callback=names_of)
+    def command(only: tuple[str, ...]) -> None:
+        read.append(only)
+
+    for arguments in (["--only", "a, b,c"], ["--only", "a", "--only", "b,c"], []):
+        command.main(arguments, standalone_mode=False)
+    assert read == [("a", "b", "c"), ("a", "b", "c"), ()]
+
+
+@needs_ezdxf
+@pytest.mark.usefixtures("here")
+def test_the_remedy_for_open_lines_works() -> None:
+    """The message names two layers that close together; its option is accepted as it is printed."""
+    square = [(0, 0, 1, 0), (1, 0, 1, 1), (1, 1, 0, 1), (0, 1, 0, 0)]
+    halves = [line("LEFT" if k > 1 else "RIGHT", *ends) for k, ends in enumerate(square)]
+    Path("axis.dxf").write_text(dxf(*halves, line("AXIS", -1, 0.5, 2, 0.5)))
+    with pytest.raises(GeometryError, match="without the lines of 'AXIS' the outline is closed") as caught:
+        call("outline", "axis.dxf")
+    option = shlex.split(str(caught.value).split(" or ")[-1])
+    assert option == ["--only", "LEFT,RIGHT"]
+    assert call("outline", "axis.dxf", *option).exit_code == 0

@@ -233,8 +233,8 @@ def _groups_that_close(ends: IntArray, groups: Sequence[str]) -> str:
         return ""
     dropped = _in_groups(set(names) - set(kept))
     listed = ", ".join(map(repr, kept))
-    options = " ".join(f"--only {shlex.quote(name)}" for name in kept)
-    remedy = "name the others with only" if "" in kept else f"write only = [{listed}], or {options}"
+    option = shlex.quote(",".join(kept))
+    remedy = "name the others with only" if "" in kept else f"write only = [{listed}], or --only {option}"
     return f"without the lines{dropped} the outline is closed: {remedy}"
 
 
