@@ -192,6 +192,7 @@ PROBE = """
 <script>
 const told = {};
 const pause = (time) => new Promise((resolve) => setTimeout(resolve, time));
+const until = async (holds) => { for (let k = 0; k < 100 && !holds(); k++) await pause(50); };
 const mouse = (target, kind, x, y) =>
   target.dispatchEvent(new MouseEvent(kind, {bubbles: true, view: window, clientX: x, clientY: y}));
 (async () => {
@@ -205,7 +206,7 @@ const mouse = (target, kind, x, y) =>
   const at = [box.left + xaxis2.l2p(nodes().x[3]), box.top + yaxis2.l2p(nodes().y[3])];
   mouse(layer, "mouseover", ...at);
   mouse(layer, "mousemove", ...at);
-  await pause(300);
+  await until(() => plot.querySelector(".hoverlayer .hovertext"));
   told.hover = [...plot.querySelectorAll(".hoverlayer .hovertext tspan, .hoverlayer .hovertext text")].map(
     (each) => each.textContent);
   told.before = Math.max(...nodes().y);
@@ -213,7 +214,7 @@ const mouse = (target, kind, x, y) =>
   const place = rail.getBoundingClientRect();
   mouse(rail, "mousedown", place.left + 2, place.top + place.height / 2);
   mouse(document, "mouseup", place.left + 2, place.top + place.height / 2);
-  await pause(300);
+  await until(() => Math.max(...nodes().y) !== told.before);
   told.after = Math.max(...nodes().y);
   told.label = plot.querySelector(".slider-label").textContent;
   told.rightmost = document.documentElement.scrollWidth;
