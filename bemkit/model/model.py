@@ -185,7 +185,10 @@ class Model:
         if not self.condensed:
             return [self._single_body.recover(state)]
         unknowns = self._joined_bodies.member_displacements(state)[: len(self.condensed)]  # rigid bodies come last
-        return [condensed.recover(own) for condensed, own in zip(self.condensed, unknowns, strict=True)]
+        return [
+            condensed.recover(unknowns_of_body)
+            for condensed, unknowns_of_body in zip(self.condensed, unknowns, strict=True)
+        ]
 
     def _beyond_contact(self, state: ContactState) -> Iterator[tuple[FloatArray, FloatArray, FloatArray]]:
         """Yield displacement, all forces but those of contact, and all forces (n_nodes, 2) of each body."""

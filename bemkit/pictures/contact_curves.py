@@ -127,11 +127,11 @@ def draw_friction_cone(
     """
     units = units or solution.units
     axes = axes_or_new(axes, 5.6, 4.6)
-    table, own = solution.contact, solution.contact.rows(part)
+    table, rows = solution.contact, solution.contact.rows(part)
     pressure, scale = -table.sigma_n, traction_scale(solution)
     friction = Abscissa.along(solution, part).sign * table.sigma_t
     if solution.friction_bound is not None:
-        nodes = np.flatnonzero(own)[np.argsort(pressure[own])]
+        nodes = np.flatnonzero(rows)[np.argsort(pressure[rows])]
         bound = solution.friction_bound[nodes]
         is_line = bool(np.all(np.diff(bound) >= -1e-9 * scale))
         style = LIMIT if is_line else {**LIMIT, "linestyle": "", "marker": "_", "markersize": 4.0}
@@ -139,7 +139,7 @@ def draw_friction_cone(
         axes.plot(pressure[nodes], -bound, **style)
     words = np.array(table.status_words())
     for word, colour in STATUS_COLOURS.items():
-        chosen = np.stack([pressure, friction], axis=1)[own & (words == word)]
+        chosen = np.stack([pressure, friction], axis=1)[rows & (words == word)]
         if len(chosen):
             x, y = chosen[marked(chosen, chosen[:, 0], scale)].T
             axes.scatter(x, y, s=18.0, color=colour, edgecolors="black", linewidths=0.4, zorder=3, label=word)

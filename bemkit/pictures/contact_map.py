@@ -56,11 +56,11 @@ def draw_contact_map(solution: Result, axes: Axes | None = None, *, units: UnitN
     tips = points - length[:, None] * nodes.directions
     words = np.array(table.status_words())[nodes.rows]
     for word, colour in STATUS_COLOURS.items():
-        own = words == word
-        if own.any():
-            teeth = np.stack([points, tips], axis=1)[own]
+        has_status = words == word
+        if has_status.any():
+            teeth = np.stack([points, tips], axis=1)[has_status]
             axes.add_collection(LineCollection(list(teeth), colors=colour, linewidths=1.4))
-            axes.scatter(points[own, 0], points[own, 1], s=7.0, color=colour, zorder=3, linewidths=0.0)
+            axes.scatter(points[has_status, 0], points[has_status, 1], s=7.0, color=colour, zorder=3, linewidths=0.0)
             axes.plot([], [], color=colour, marker="o", markersize=4.0, label=word)
     legend_below(axes)
     return axes

@@ -41,8 +41,8 @@ class GravityColumn:
 
     def base_pressures(self) -> tuple[float, ...]:
         """Return the pressure [Pa] under each column, from below."""
-        own = [weight * height for weight, height in zip(self.weights, self.heights, strict=True)]
-        return tuple(sum(own[k:]) for k in range(len(own)))
+        block_weights = [weight * height for weight, height in zip(self.weights, self.heights, strict=True)]
+        return tuple(sum(block_weights[k:]) for k in range(len(block_weights)))
 
     def settlements(self) -> tuple[float, ...]:
         """Return how far the top of each column comes down [m], from below."""

@@ -259,12 +259,12 @@ def _along(solution: Solution, places: SamplePoints) -> FloatArray:
     elements = along_boundary(mesh, mesh.part(places.part))
     lengths = mesh.lengths[elements]
     ends = np.cumsum(lengths)
-    own = np.clip(np.searchsorted(ends, places.s), 0, elements.size - 1)
-    basis = space.basis(np.clip(2.0 * (places.s - ends[own]) / lengths[own] + 1.0, -1.0, 1.0))
+    element_index = np.clip(np.searchsorted(ends, places.s), 0, elements.size - 1)
+    basis = space.basis(np.clip(2.0 * (places.s - ends[element_index]) / lengths[element_index] + 1.0, -1.0, 1.0))
     at_dofs = (ends - lengths)[:, None] + 0.5 * lengths[:, None] * (element_nodes(space)[elements] + 1.0)
     rows = table.rows(places.part)
     columns = np.stack([np.interp(at_dofs, table.s[rows], getattr(table, name)[rows]) for name in COLUMNS], axis=2)
-    return np.asarray(np.einsum("pn,npc->cn", basis, from_own_nodes(space, columns, elements)[own]))
+    return np.asarray(np.einsum("pn,npc->cn", basis, from_own_nodes(space, columns, elements)[element_index]))
 
 
 def _gauss_places(solution: Solution, part: str) -> SamplePoints:

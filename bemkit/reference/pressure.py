@@ -122,14 +122,14 @@ def _rule(kernel: Kernel, half_width: float, x: FloatArray) -> tuple[FloatArray,
     With y = a sin(phi) the integrand is smooth but for the kernel at the point itself, towards which panels are graded.
     """
     fraction, weight = _graded_rule(_N_PANELS, _N_POINTS)
-    own = np.arcsin(np.clip(x / half_width, -1.0, 1.0))[:, None]
+    angles = np.arcsin(np.clip(x / half_width, -1.0, 1.0))[:, None]
     places, weights = [], []
     for end in (-0.5 * np.pi, 0.5 * np.pi):
-        turn = (end - own) * fraction
+        turn = (end - angles) * fraction
         # from the own place on, so that short distances keep their digits
-        distance = half_width * (2.0 * np.sin(0.5 * turn) * np.cos(own + 0.5 * turn) + np.sin(own)) - x[:, None]
+        distance = half_width * (2.0 * np.sin(0.5 * turn) * np.cos(angles + 0.5 * turn) + np.sin(angles)) - x[:, None]
         is_apart = distance != 0.0
         values = np.where(is_apart, kernel(np.where(is_apart, -distance, half_width)), 0.0)
-        places.append(np.sin(own + turn))
-        weights.append(np.abs(end - own) * weight * values * half_width * np.cos(own + turn) ** 2)
+        places.append(np.sin(angles + turn))
+        weights.append(np.abs(end - angles) * weight * values * half_width * np.cos(angles + turn) ** 2)
     return np.concatenate(places, axis=1), np.concatenate(weights, axis=1)

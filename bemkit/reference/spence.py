@@ -152,10 +152,10 @@ def _running_integrals(half_lengths: FloatArray) -> FloatArray:
     n_panels = half_lengths.size
     powers = np.vander(xi, increasing=True)
     order = np.arange(1.0, _N_POINTS + 1.0)
-    own = (xi[:, None] ** order - (-1.0) ** order) / order @ np.linalg.inv(powers)
+    integrals = (xi[:, None] ** order - (-1.0) ** order) / order @ np.linalg.inv(powers)
     whole = np.tril(np.ones((n_panels, n_panels)), -1)
     of_panels = np.kron(whole * half_lengths, np.tile(weights, (_N_POINTS, 1)))
-    return np.asarray(of_panels + np.kron(np.diag(half_lengths), own))
+    return np.asarray(of_panels + np.kron(np.diag(half_lengths), integrals))
 
 
 def _log_integrals(cuts: FloatArray, places: FloatArray) -> FloatArray:

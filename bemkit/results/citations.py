@@ -149,9 +149,9 @@ def _of_contact(stated: Scene, messages: list[str]) -> Iterator[Method]:
     if not stated.has_contact:
         return
     yield Method("contact and friction as projection equations", ("Paper", "AlartCurnier1991", "QiSun1993"))
-    own = [law for body in stated.placed_bodies for law in stated.scene_of(body).laws.values()]
-    own += [each.law for each in (*stated.contacts, stated.touching) if each is not None and each.law is not None]
-    for law in (stated.law, *own):
+    laws = [law for body in stated.placed_bodies for law in stated.scene_of(body).laws.values()]
+    laws += [each.law for each in (*stated.contacts, stated.touching) if each is not None and each.law is not None]
+    for law in (stated.law, *laws):
         if keys := LAW_WORKS.get(LAWS.name_of(law)):
             yield Method(f"law {LAWS.name_of(law)}", keys)
     for word in map(SOLVERS.name_of, drivers_at_work(stated.solver, messages)):

@@ -152,9 +152,9 @@ class ContactTable:
 
     def renamed(self, names: Mapping[str, str]) -> ContactTable:
         """Return the rows of some parts, by their names, under other names."""
-        own = [row for row, part in enumerate(self.part) if part in names]
-        columns: dict[str, Any] = {key: column[own] for key, column in self.columns().items()}
-        return ContactTable(part=tuple(names[self.part[row]] for row in own), **columns)
+        rows = [row for row, part in enumerate(self.part) if part in names]
+        columns: dict[str, Any] = {key: column[rows] for key, column in self.columns().items()}
+        return ContactTable(part=tuple(names[self.part[row]] for row in rows), **columns)
 
     @cached_property
     def is_joined(self) -> BoolArray:

@@ -63,19 +63,19 @@ def joined_corners(
     same = LYING_AT * min(one.length, two.length)
     points += [(two, one, point) for point in two.ends() if all(np.abs(point - p).max() > same for _, _, p in points)]
     for side, other, point in points:
-        own, foot = _end_of(side, point), _foot_of(other, point, LYING_ON * min(one.length, two.length))
-        if foot is None or own.before == own.after:
+        end, foot = _end_of(side, point), _foot_of(other, point, LYING_ON * min(one.length, two.length))
+        if foot is None or end.before == end.after:
             continue
-        way = AFTER if np.isin(own.after, side.mesh.part(side.part)) else BEFORE  # of the touching element
-        touching = (own.before, own.after)[way], (foot.after, foot.before)[way]
-        wedges = own.given(given[side.body], way), foot.given(given[other.body], 1 - way)
+        way = AFTER if np.isin(end.after, side.mesh.part(side.part)) else BEFORE  # of the touching element
+        touching = (end.before, end.after)[way], (foot.after, foot.before)[way]
+        wedges = end.given(given[side.body], way), foot.given(given[other.body], 1 - way)
         contact = _contact_at(table, law, side.mesh.centres[touching[0]])
         is_on_other = np.isin(touching[1], other.mesh.part(other.part))
         if contact is None or not is_on_other or wedges[0] is None or wedges[1] is None:
             continue
         ordered = [
             JoinedWedge(place.angle, materials[place.side.body].kappa, materials[place.side.body].shear_modulus, beside)
-            for place, beside in ((own, wedges[0]), (foot, wedges[1]))
+            for place, beside in ((end, wedges[0]), (foot, wedges[1]))
         ]
         exponent = joined_exponent(*(ordered if way == BEFORE else reversed(ordered)), contact)
         if exponent is None:

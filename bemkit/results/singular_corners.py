@@ -173,10 +173,10 @@ class GivenSides:
 
     def _in_contact(self, element: int) -> WedgeSide | None:
         """Return the status of the contact node nearest to the middle of an element; None if its part has no node."""
-        own = np.flatnonzero(self._table.rows(self._part[element]))
-        if not own.size:  # both nodes of a part of one element belong to its neighbours
+        rows = np.flatnonzero(self._table.rows(self._part[element]))
+        if not rows.size:  # both nodes of a part of one element belong to its neighbours
             return None
-        row = int(own[np.argmin(norms(self._points[own] - self._mesh.centres[element]))])
+        row = int(rows[np.argmin(norms(self._points[rows] - self._mesh.centres[element]))])
         status = NodeStatus(int(self._table.status[row]))
         if status in (NodeStatus.SEPARATED, NodeStatus.STICK):
             return FREE if status is NodeStatus.SEPARATED else HELD

@@ -149,7 +149,7 @@ class Solution(SolvedScene, Explorable):
     @property
     def singular_corners(self) -> tuple[SingularCorner, ...]:
         """Corners of all bodies at which contact tractions grow without bound; see `ContactPlaces.corners`."""
-        return tuple(corner for own in self.places.corners.values() for corner in own)
+        return tuple(corner for corners in self.places.corners.values() for corner in corners)
 
     @cached_property
     def estimated_traction_error(self) -> float | None:
@@ -270,8 +270,8 @@ class Solution(SolvedScene, Explorable):
             **{name: getattr(self, name) for name in numbers},
             "singular_corners": [
                 ({"body": name} if name else {}) | corner.as_dict()
-                for name, own in self.places.corners.items()
-                for corner in own
+                for name, corners in self.places.corners.items()
+                for corner in corners
             ],
             "parts": part_facts(self),
             "contacts": contact_facts(self),

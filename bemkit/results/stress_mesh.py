@@ -210,7 +210,7 @@ def _fitted(rings: list[_Ring], inner: FloatArray) -> tuple[list[_Ring], FloatAr
             break
         if len(inner):
             near = KDTree(inner).query_ball_point(np.concatenate(middles), np.concatenate(radii))
-            inner = np.delete(inner, np.unique([k for own in near for k in own]).astype(np.intp), axis=0)
+            inner = np.delete(inner, np.unique([k for neighbours in near for k in neighbours]).astype(np.intp), axis=0)
         rings = [ring.halved(cut) for ring, cut in zip(rings, missing, strict=True)]
     return rings, inner, triangles
 

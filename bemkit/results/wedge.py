@@ -191,8 +191,8 @@ def _smallest_root(conditions: Callable[[ComplexArray], ComplexArray]) -> float 
     def determinant(exponent: ComplexArray) -> ComplexArray:
         matrices = conditions(exponent)
         # less the roots of the functions themselves, which at 0 and 1 do not differ
-        own = (exponent * (exponent - 1.0)) ** (matrices.shape[1] // 4)
-        return np.asarray(np.linalg.det(matrices) / own)
+        scale = (exponent * (exponent - 1.0)) ** (matrices.shape[1] // 4)
+        return np.asarray(np.linalg.det(matrices) / scale)
 
     roots = _roots_near(determinant, _STARTS.ravel())
     between = roots.real[(roots.real > _MARGIN) & (roots.real < 1.0 - _MARGIN)]

@@ -77,9 +77,9 @@ class DensityMeshes:
         """Return meshes whose density follows the estimated errors; copies share one, as fine as the worst needs."""
         errors = StepErrors.of(solutions[-1])
         densities = self._densities(level, errors)
-        own = [float(densities[key].sum()) for key in level.keys.values()]
-        total = sum(own)  # zero where bodies only move as wholes, and miss their contact
-        shares = [float(density.sum()) / total if total > 0.0 else 1.0 / len(own) for density in densities]
+        totals = [float(densities[key].sum()) for key in level.keys.values()]
+        total = sum(totals)  # zero where bodies only move as wholes, and miss their contact
+        shares = [float(density.sum()) / total if total > 0.0 else 1.0 / len(totals) for density in densities]
         spread = (SPREAD if errors.surface is None else HALF_PLANE_SPREAD) if any(level.touching) else 0.0
         is_accurate = self.error(solutions[-1]) <= self.accuracy
         n_elements = next_size(errors.worst.n_elements, total / (1.0 - spread), is_accurate=is_accurate)
@@ -87,7 +87,7 @@ class DensityMeshes:
             better_partition(
                 member.partition,
                 density,
-                int(np.ceil(n_elements * ((1.0 - spread) * share + spread / len(own)))),
+                int(np.ceil(n_elements * ((1.0 - spread) * share + spread / len(totals)))),
                 cuts=zone_cuts(member.partition, member.ends),
                 spread_over=touching,
                 spread=spread,

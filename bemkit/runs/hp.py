@@ -111,8 +111,8 @@ class LayeredMeshes:
     def _check_lengths(self, members: Sequence[Member], errors: _Errors) -> None:
         """Raise an error that names the place if the largest error is that of an element as short as can be."""
         shares = errors.split(self._share(errors, errors.elements))
-        member, own = max(zip(members, shares, strict=True), key=lambda pair: float(pair[1].max()))
-        mesh, worst = member.bodies[0].mesh, int(np.argmax(own))
+        member, share = max(zip(members, shares, strict=True), key=lambda pair: float(pair[1].max()))
+        mesh, worst = member.bodies[0].mesh, int(np.argmax(share))
         if mesh.lengths[worst] < 2.0 / FACTOR * shortest_length(mesh):
             x, y = mesh.centres[worst]
             raise GeometryError(
@@ -167,8 +167,8 @@ class LayeredMeshes:
         # layers shorter than what flickers would hold nothing but round-off
         resolution = max(LAST_TIPS * self.accuracy if rise.is_last else self.accuracy, FLICKER)
         refined = tuple(
-            refined_partition(member.partition, excess, own, resolution)
-            for member, excess, own in zip(members, excesses, fresh, strict=True)
+            refined_partition(member.partition, excess, partition, resolution)
+            for member, excess, partition in zip(members, excesses, fresh, strict=True)
         )
         degrees: tuple[int, ...] = ()
         if is_settled and level.asked.mesh.rising_degrees and len(level.keys) == 1:
@@ -265,16 +265,19 @@ class _Errors:
         """Return the errors of a solution; None if degrees are too low for an estimate."""
         members = level.members(solution)
         known = [[body.coefficient_errors for body in member.bodies] for member in members]
-        if any(own is None for of_copies in known for own in of_copies):
+        if any(copy_errors is None for of_copies in known for copy_errors in of_copies):
             return None
-        of_members = [CoefficientErrors.at_worst([own for own in of_copies if own is not None]) for of_copies in known]
+        of_members = [
+            CoefficientErrors.at_worst([copy_errors for copy_errors in of_copies if copy_errors is not None])
+            for of_copies in known
+        ]
         is_contact = [np.isin(np.arange(len(each.partition.sides)), each.contact_elements) for each in members]
         moved = [_moved_to_corners(solution, *each) for each in zip(members, of_members, is_contact, strict=True)]
         return cls(
             elements=CoefficientErrors.joined(moved),
             is_contact=np.concatenate(is_contact),
             degrees=np.concatenate([_degrees_of(each, each.bodies[0].scene.discretisation) for each in members]),
-            ends=np.cumsum([own.size for own in is_contact])[:-1],
+            ends=np.cumsum([mask.size for mask in is_contact])[:-1],
             error_unit=solution.error_unit,
             size=solution.contact_traction_size,
         )
@@ -286,8 +289,8 @@ class _Errors:
     def relative(self, chosen: BoolArray) -> float:
         """Return the larger one of the relative errors of some elements, in energy and in contact tractions."""
         energy = float(self.elements.energy[chosen].sum()) / self.error_unit
-        own = self.elements.traction[chosen & self.is_contact]
-        tractions = float(own.sum()) / self.size**2 if self.size > 0.0 else 0.0
+        contact_errors = self.elements.traction[chosen & self.is_contact]
+        tractions = float(contact_errors.sum()) / self.size**2 if self.size > 0.0 else 0.0
         return float(np.sqrt(max(energy, tractions)))
 
     def excess(self, degrees: IntArray, goal: float) -> FloatArray:

@@ -85,8 +85,8 @@ class Level:
         if not self.is_layered:
             return self.asked
         scene = replace(self.asked, discretisation=self._discretisation(self.asked.discretisation))
-        own = ((body, body.discretisation) for body in scene.bodies)
-        bodies = (body if d is None else replace(body, discretisation=self._discretisation(d)) for body, d in own)
+        pairs = ((body, body.discretisation) for body in scene.bodies)
+        bodies = (body if d is None else replace(body, discretisation=self._discretisation(d)) for body, d in pairs)
         return replace(scene, bodies=tuple(bodies))
 
     def _discretisation(self, scene: Discretisation) -> Discretisation:
@@ -124,8 +124,8 @@ class Level:
     def at_worst(self, bodies: Sequence[FloatArray]) -> list[FloatArray]:
         """Return for each partition the largest values (n_elements,) that any of its bodies has."""
         worst: dict[int, FloatArray] = {}
-        for key, own in zip(self.keys.values(), bodies, strict=True):
-            worst[key] = np.maximum(worst.get(key, own), own)
+        for key, values in zip(self.keys.values(), bodies, strict=True):
+            worst[key] = np.maximum(worst.get(key, values), values)
         return [worst[key] for key in range(len(self.partitions))]
 
 

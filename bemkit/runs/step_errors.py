@@ -45,8 +45,8 @@ class StepErrors:
     def bodies(self) -> list[FloatArray] | None:
         """(n_elements,) arrays [J/m]: squared errors in the energy norm of each body; None without an estimate."""
         errors = [[body.element_errors for body in step.bodies.values()] for step in self.steps]
-        known = [[own for own in of_step if own is not None] for of_step in errors]
-        if any(len(own) < len(each) for own, each in zip(known, errors, strict=True)):
+        known = [[body_errors for body_errors in of_step if body_errors is not None] for of_step in errors]
+        if any(len(body_errors) < len(each) for body_errors, each in zip(known, errors, strict=True)):
             return None
         return [np.max(of_body, axis=0) for of_body in zip(*known, strict=True)]
 
@@ -67,7 +67,7 @@ class StepErrors:
         """Relative error in the energy norm; infinite without an estimate, and if it is measured by nothing."""
         if self.bodies is None:
             return float("inf")
-        squared = sum(float(own.sum()) for own in self.bodies)
+        squared = sum(float(body_errors.sum()) for body_errors in self.bodies)
         if squared == 0.0:
             return 0.0
         return float(np.sqrt(squared / self.unit)) if self.unit > 0.0 else float("inf")
@@ -90,8 +90,8 @@ class StepErrors:
             return None
         errors = [step.body.surface_errors for step in self.steps]
         known = [each for each in errors if each is not None]
-        own = self.worst.body.surface_errors
-        return None if own is None else own.at_worst(known)
+        surface_errors = self.worst.body.surface_errors
+        return None if surface_errors is None else surface_errors.at_worst(known)
 
 
 def in_which_step(solution: Solution) -> str:

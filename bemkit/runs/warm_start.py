@@ -69,7 +69,7 @@ def _carried(
         if not known.size:
             raise InputError(f"the start has no contact {part!r}: it has {', '.join(dict.fromkeys(names))}")
         known = known[np.argsort(arc_length[known])]
-        own = np.flatnonzero(parts == part)
+        rows = np.flatnonzero(parts == part)
         for column in range(4):
-            result[own, column] = np.interp(places[own], arc_length[known], values[known, column])
+            result[rows, column] = np.interp(places[rows], arc_length[known], values[known, column])
     return ContactState(result[:, :2], result[:, 2:])
