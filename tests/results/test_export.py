@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from base64 import b64decode
 from collections.abc import Callable
+from importlib.util import find_spec
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -15,11 +16,13 @@ import bemkit as bk
 from bemkit.atomic_files import OutputFileError
 from bemkit.cli.main import main
 from bemkit.pictures.shown import shown
+from bemkit.pictures.stress import draw_stress
 from bemkit.results.export import FORMATS, boundary_arrays, export_result
 from bemkit.results.solution import Solution
 from bemkit.results.stress_measures import STRESSES
 from bemkit.results.stress_mesh import stress_mesh
 from bemkit.scene.toml import with_overrides
+from bemkit.scene.unit_names import amount
 from tests.perforated_plate import NOMINAL, plate
 from tests.slow import slow_only
 
@@ -129,6 +132,13 @@ def test_triangles_end_at_the_boundary_and_hold_the_largest_stress(is_biaxial: b
     # the picture draws the same triangles and values
     size = np.ptp(solution.mesh.whole.nodes, axis=0).max()
     drawn = stress_mesh(solution.body, float(size) / 48, shown(solution).frame)
+    assert draw_stress(solution).get_title().startswith(f"Stress up to {amount(largest, 'stress', None)}\n")
+    if find_spec("pyvista"):
+        import pyvista
+
+        grid = pyvista.read(tmp_path / "r.vtu")
+        assert np.isfinite(grid.point_data["von_mises"]).all()
+        assert grid.point_data["von_mises"].max() == mesh.point_data["von_mises"].max()
     triangles = next(block.data for block in mesh.cells if block.type == "triangle")
     used = mesh.point_data["von_mises"][-len(drawn.points) :]
     np.testing.assert_allclose(used, STRESSES["von-mises"].of(drawn.stress, scene.material), rtol=1e-9)
