@@ -12,10 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray
-from bemkit.contact.obstacle import Obstacle, RigidCavity, RigidCircle, RigidHalfPlane, measure_contact
-from bemkit.contact.polygon import RigidPolygon
-from bemkit.contact.signed_distance import SignedDistance
-from bemkit.contact.spline import RigidSpline
+from bemkit.contact.obstacle import SIMPLE_OBSTACLES, Obstacle, measure_contact
 from bemkit.geometry.spaces import element_nodes
 from bemkit.geometry.vectors import norms
 from bemkit.model.contacts import ContactRows
@@ -26,8 +23,6 @@ from bemkit.scene.conditions import Contact
 from bemkit.scene.unit_names import amount
 from bemkit.solvers.base import ContactSolution, Status
 
-IN_THE_PLANE = (RigidHalfPlane, RigidCircle, RigidCavity, RigidPolygon, RigidSpline, SignedDistance)
-"""Obstacles with a position in the plane, so that their distance from a point that has moved is known."""
 _BY_DEFORMATION = 5.0
 """Displacements by contact forces, up to which a motion along a contact is one of deformation."""
 _OFF = 0.2
@@ -115,7 +110,7 @@ def _is_off_obstacle(
     rows: ContactRows, obstacle: Obstacle, displacement: FloatArray, is_pressed: BoolArray, deformation: float
 ) -> bool:
     """Whether pressed nodes have come to where the obstacle is elsewhere, or faces them in another direction."""
-    if not isinstance(obstacle, IN_THE_PLANE):
+    if not is_in_the_plane(obstacle):
         return False
     points, frame, moved = rows.points[is_pressed], rows.frame[is_pressed], displacement[is_pressed]
     gap, _ = measure_contact(obstacle, points, frame[:, 0])
@@ -141,3 +136,14 @@ def _fixed_obstacle(prepared: Prepared, rows: ContactRows) -> Obstacle:
     parts = prepared.bodies[rows.body].scene.parts
     stated = {part.name: part.condition for part in parts if isinstance(part.condition, Contact)}
     return stated[rows.part].obstacle
+
+
+def is_in_the_plane(obstacle: Obstacle) -> bool:
+    """Whether an obstacle has a position in the plane, so that its distance from a point that has moved is known."""
+    if isinstance(obstacle, SIMPLE_OBSTACLES):
+        return True
+    from bemkit.contact.polygon import RigidPolygon
+    from bemkit.contact.signed_distance import SignedDistance
+    from bemkit.contact.spline import RigidSpline
+
+    return isinstance(obstacle, RigidPolygon | RigidSpline | SignedDistance)

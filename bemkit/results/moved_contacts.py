@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from bemkit.arrays import IntArray
-from bemkit.contact.obstacle import SIMPLE_OBSTACLES, Obstacle
+from bemkit.contact.obstacle import Obstacle
 from bemkit.geometry.neighbours import along_boundary
 from bemkit.geometry.vectors import norms
+from bemkit.model.finite_sliding import is_in_the_plane
 from bemkit.results.between_nodes import Interpolation, points_at_obstacle, points_between
 from bemkit.results.solved_body import SolvedBody
 from bemkit.scene.conditions import Contact
@@ -30,24 +31,13 @@ def distances_off(body: SolvedBody) -> dict[str, tuple[float, float]]:
     """
     found = {}
     for part in body.scene.parts:
-        if isinstance(part.condition, Contact) and _is_in_the_plane(part.condition.obstacle):
+        if isinstance(part.condition, Contact) and is_in_the_plane(part.condition.obstacle):
             elements = along_boundary(body.mesh, body.mesh.part(part.name))
             force = float(body.mesh.lengths[elements] @ norms(body.boundary.traction[elements]))
             if force > 0.0:
                 off = _distance_off(body, part.condition.obstacle, elements)
                 found[part.name] = off, force / body.scene.material.plane_modulus
     return found
-
-
-def _is_in_the_plane(obstacle: Obstacle) -> bool:
-    """Whether an obstacle has a position in the plane, so that its distance from a point that has moved is known."""
-    if isinstance(obstacle, SIMPLE_OBSTACLES):
-        return True
-    from bemkit.contact.polygon import RigidPolygon
-    from bemkit.contact.signed_distance import SignedDistance
-    from bemkit.contact.spline import RigidSpline
-
-    return isinstance(obstacle, RigidPolygon | RigidSpline | SignedDistance)
 
 
 def _distance_off(body: SolvedBody, obstacle: Obstacle, elements: IntArray) -> float:

@@ -67,8 +67,6 @@ def checked(model: Model, result: ContactSolution) -> ContactSolution:
         from bemkit.model.turning import with_turning_checked
 
         result = with_turning_checked(model, result)
-    if model.prepared.scene.has_obstacles_only:
-        return result
     from bemkit.model.finite_sliding import with_sliding_checked
 
     return with_sliding_checked(model, result)

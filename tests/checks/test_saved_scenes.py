@@ -29,17 +29,17 @@ def outcome_of(name: str) -> tuple[Outcome, str]:
     ("name", "outcomes"),
     [
         ("unloaded-without-strain", [Outcome.NAMED]),  # a corner of the obstacle lies between two nodes
-        ("tip-of-a-wedge", RIGHT),
+        ("tip-of-a-wedge", [Outcome.NAMED]),  # a half-plane slides along the slopes of a wedge
         ("no-shear", RIGHT),
         ("carried-along", RIGHT),
         # whether a node touches at all is decided by round-off; its overlap between nodes is warned of or named
         ("contact-between-nodes", [Outcome.WARNED, Outcome.NAMED]),
-        ("far-fall-far-away", RIGHT),
+        ("far-fall-far-away", [Outcome.NAMED]),  # along a circle, by a fifth of the size of the plate
         # a half-plane 161 wide, whose gaps are zero but for -4e-15, after a motion of 1e-4 without contact
         ("back-at-rest", [Outcome.WARNED]),
         # its overlap ended within 1e-9 of the way, which was 2e-6 of the deformation
         pytest.param("pushed-aside", [*RIGHT, Outcome.NAMED], marks=SLOW),
-        pytest.param("wedge", RIGHT, marks=SLOW),
+        pytest.param("wedge", [*RIGHT, Outcome.NAMED], marks=SLOW),  # two nodes on each flank
         pytest.param("blocks-of-degree-4", RIGHT, marks=SLOW),
         pytest.param("stiff-pairs", RIGHT, marks=SLOW),
         # a disc between two nodes of the block above it
@@ -47,9 +47,9 @@ def outcome_of(name: str) -> tuple[Outcome, str]:
         # contacts slide farther than small displacements describe
         pytest.param("heavy-disc", [Outcome.NAMED], marks=SLOW),
         pytest.param("one-node-that-carries-all", [Outcome.NAMED], marks=SLOW),
-        # the work of collocation does not balance, and slip counts from the last increment of a step
-        pytest.param("history-of-collocation", [Outcome.WARNED], marks=SLOW),
-        pytest.param("history-of-increments", [Outcome.WARNED], marks=SLOW),
+        # three nodes carry a block; the work of collocation does not balance, slip counts from the last increment
+        pytest.param("history-of-collocation", [Outcome.WARNED, Outcome.NAMED], marks=SLOW),
+        pytest.param("history-of-increments", [Outcome.WARNED, Outcome.NAMED], marks=SLOW),
         ("touches-between-nodes", [Outcome.WARNED, Outcome.NAMED]),  # a disc of constant elements, likewise
         ("ends-that-differ-by-round-off", [Outcome.WARNED]),
         ("nothing-holds", [Outcome.NAMED]),  # a block that touches nothing, and two without support

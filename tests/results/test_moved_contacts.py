@@ -1,4 +1,4 @@
-"""Contact with obstacles along which a body has moved too far for its gaps is warned of."""
+"""Contact with obstacles along which a body has moved too far for its gaps is named or warned of."""
 
 from __future__ import annotations
 
@@ -31,15 +31,32 @@ def doubts(solution: bk.Solution) -> list[str]:
     return [sentence for sentence in map(str, solution.warnings) if "moves so far" in sentence]
 
 
-def test_sliding_far_along_a_curved_obstacle_is_doubted() -> None:
+def test_sliding_far_along_a_curved_obstacle_ends_by_name() -> None:
     """By a tenth of the radius, which takes the block 5e-3 away from the cylinder that it is pressed into by 1e-2."""
     solution = bk.run(block(0.1))
-    assert solution.is_converged
-    (doubt,) = doubts(solution)
-    assert "Part 'floor' moves so far that its contact ends 0.00" in doubt
-    assert "Model the body in its final position" in doubt
+    assert solution.status is bk.Status.FINITE_SLIDING
+    assert "contact 'floor': the sides move by" in solution.message
     there = bk.run(replace(block(0.0), shape=bk.Rectangle(1.0, 1.0, (0.1, 0.0))))
-    assert solution.force_normal > 1.2 * there.force_normal  # the doubt is right
+    assert solution.force_normal > 1.2 * there.force_normal  # the name is right
+
+
+def test_a_light_contact_with_a_curved_obstacle_far_away_is_doubted() -> None:
+    """A block slides on a plane until a light force presses it against a cylinder 0.2 away."""
+    stop = bk.Contact(bk.RigidCircle((1.7, 0.25), 0.5))
+    scene = replace(
+        block(0.0), shape=bk.Rectangle(1.0, 0.5), material=bk.Material(1.0, 0.3), law=bk.Frictionless(),
+        parts=(
+            bk.Part("floor", bk.Contact(bk.RigidHalfPlane()), ("bottom",)),
+            bk.Part("stop", stop, ("right",)),
+            bk.Part("push", bk.Traction(1e-4, -1e-3), ("left",)),
+            bk.Part("load", bk.Pressure(1e-3), ("top",)),
+        ),
+        discretisation=bk.Galerkin(1),
+        mesh=bk.MeshOptions(elements=80),
+    )  # fmt: skip
+    (doubt,) = doubts(bk.run(scene))
+    assert "Part 'stop' moves so far that its contact ends 0.0002" in doubt
+    assert "Model the body in its final position" in doubt
 
 
 @pytest.mark.parametrize("scene", [block(0.01), block(0.1, bk.RigidHalfPlane()), block(0.1, bk.Gap(0.0))])
