@@ -76,8 +76,7 @@ def drawn_scene(n_bodies: int, seed: int, index: int) -> tuple[Scene, Draw]:
 def try_scene(n_bodies: int, seed: int, index: int) -> Trial:
     """Solve a scene and compare estimates with errors.
 
-    A row counts if both solutions are certified, the contact is resolved, and the fine solution is accurate enough. The
-    rules are older than the numbers.
+    A row counts if both solutions are certified, the contact is resolved, and the fine solution is accurate enough.
     """
     scene, draw = drawn_scene(n_bodies, seed, index)
     discretisations = {degree: _discretised(scene, draw, degree) for degree in DEGREES}
