@@ -20,8 +20,8 @@ they touch: mortar conditions hold in the mean, which curved sides of long eleme
 def with_missed_contact_named(solution: Solution) -> Solution:
     """Return the same solution, with the status MISSED_CONTACT if the mesh does not find the contact.
 
-    A contact without any force overlaps between its nodes, one with a force at a few nodes is deeper between them than
-    forces move the bodies, or sides that touch nowhere have a force.
+    A contact without any force overlaps between its nodes, one with a force at a few nodes is much deeper between them
+    than forces move the bodies, or sides that touch nowhere have a force.
     """
     if not solution.is_converged:
         return solution

@@ -215,7 +215,7 @@ class Solution(SolvedScene, Explorable):
 
     @cached_property
     def unfound_contacts(self) -> dict[str, tuple[float, float]]:
-        """The missed contacts without any force, and those of a few nodes that overlap by more than forces move them.
+        """The missed contacts without any force, and those of a few nodes that are much deeper than forces move them.
 
         Contacts of more nodes are not measured for it.
         """

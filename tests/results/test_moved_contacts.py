@@ -95,3 +95,19 @@ def test_a_part_that_does_not_face_its_obstacle_is_not_doubted() -> None:
         mesh=bk.MeshOptions(elements=16),
     )  # fmt: skip
     assert not doubts(bk.run(scene))
+
+
+def test_friction_across_the_gap_is_no_contact_that_slides() -> None:
+    """A disc sinks a long way before it touches; by the law of Tresca nodes that face away carry friction, too."""
+    disc = bk.Scene(
+        title="Disc that sinks onto a floor",
+        shape=bk.Sector(1.0, 180.0, 360.0, centre=(0.0, 1.05)),
+        material=bk.Material(1.0, 0.3),
+        parts=(
+            bk.Part("floor", bk.Contact(bk.RigidHalfPlane()), ("arc",)),
+            bk.Part("load", bk.PrescribedDisplacement(0.0, -0.051), ("start", "end")),
+        ),
+        law=bk.Tresca(1e-6),
+        mesh=bk.MeshOptions(elements=120),
+    )
+    assert bk.run(disc).status is bk.Status.CONVERGED
