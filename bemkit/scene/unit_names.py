@@ -10,7 +10,6 @@ from dataclasses import dataclass, fields, replace
 from types import MappingProxyType
 
 from bemkit.errors import InputError
-from bemkit.formulas import closest
 
 _LONGEST = 24
 QUANTITIES: Mapping[str, str] = MappingProxyType(
@@ -77,6 +76,8 @@ def read_unit(text: str) -> Unit:
                 continue
             found = _FACTOR.fullmatch(factor)
             if found is None or found[1] not in _UNITS:
+                from bemkit.formulas import closest  # loads numpy, which help and errors of options do without
+
                 raise InputError(
                     f"the unit {factor!r} is unknown: give one of {', '.join(_UNITS)}{closest(factor, _UNITS)}"
                 )

@@ -1,4 +1,4 @@
-"""What the flanks of the wedge carry
+"""Pressure on the flanks of a wedge
 
 The pressing force on both flanks of the wedge over the coefficient of friction: twenty-one solves that share one
 factored body. The more friction carries, the less the flanks press; where all of them slip, equilibrium determines

@@ -52,10 +52,11 @@ def test_energy_of_a_clamped_angle(word: str, exponent: float, order: tuple[floa
 @pytest.mark.parametrize("example", slow_except((1, 2), 1))
 @pytest.mark.parametrize(
     ("word", "accuracy", "energy_order", "traction_order"),
-    # orders of smooth solutions: 3 and 5 in the energy, 1.5 and 2 in the tractions; these are seen on short sequences
+    # orders of smooth solutions: 3 and 5 in the energy, 1.5 and 2 in the tractions; these are seen on short sequences,
+    # in which errors fall faster while meshes find the points where the status changes
     [
         pytest.param("linear", 8e-4, (2.5, 4.5), (1.4, 3.5), marks=pytest.mark.slow),
-        ("quadratic", 1e-4, (3.0, 7.0), (1.7, 4.5)),
+        ("quadratic", 1e-4, (3.0, 7.0), (1.7, 5.5)),
     ],
 )
 def test_adapted_meshes_keep_the_orders_of_smooth_solutions(

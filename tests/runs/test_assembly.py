@@ -193,8 +193,8 @@ def test_columns_between_smooth_walls_settle_under_their_weight() -> None:
 
 
 def test_two_cylinders_are_those_of_hertz() -> None:
-    """To 0.2 % at the accuracy of the shipped scene; the finite cylinders themselves differ from Hertz by 1e-4."""
-    solution = bk.run(bk.load_scene("two-cylinders"))
+    """To 0.2 % at an accuracy of 0.3 %; the finite cylinders themselves differ from Hertz by 1e-4."""
+    solution = bk.run(replace(bk.load_scene("two-cylinders"), mesh=bk.MeshOptions(accuracy=3e-3)))
     assert solution.is_converged
     (contact,) = solution.contacts
     half_width = np.sqrt(4.0 * contact.force_normal / np.pi)  # R = 1/2, E* = 1/2
@@ -203,7 +203,7 @@ def test_two_cylinders_are_those_of_hertz() -> None:
     assert contact.peak_pressure == pytest.approx(peak, rel=2e-3)
     # alike bodies in the mean of both normals: no shear; with the normals of one it is 4 to 11 % of the peak
     assert np.abs(solution.contact.sigma_t).max() < 1e-3 * peak
-    assert 0.0 < solution.estimated_error < 5e-3
+    assert 0.0 < solution.estimated_error < 3e-3
 
 
 def test_meshes_follow_the_solution_on_both_sides() -> None:
