@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from bemkit.results.contact_table import free_contacts, narrow_contacts
+from bemkit.results.contact_table import free_contacts
 from bemkit.scene.unit_names import amount
 from bemkit.solvers.base import Status
 
@@ -27,7 +27,7 @@ def with_missed_contact_named(solution: Solution) -> Solution:
         return solution
     if solution.unfound_contacts:
         name, (x, y) = next(iter(solution.unfound_contacts.items()))
-        between = solution.between_nodes_of({name})[name]
+        between = solution.narrow_contacts_between_nodes[name]
         depth = amount(between.penetration_depth, "length", solution.units, 2)
         words = f"Contact {name!r} overlaps by {depth} at ({x:.4g}, {y:.4g})."
     elif apart := _pressed_apart(solution):
@@ -40,6 +40,9 @@ def with_missed_contact_named(solution: Solution) -> Solution:
 
 def _pressed_apart(solution: Solution) -> list[str]:
     """Return the contacts between elastic bodies with a force whose sides touch nowhere."""
-    pressed = narrow_contacts(solution.contact) - free_contacts(solution.contact)
-    pairs = {name for name in pressed if solution.n_sides(name) > 1}
-    return [name for name, each in solution.between_nodes_of(pairs).items() if each.apart > LARGEST_APART]
+    free = free_contacts(solution.contact)
+    return [
+        name
+        for name, each in solution.narrow_contacts_between_nodes.items()
+        if name not in free and solution.n_sides(name) > 1 and each.apart > LARGEST_APART
+    ]

@@ -219,8 +219,12 @@ class Solution(SolvedScene, Explorable):
 
         Contacts of more nodes are not measured for it.
         """
-        narrow = self.between_nodes_of(narrow_contacts(self.contact))
-        return unfound_contacts(self.contact, narrow)
+        return unfound_contacts(self.contact, self.narrow_contacts_between_nodes)
+
+    @cached_property
+    def narrow_contacts_between_nodes(self) -> dict[str, BetweenNodes]:
+        """Largest violations between the nodes of contacts with a force at a few nodes at most."""
+        return self.between_nodes_of(narrow_contacts(self.contact))
 
     @property
     def unasked_warnings(self) -> Any:
