@@ -19,7 +19,7 @@ CONTRIBUTING = Path(__file__).parent.parent / "CONTRIBUTING.md"
 NAME = "bemkit"
 NOT_NEEDED = (
     *("operators.steklov_poincare.galerkin", "operators.forms", "operators.assembly", "operators.integrals.sweep"),
-    "operators.matrix_free.needs",
+    "operators.matrix_free.cost",
     *("operators.particular_solutions", "model.particular", "model.free_motion", "model.contact_free_body"),
     *("geometry.drawn", "geometry.nurbs", "geometry.files", "geometry.arclength"),
     *("geometry.reflection", "geometry.meshing.partition", "geometry.meshing.layers"),

@@ -77,7 +77,7 @@ class Unbalanced:
     motions_round_off: float
     terms: float
 
-    def beside(self, given: FloatArray, reaction: float = 0.0, round_off: float = 0.0) -> Imbalance:
+    def relative_to(self, given: FloatArray, reaction: float = 0.0, round_off: float = 0.0) -> Imbalance:
         """Return it relative to the forces at hand.
 
         Parameters

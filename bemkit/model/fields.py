@@ -27,7 +27,7 @@ def elastic_energy(
     of_map, map_force = elastic.own_fields(displacement, force)
     # the forces are in equilibrium: on a rigid motion, which may be huge, they would only do the work of round-off
     strained = without_motion(space.mesh, dof_points(space), of_map)
-    return 0.5 * float(np.sum(strained * map_force)) + float(elastic.energy_beyond(of_map, map_force).sum())
+    return 0.5 * float(np.sum(strained * map_force)) + float(elastic.further_energy(of_map, map_force).sum())
 
 
 def insert_loads(

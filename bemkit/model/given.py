@@ -22,8 +22,8 @@ from bemkit.operators.linear.solvers import (
 )
 from bemkit.operators.pair_form import Tag
 from bemkit.operators.steklov_poincare import SteklovPoincare, TractionField
-from bemkit.operators.steklov_poincare.hierarchical_needs import choose_collocation_solver
-from bemkit.operators.steklov_poincare.needs import BodyCase, physical_memory
+from bemkit.operators.steklov_poincare.cost import BodyCase, physical_memory
+from bemkit.operators.steklov_poincare.hierarchical_cost import choose_collocation_solver
 from bemkit.operators.steklov_poincare.nodal_conditions import (
     ConflictingSupportsError,
     GivenData,
@@ -152,19 +152,19 @@ def loaded_map(elastic: SteklovPoincare, inside: ForcesInside | None) -> Steklov
     """Return a map under forces inside the body, the map itself if there are none."""
     if inside is None:
         return elastic
-    from bemkit.operators.steklov_poincare.forces_inside import HeavyElasticity
+    from bemkit.operators.steklov_poincare.forces_inside import ElasticityWithBodyForces
 
-    return HeavyElasticity(elastic, inside)
+    return ElasticityWithBodyForces(elastic, inside)
 
 
-def weightless(elastic: SteklovPoincare, inside: ForcesInside | None) -> SteklovPoincare:
+def without_body_forces(elastic: SteklovPoincare, inside: ForcesInside | None) -> SteklovPoincare:
     """Return a map of `loaded_map` without the forces inside the body."""
     if inside is None:
         return elastic
-    from bemkit.operators.steklov_poincare.forces_inside import HeavyElasticity
+    from bemkit.operators.steklov_poincare.forces_inside import ElasticityWithBodyForces
 
-    assert isinstance(elastic, HeavyElasticity)
-    return elastic.weightless
+    assert isinstance(elastic, ElasticityWithBodyForces)
+    return elastic.without_body_forces
 
 
 def given_data(conditions: NodalConditions, force: FloatArray, inside: ForcesInside | None) -> GivenData:

@@ -18,7 +18,7 @@ from bemkit.contact.body import ContactState
 from bemkit.contact.problem import ContactProblem
 from bemkit.errors import InputError
 from bemkit.model.fields import elastic_energy, insert_loads
-from bemkit.model.given import driven_by, loaded_map, weightless
+from bemkit.model.given import driven_by, loaded_map, without_body_forces
 from bemkit.model.placed import groups, shape_numbers
 from bemkit.model.prepared import Prepared, PreparedBody
 from bemkit.model.single_body import SingleBody, is_direct, is_single, single_body
@@ -335,7 +335,7 @@ def _loaded(maps: Sequence[SteklovPoincare], bodies: Sequence[PreparedBody]) -> 
 def _maps_under(prepared: Prepared, model: Model) -> tuple[SteklovPoincare, ...]:
     """Return the maps of a model under the body forces and the motions far away of another step."""
     loaded = zip(model.elastic, model.prepared.bodies, strict=True)
-    maps = [weightless(map_, body.inside) for map_, body in loaded]
+    maps = [without_body_forces(map_, body.inside) for map_, body in loaded]
     pairs = zip(maps, model.prepared.bodies, prepared.bodies, strict=True)
     moved = [map_ if one.drive == two.drive else driven_by(map_, two.drive) for map_, one, two in pairs]
     return _loaded(moved, prepared.bodies)

@@ -35,8 +35,8 @@ from bemkit.operators.linear.solvers import ChosenLinearSolver, DenseCholesky, L
 from bemkit.operators.material import Material
 from bemkit.operators.pair_form import Tag
 from bemkit.operators.steklov_poincare import SteklovPoincare
-from bemkit.operators.steklov_poincare.hierarchical_needs import LARGEST_BLOCK
-from bemkit.operators.steklov_poincare.needs import BodyCase
+from bemkit.operators.steklov_poincare.cost import BodyCase
+from bemkit.operators.steklov_poincare.hierarchical_cost import LARGEST_BLOCK
 from bemkit.operators.steklov_poincare.nodal_conditions import (
     GivenData,
     NodalConditions,

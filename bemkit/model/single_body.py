@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, TypeAlias
 from bemkit.contact.condensation.direct_body import DirectBody, WholeBody
 from bemkit.contact.condensation.nodes import NoContactNodesError, opened
 from bemkit.errors import InputError
-from bemkit.model.given import weightless
+from bemkit.model.given import without_body_forces
 from bemkit.model.prepared import Prepared
 from bemkit.operators.steklov_poincare import CondensedMap, SteklovPoincare
 
@@ -93,6 +93,6 @@ def single_body(prepared: Prepared, elastic: SteklovPoincare, condensed: Condens
     from bemkit.contact.condensation.hierarchical_body import hierarchical_body
     from bemkit.operators.steklov_poincare.hierarchical import HierarchicalCollocation
 
-    compressed = weightless(elastic, body.inside)
+    compressed = without_body_forces(elastic, body.inside)
     assert isinstance(compressed, HierarchicalCollocation)
     return hierarchical_body(compressed, conditions, nodes, body.force, body.inside)

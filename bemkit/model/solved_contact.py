@@ -178,7 +178,7 @@ def _negative_work(
     """Say how negative the work of all forces is, without those inside or with them; empty if neither is."""
     motions = traction_free_modes(space.mesh, dof_points(space))
     share = negative_share(displacement, force, motions, sensitivity)
-    if not share and (beyond := elastic.energy_beyond(displacement, force)).any():
+    if not share and (beyond := elastic.further_energy(displacement, force)).any():
         share = negative_share(displacement, force, motions, sensitivity, 2.0 * beyond)
     return f"it is {-share:.1e} times the work of all forces, each taken by its size" if share else ""
 

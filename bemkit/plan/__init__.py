@@ -1,6 +1,6 @@
 """Only what the scene needs: the cost of a scene, what is skipped, and why."""
 
-from bemkit.operators.steklov_poincare.needs import PlanItem as PlanItem
+from bemkit.operators.steklov_poincare.cost import PlanItem as PlanItem
 from bemkit.plan.items import Sizes as Sizes
 from bemkit.plan.plan import Plan as Plan
 from bemkit.plan.plan import TooLargeError as TooLargeError

@@ -12,7 +12,7 @@ from bemkit.geometry.symmetry import Symmetry
 from bemkit.model.placed import PlacedBody, groups
 from bemkit.model.prepared import Prepared
 from bemkit.operators.rigid_modes import admissible_modes
-from bemkit.operators.steklov_poincare.needs import PlanItem
+from bemkit.operators.steklov_poincare.cost import PlanItem
 from bemkit.scene.body_scene import BodyScene
 from bemkit.scene.registry import BODY_FORCES
 from bemkit.scene.scene import Scene

@@ -16,10 +16,10 @@ from bemkit.model.prepared import Prepared, prepare_steps
 from bemkit.notebook import ShownInNotebooks
 from bemkit.operators.counts import OperationCounts
 from bemkit.operators.linear.solvers import LinearSolver
-from bemkit.operators.steklov_poincare.needs import (
+from bemkit.operators.steklov_poincare.cost import (
     CONTACT_STEPS,
     BodyCase,
-    BodyNeeds,
+    BodyCost,
     PlanItem,
     physical_memory,
     seconds_of,
@@ -144,7 +144,7 @@ def plan_steps(steps: Sequence[Prepared], proposal: Symmetry | None = None) -> P
     )
 
 
-def _needs(steps: Sequence[Prepared], number: int) -> BodyNeeds:
+def _needs(steps: Sequence[Prepared], number: int) -> BodyCost:
     first, body = steps[0], steps[0].bodies[number]
     case = BodyCase(
         body.own_space.mesh,
@@ -154,7 +154,7 @@ def _needs(steps: Sequence[Prepared], number: int) -> BodyNeeds:
         first.linear_solver(body),
         first.is_condensed,
     )
-    return first.elastic_map(body).needs(case)
+    return first.elastic_map(body).cost(case)
 
 
 @dataclass(frozen=True)

@@ -130,7 +130,7 @@ def _solved(scene: Scene, name: str) -> Solution:
     )
     demand(
         solution.work == solution.plan.work,
-        f"{name}.elastic_map: its needs foresee {solution.plan.work.as_dict()}, "
+        f"{name}.elastic_map: its cost predicts {solution.plan.work.as_dict()}, "
         f"but it counts {solution.work.as_dict()}",
     )
     return solution

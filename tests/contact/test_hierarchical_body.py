@@ -18,7 +18,7 @@ from bemkit.model.model import Model, build_model
 from bemkit.model.prepared import prepare
 from bemkit.operators.hierarchy.factor import Factor
 from bemkit.operators.hierarchy.skeletons import Compression
-from bemkit.operators.hierarchy.system import ElementLaws, HierarchicalSystem
+from bemkit.operators.hierarchy.system import HierarchicalSystem, LocalConditions
 from bemkit.operators.linear import threads
 from bemkit.operators.linear.solvers import DenseCholesky, Hierarchical
 from bemkit.operators.steklov_poincare.hierarchical import HierarchicalCollocation
@@ -175,8 +175,8 @@ def test_a_body_is_compressed_and_factored_once_for_all_load_steps(monkeypatch: 
         result: Compression = compressed[-1]
         return result
 
-    def updated(factor: Factor, laws: ElementLaws) -> None:
-        update(factor, laws)
+    def updated(factor: Factor, conditions: LocalConditions) -> None:
+        update(factor, conditions)
         factored.append(factor.n_factored)
 
     monkeypatch.setattr(Compression, "of", classmethod(of))
@@ -284,4 +284,4 @@ def test_a_contact_boundary_that_supports_fix_is_named() -> None:
     body = model.body
     assert isinstance(body, HierarchicalBody)
     with pytest.raises(NoContactNodesError, match="fix every node"):
-        hierarchical_body(body.loaded.map, body.conditions, body.nodes.take(np.zeros(0, np.intp)), body.force)
+        hierarchical_body(body.loaded.elastic, body.conditions, body.nodes.take(np.zeros(0, np.intp)), body.force)

@@ -128,11 +128,11 @@ forces = st.floats(1e-9, 1e9)
 def test_what_is_missing_is_relative_to_the_forces_at_hand(contact: float, given_force: float, share: float) -> None:
     missing = share * max(contact, given_force)
     state = Unbalanced(np.array([-contact, 0.0]), missing, missing, 0.0, 0.0, terms=1e12 * (contact + given_force))
-    off = state.beside(np.array([0.0, given_force]))
+    off = state.relative_to(np.array([0.0, given_force]))
     assert off.force == pytest.approx(share)
     assert off.moment == pytest.approx(missing / (contact + given_force))
     # supports may squeeze a body by any force without work on its free motions
-    squeezed = state.beside(np.array([given_force]), reaction=1e15)
+    squeezed = state.relative_to(np.array([given_force]), reaction=1e15)
     assert squeezed.force == pytest.approx(missing / 1e15)
     assert squeezed.moment == pytest.approx(off.moment)
 
@@ -142,15 +142,15 @@ def test_round_off_of_a_moved_body_is_no_force_but_a_load_is(terms: float, share
     round_off = np.finfo(float).eps * terms
     noise = share * NOISE_FACTOR * round_off
     moved = Unbalanced(np.array([noise]), noise, noise, round_off, round_off, terms)
-    assert moved.beside(np.zeros(3)).worst <= NOISE_FACTOR * np.finfo(float).eps
-    assert moved.beside(np.array([noise])).worst >= 0.5  # a body on its way to infinity balances no load
-    assert moved.beside(np.array([noise])).round_off == 1e-6
+    assert moved.relative_to(np.zeros(3)).worst <= NOISE_FACTOR * np.finfo(float).eps
+    assert moved.relative_to(np.array([noise])).worst >= 0.5  # a body on its way to infinity balances no load
+    assert moved.relative_to(np.array([noise])).round_off == 1e-6
     more = 1.1 / share * noise
-    assert Unbalanced(np.array([more]), more, more, round_off, round_off, terms).beside(np.zeros(3)).worst == 1.0
+    assert Unbalanced(np.array([more]), more, more, round_off, round_off, terms).relative_to(np.zeros(3)).worst == 1.0
 
 
 @pytest.mark.parametrize("missing", [0.0, 1e-30, 1.0])
 def test_nothing_is_small_beside_nothing(missing: float) -> None:
     """A stiffness of zero, as of one contact node of a driven half-plane, balances no load."""
     state = Unbalanced(np.zeros(2), missing, missing, 0.0, 0.0, terms=0.0)
-    assert state.beside(np.zeros(2)).worst == float(missing > 0.0)
+    assert state.relative_to(np.zeros(2)).worst == float(missing > 0.0)

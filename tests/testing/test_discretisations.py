@@ -18,8 +18,8 @@ from bemkit.operators.linear.solvers import LinearSolver
 from bemkit.operators.pair_form import Tag
 from bemkit.operators.steklov_poincare import CondensedMap
 from bemkit.operators.steklov_poincare.collocation import CollocationElasticity
+from bemkit.operators.steklov_poincare.cost import BodyCase, BodyCost
 from bemkit.operators.steklov_poincare.galerkin import GalerkinElasticity
-from bemkit.operators.steklov_poincare.needs import BodyCase, BodyNeeds
 from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions
 from bemkit.scene.discretisation import Discretisation
 from bemkit.scene.registry import DISCRETISATIONS
@@ -165,9 +165,9 @@ class TooHigh(Own):
 class Unforeseen(CollocationElasticity):
     """Predicts nothing."""
 
-    def needs(self, case: BodyCase) -> BodyNeeds:
+    def cost(self, case: BodyCase) -> BodyCost:
         """Return nothing."""
-        return BodyNeeds()
+        return BodyCost()
 
 
 @dataclass(frozen=True)
@@ -248,7 +248,7 @@ class HalfTheTractions(bk.ConstantCollocation):
         (Vague(), "Vague.estimates_error is None, not a bool"),
         (OtherSpace(), "OtherSpace.displacement_space is not the displacement_space of its map"),
         (TooHigh(), r"TooHigh.estimates_error is True with .* of the degrees \(2, 0\)"),
-        (Uncounted(), "Uncounted.elastic_map: its needs foresee .*'element_pairs': 0.*, but it counts"),
+        (Uncounted(), "Uncounted.elastic_map: its cost predicts .*'element_pairs': 0.*, but it counts"),
         (NotSymmetric(), "NotSymmetric.elastic_map says it is symmetric: it differs from its transpose by"),
         (Turning(), "Turning.elastic_map says it is zero on rigid motions: a turn causes"),
         (Springs(), "Springs.elastic_map: a translation causes forces"),

@@ -184,7 +184,7 @@ class DenseBody(LinearBody):
 
     def imbalance(self, state: ContactState) -> Imbalance:
         """Return how far the state is from equilibrium, relative to load and contact forces; see `unbalanced`."""
-        return self.unbalanced(state).beside(self.load)
+        return self.unbalanced(state).relative_to(self.load)
 
     def unbalanced(self, state: ContactState) -> Unbalanced:
         """Return the largest nodal force out of balance, and the work of load and tractions on rigid motions.

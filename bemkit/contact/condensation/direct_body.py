@@ -146,7 +146,7 @@ class WholeBody:
         round_off = max(of_forces, float(np.finfo(float).eps * largest * column_sums.sum()))
         noise = NOISE_FACTOR * round_off
         reaction = float(np.abs(self.conditions.in_frames(force)[self.conditions.is_fixed]).max(initial=0.0))
-        result = of_contact.beside(self._given_forces, reaction if reaction > noise else 0.0, round_off)
+        result = of_contact.relative_to(self._given_forces, reaction if reaction > noise else 0.0, round_off)
         if not self.balanced or (np.abs(force).sum() <= noise and self._only_moves(displacement)):
             return result
         resultant, inner = self.condensed.volume_force, self.condensed.inner_force

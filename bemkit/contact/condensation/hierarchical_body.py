@@ -1,4 +1,4 @@
-"""An elastic body of many elements as the contact solvers see it: compressed, never condensed."""
+"""A body with compressed boundary equations as the contact solvers see it."""
 
 from __future__ import annotations
 
@@ -23,31 +23,32 @@ from bemkit.operators.steklov_poincare.hierarchical import HierarchicalCollocati
 from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions
 
 _SAMPLED_PAIRS, _MOST_SAMPLED, _FEWEST_SAMPLED = 250_000, 50, 8
-"""Points where a residual is evaluated: so many that their pairs with all elements take about as long as a response."""
+"""Pairs of a sampled point and an element, and limits of the number of points. Their residuals then take about as long
+as a response."""
 _KEPT = 3
-"""Responses whose conditions are remembered, so that fields of the whole boundary follow without another one."""
+"""Responses whose conditions are kept, so that the fields of the whole boundary need no other response."""
 _MOST_SHIFTS = 4
-"""Rounds in which the rigid motion of a body is found; each knows it to the tolerance of the compression better."""
+"""Largest number of rounds that find the rigid motion of a body; each gains a factor of the compression's tolerance."""
 _MANY = 4000
-"""Contact nodes from which on a response for each of them is too much."""
+"""Number of contact nodes above which one response for each node is too expensive."""
 
 
 @dataclass(frozen=True, eq=False)
 class ElementConditions:
-    """Contact components from tractions and displacements in the frames of elements, and conditions the other way.
+    """Maps between contact components and components in the frames of elements.
 
     Parameters
     ----------
     of_traction, of_displacement : (n_contact, 2, 2) arrays
-        ``sigma = of_traction @ t``, where t is the force of an element or node by its weight, and
-        ``u = of_displacement @ u_local``. Where a support holds a node in one direction, sigma_n is the effective
-        pressure on the other one, see `bemkit.contact.condensation.held_friction`, and sigma_t is zero.
+        ``sigma = of_traction @ t``, where t is the force of an element divided by its weight, and
+        ``u = of_displacement @ u_local``. If a support holds a node in one direction, sigma_n is the effective
+        pressure in the other direction, see `bemkit.contact.condensation.held_friction`, and sigma_t is zero.
     is_held : (n_contact,) bool array
-        These nodes.
+        Nodes that a support holds in one direction.
     support : (n_contact, 2) array
-        The direction that the support holds in the frame of the element, zero elsewhere.
+        The held direction in the frame of the element, zero elsewhere.
     given : (n_contact,) array [m]
-        The displacement that it prescribes.
+        The displacement prescribed there.
     """
 
     of_traction: FloatArray
@@ -58,7 +59,7 @@ class ElementConditions:
 
     @classmethod
     def of(cls, conditions: NodalConditions, contact: ContactNodes, weights: FloatArray) -> ElementConditions:
-        """Return what conditions and weights of all elements (n_elements,) and the frames of contact make of it."""
+        """Return the maps for the conditions and weights (n_elements,) of all elements and the contact frames."""
         nodes, is_held = contact.nodes, held_nodes(conditions, contact)
         turn = np.einsum("nkc,njc->nkj", contact.frame, conditions.frame[nodes])
         unit = np.broadcast_to(np.eye(2), turn.shape)
@@ -76,16 +77,16 @@ class ElementConditions:
         )
 
     def at_elements(self, conditions: LinearConditions) -> NodeConditions:
-        """Return conditions of contact in the frames of the elements; held tangents follow their support."""
+        """Return contact conditions in the frames of the elements; a support replaces those of held directions."""
         on_traction = conditions.on_traction @ self.of_traction
         on_displacement = conditions.on_displacement @ self.of_displacement
-        value = conditions.value.copy()
-        held = self.is_held
-        on_traction[held, 1], on_displacement[held, 1], value[held, 1] = 0.0, self.support[held], self.given[held]
+        value, is_held = conditions.value.copy(), self.is_held
+        on_traction[is_held, 1], on_displacement[is_held, 1] = 0.0, self.support[is_held]
+        value[is_held, 1] = self.given[is_held]
         return NodeConditions(on_traction, on_displacement, value)
 
     def of_contact(self, traction: FloatArray, displacement: FloatArray) -> ContactState:
-        """Return what contact sees of tractions and displacements (n_contact, 2) in the frames of the elements."""
+        """Return the contact state of tractions and displacements (n_contact, 2) in the frames of the elements."""
         return ContactState(_times(self.of_displacement, displacement), _times(self.of_traction, traction))
 
 
@@ -103,18 +104,17 @@ class HierarchicalBody(LinearBody):
     loaded : LoadedSystem
         The equations under the given supports and forces.
     nodes : ContactNodes
-        Elements, or nodes of Galerkin's method, that may touch, along whose frames the equations have theirs.
+        Elements that may touch; the frames of their equations are the contact frames.
     conditions : NodalConditions
-        Of the elements.
+        Conditions of the elements.
     force : (n_elements, 2) array [N/m]
         Given nodal forces, in x and y.
     inside : ForcesInside, optional
-        What acts inside the body; the equations know what its particular solution leaves of everything else.
+        Body forces and heat. The equations are solved for the difference from their particular solution.
 
     Notes
     -----
-    A response factors the leaves of the tree whose conditions differ from those of the last one, and what lies above
-    them.
+    A response factors the leaves whose conditions differ from those of the last response, and the clusters above them.
     """
 
     loaded: LoadedSystem
@@ -124,7 +124,7 @@ class HierarchicalBody(LinearBody):
     inside: ForcesInside | None = None
     _responses: list[_Response] = field(default_factory=list, init=False)
     _fields: list[_Fields] = field(default_factory=list, init=False)
-    _travelled: list[LoadedSystem] = field(default_factory=list, init=False)
+    _shifted: list[LoadedSystem] = field(default_factory=list, init=False)
 
     condensed = None
     """No stiffness is formed."""
@@ -136,8 +136,8 @@ class HierarchicalBody(LinearBody):
 
     @property
     def accuracy(self) -> float:  # type: ignore[override]
-        """Message of the linear solver."""
-        return self.loaded.map.options.accuracy
+        """Relative accuracy of the linear solver."""
+        return self.loaded.elastic.options.accuracy
 
     @property
     def responses_are_expensive(self) -> bool:  # type: ignore[override]
@@ -146,8 +146,8 @@ class HierarchicalBody(LinearBody):
 
     @property
     def stiffness_scale(self) -> float:
-        """E' by the median length of a node [Pa/m]."""
-        return self.loaded.map.material.plane_modulus / float(np.median(self.weights))
+        """E' divided by the median length of a node [Pa/m]."""
+        return self.loaded.elastic.material.plane_modulus / float(np.median(self.weights))
 
     @property
     def tangent_follows(self) -> BoolArray:
@@ -156,7 +156,7 @@ class HierarchicalBody(LinearBody):
 
     @cached_property
     def _held_friction(self) -> HeldFriction:
-        """How friction acts at these nodes."""
+        """Friction at nodes that a support holds in one direction."""
         elements = self._elements
         moving = np.where(elements.support[:, None] == 0.0, elements.of_displacement, 0.0).sum(axis=2)
         slope = np.divide(moving[:, 1], moving[:, 0], out=np.zeros(len(moving)), where=elements.is_held)
@@ -164,28 +164,28 @@ class HierarchicalBody(LinearBody):
 
     @property
     def work(self) -> OperationCounts:
-        """The order of the contact system; whole matrices there are none."""
+        """Order of the contact system; no matrix of it is formed."""
         n_retained = int(np.count_nonzero(self.conditions.is_retained))
         return OperationCounts(contact_unknowns=n_retained)
 
     def respond(self, conditions: LinearConditions) -> ContactState:
-        """Return the response; leaves whose conditions are those of the last one are not factored again.
+        """Return the response; leaves whose conditions are unchanged since the last response are not factored again.
 
         Notes
         -----
-        Prescribed displacements, zero tractions and slip tractions are met exactly, as by `DenseBody`.
+        Prescribed displacements, zero tractions and slip tractions are fulfilled exactly, as by `DenseBody`.
         """
         if len(conditions.free_motions(self.rigid_motions())):
             raise SingularResponse("the contact conditions leave a rigid motion free")
         self._fields.clear()
         substituted = self._held_friction.substituted(conditions)
         state = self._held_friction.restored(conditions, self._solved(substituted))
-        self._responses.append(_Response(state, substituted, self._moving.system.n_answers))
+        self._responses.append(_Response(state, substituted, self._current.system.n_answers))
         del self._responses[:-_KEPT]
         return state
 
     def rigid_motions(self) -> FloatArray:
-        """Return the motions that no support resists, (n_motions, n_contact, 2)."""
+        """Return the rigid motions that no support resists, (n_motions, n_contact, 2)."""
         return self._motions
 
     def rigid_load(self) -> FloatArray:
@@ -198,7 +198,7 @@ class HierarchicalBody(LinearBody):
     ) -> HierarchicalBody:
         """Return the same body under other forces in x and y, and displacements in the frames of the elements.
 
-        What acts inside the body stays as it is unless `inside` says otherwise.
+        Body forces stay the same unless `inside` is given.
         """
         inside = self.inside if inside is None else inside
         conditions = replace(self.conditions, displacement=displacement)
@@ -209,53 +209,56 @@ class HierarchicalBody(LinearBody):
     def recover(self, state: ContactState) -> tuple[FloatArray, FloatArray]:
         """Return displacement (n_elements, 2) and total force (n_elements, 2) of the boundary, in x and y.
 
-        That is under the conditions which have led to the state or, if it is no late response, with its displacements
-        held.
+        The fields are those under the conditions of a recent response or, for any other state, those under its
+        displacements.
         """
         fields = self._fields_of(state)
         return fields.displacement, fields.force
 
     def imbalance(self, state: ContactState) -> Imbalance:
-        """Return how far the state is from a solution of the boundary equations, and all forces from equilibrium.
+        """Return the residual of the boundary equations and of the equilibrium of all forces.
 
-        `force` is the largest of three: the resultant of all forces; the residual of the equations at points all over
-        the boundary, all integrals in closed form instead of compressed, by the largest displacement beside a rigid
-        motion; and what contact tractions differ from those of the whole boundary, by the largest force.
+        `force` is the largest of three numbers: the relative resultant of all forces; the residual of the uncompressed
+        equations at sampled points, relative to the largest displacement without its rigid part; and the difference
+        of the contact tractions from those of the whole boundary, relative to the largest force.
         """
         fields = self._fields_of(state)
-        loaded, mesh, inside = fields.loaded, self.loaded.map.mesh, self.inside
+        loaded, mesh, inside = fields.loaded, self.loaded.elastic.mesh, self.inside
         if not (np.isfinite(fields.displacement).all() and np.isfinite(fields.force).all()):
             return Imbalance(np.nan, np.nan)
-        points = dof_points(loaded.map.displacement_space)
-        size = float(np.abs(without_motion(mesh, points, fields.displacement - loaded.motion)).max())
-        of_contact = (fields.force - self.force) / loaded.map.mesh.lengths[:, None]
+        points = dof_points(loaded.elastic.displacement_space)
+        # contact tractions of the state against those of the whole boundary
+        of_contact = (fields.force - self.force) / loaded.elastic.mesh.lengths[:, None]
         at_nodes = self.conditions.in_frames(of_contact)[self.nodes.nodes]
         at_nodes = np.einsum("nij,nj->ni", self._elements.of_traction, at_nodes)
         acting = self._held_friction.effective(state.traction)
         missing = float(np.abs(self.weights[:, None] * (acting - at_nodes)).max())
         largest = max(float(np.abs(fields.force).max()), float((self.weights[:, None] * np.abs(state.traction)).max()))
-        terms = loaded.map.material.plane_modulus * float(np.abs(fields.displacement).max())
+        terms = loaded.elastic.material.plane_modulus * float(np.abs(fields.displacement).max())
         if inside is None and not self.force.any() and largest <= self.accuracy * terms:
-            return Imbalance(missing / terms, 0.0) if terms else Imbalance(0.0, 0.0)  # it has only been moved
+            return Imbalance(missing / terms, 0.0) if terms else Imbalance(0.0, 0.0)  # a pure rigid motion
+        # resultant of all forces
         of_inside = () if inside is None else (inside.volume_force, inside.inner_force)
         result = resultant_imbalance(points, fields.force, admissible_modes(mesh), 0.0, *of_inside)
+        # residual of the uncompressed equations, unless the body hardly strains
+        strained = float(np.abs(without_motion(mesh, points, fields.displacement - loaded.motion)).max())
         noise = NOISE_FACTOR * float(np.finfo(float).eps * np.abs(fields.displacement - loaded.motion).max())
-        if size > noise:
-            left = loaded.system.residual(self._sampled, fields.traction, fields.strained)
-            result = result.joined(Imbalance(float(np.abs(left).max()) / size, 0.0, noise / size))
+        if strained > noise:
+            residual = loaded.system.residual(self._sampled, fields.traction, fields.strained)
+            result = result.joined(Imbalance(float(np.abs(residual).max()) / strained, 0.0, noise / strained))
         return result.joined(Imbalance(missing / largest, 0.0)) if largest else result
 
     def _fields_of(self, state: ContactState) -> _Fields:
-        """Return the fields on the whole boundary that belong to a state."""
+        """Return the fields of a state on the whole boundary."""
         for fields in self._fields:
             if fields.state is state:
                 return fields
-        response = next((each for each in self._responses if each.state is state), None)
-        if response is None or response.answer != self._moving.system.n_answers:
+        response = next((response for response in self._responses if response.state is state), None)
+        if response is None or response.answer != self._current.system.n_answers:
             self._solved(stick(state.u_n, state.u_t) if response is None else response.conditions)
-        loaded = self._moving
-        traction, strained = loaded.system.everywhere()
-        displacement, force = strained + loaded.motion, traction * loaded.map.mesh.lengths[:, None]
+        loaded = self._current
+        traction, strained = loaded.system.full_state()
+        displacement, force = strained + loaded.motion, traction * loaded.elastic.mesh.lengths[:, None]
         if self.inside is not None:
             displacement, force = displacement + self.inside.displacement, force + self.inside.force
         fields = _Fields(state, loaded, strained, traction, displacement, force)
@@ -264,7 +267,7 @@ class HierarchicalBody(LinearBody):
 
     @cached_property
     def _sampled(self) -> IntArray:
-        """Elements where residuals are evaluated: half of them in contact, without any pattern."""
+        """Elements where residuals are evaluated, spread irregularly; half of them are in contact."""
         n = len(self.force)
         n_points = min(n, int(np.clip(_SAMPLED_PAIRS // n, _FEWEST_SAMPLED, _MOST_SAMPLED)))
         spread = spread_fractions(n_points)
@@ -273,49 +276,49 @@ class HierarchicalBody(LinearBody):
 
     @cached_property
     def _motions(self) -> FloatArray:
-        return free_motions(self.conditions, self.nodes, self.loaded.map.displacement_space)
+        return free_motions(self.conditions, self.nodes, self.loaded.elastic.displacement_space)
 
     @property
-    def _moving(self) -> LoadedSystem:
-        """The equations without the rigid motion of the last response."""
-        return self._travelled[-1] if self._travelled else self.loaded
+    def _current(self) -> LoadedSystem:
+        """The equations after the rigid motion of the last response is subtracted."""
+        return self._shifted[-1] if self._shifted else self.loaded
 
     @cached_property
     def _elements(self) -> ElementConditions:
-        return ElementConditions.of(self.conditions, self.nodes, self.loaded.map.mesh.lengths)
+        return ElementConditions.of(self.conditions, self.nodes, self.loaded.elastic.mesh.lengths)
 
     @cached_property
     def _known(self) -> tuple[FloatArray, FloatArray]:
-        """Tractions and displacements (n_contact, 2) in the frames of the elements that the equations do not solve for.
+        """Tractions and displacements (n_contact, 2) that the equations do not solve for, in the frames of elements.
 
-        Those of the particular solution for what acts inside; and given forces, of which contact knows nothing.
+        They belong to the particular solution of body forces; given forces are subtracted.
         """
         nodes = self.nodes.nodes
         force, displacement = -self.force[nodes], np.zeros((self.n_contact, 2))
         if self.inside is not None:
             force, displacement = force + self.inside.force[nodes], self.inside.displacement[nodes]
-        frame, traction = self.conditions.frame[nodes], force / self.loaded.map.mesh.lengths[nodes, None]
+        frame, traction = self.conditions.frame[nodes], force / self.loaded.elastic.mesh.lengths[nodes, None]
         return np.einsum("nkc,nc->nk", frame, traction), np.einsum("nkc,nc->nk", frame, displacement)
 
     def _solved(self, conditions: LinearConditions) -> ContactState:
-        """Return the response; where the contact nodes move rigidly by far more than they strain, solve without that.
+        """Return the response; subtract a rigid motion of the contact nodes that is far larger than their strain.
 
-        A rigid motion causes no tractions, in the compressed equations none but for their tolerance.
+        A rigid motion causes no tractions, but in the compressed equations it causes some within their tolerance.
         """
-        nodes, asked = self.nodes.nodes, self._elements.at_elements(conditions)
+        nodes, required = self.nodes.nodes, self._elements.at_elements(conditions)
         frame, (traction, displacement) = self.conditions.frame[nodes], self._known
         for _ in range(_MOST_SHIFTS):
-            loaded = self._moving
+            loaded = self._current
             moved = displacement + np.einsum("nkc,nc->nk", frame, loaded.motion[nodes])
             try:
-                state = loaded.system.state(loaded.known, nodes, asked.beside(traction, moved))
+                state = loaded.system.state(loaded.known, nodes, required.relative_to(traction, moved))
             except SingularMatrixError as error:
                 raise SingularResponse(str(error)) from error
             strained = np.einsum("nkc,nk->nc", frame, state[:, 2:])
-            travel = loaded.travel_of(nodes, strained)
-            if travel is None:
+            amplitudes = loaded.large_motion(nodes, strained)
+            if amplitudes is None:
                 break
-            self._travelled[:] = [loaded.moved(travel)]
+            self._shifted[:] = [loaded.subtracting(amplitudes)]
         response = self._elements.of_contact(state[:, :2] + traction, state[:, 2:] + moved)
         given_tractions = conditions.with_given_tractions(response.traction)
         given_tractions[self.tangent_follows, 1] = 0.0
@@ -324,7 +327,7 @@ class HierarchicalBody(LinearBody):
 
 @dataclass(frozen=True, eq=False)
 class _Response:
-    """A state, the conditions that have led to it, and the number of the answer of the equations to these."""
+    """A state, its conditions, and the value of `HierarchicalSystem.n_answers` when it was solved."""
 
     state: ContactState
     conditions: LinearConditions
@@ -333,9 +336,10 @@ class _Response:
 
 @dataclass(frozen=True, eq=False)
 class _Fields:
-    """Fields (n_elements, 2) in x and y on the whole boundary: what the equations solve for, and all of it.
+    """Fields (n_elements, 2) in x and y on the whole boundary.
 
-    The equations know neither a rigid motion of the body nor the particular solution for what acts inside it.
+    `strained` and `traction` are solutions of the equations; `displacement` and `force` also contain the rigid motion
+    that was subtracted and the particular solution of body forces.
     """
 
     state: ContactState
@@ -349,7 +353,7 @@ class _Fields:
 def _left_of(
     conditions: NodalConditions, force: FloatArray, inside: ForcesInside | None
 ) -> tuple[NodalConditions, FloatArray]:
-    """Return the given displacements and forces less those of a particular solution."""
+    """Return the given displacements and forces minus those of the particular solution."""
     return (conditions, force) if inside is None else inside.left_of(conditions, force)
 
 
@@ -360,23 +364,23 @@ def hierarchical_body(
     force: FloatArray,
     inside: ForcesInside | None = None,
 ) -> HierarchicalBody:
-    """Return a compressed body as contact sees it.
+    """Return a body with compressed equations as contact solvers see it.
 
     Parameters
     ----------
     elastic : HierarchicalCollocation
     conditions : NodalConditions
     contact : ContactNodes
-        They may touch, and are retained where no support holds them; see `opened`.
+        Nodes that may touch; their directions are retained unless a support holds them, see `opened`.
     force : (n_elements, 2) array [N/m]
         Given nodal forces, zero at contact nodes.
     inside : ForcesInside, optional
-        What acts inside the body.
+        Body forces and heat.
 
     Raises
     ------
     NoContactNodesError
-        If supports leave no node of the contact boundary free to move towards the obstacle.
+        If no node of the contact boundary can move towards the obstacle.
     """
     if not contact.nodes.size:
         raise NoContactNodesError

@@ -1,4 +1,4 @@
-"""A strip of thousands of elements as a `LinearBody`: its equations are compressed over a tree and factored there."""
+"""A half-plane with thousands of elements as a `LinearBody`: its equations are compressed and factored over a tree."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from bemkit.contact.body import SingularResponse
 from bemkit.contact.half_plane.surface_body import SurfaceBody
 from bemkit.contact.reduced_conditions import ReducedConditions, as_pairs
 from bemkit.operators.half_plane.large import LargeHalfPlane
-from bemkit.operators.hierarchy.system import ElementLaws, NodeConditions
+from bemkit.operators.hierarchy.system import LocalConditions, NodeConditions
 from bemkit.operators.linear.dense import SingularMatrixError
 
 _SAMPLED = 24
@@ -25,8 +25,7 @@ class LargeStripBody(SurfaceBody):
 
     Notes
     -----
-    A response factors the leaves of the tree whose conditions differ from those of the last one, and the clusters above
-    them.
+    A response factors the leaves whose conditions differ from those of the last response, and the clusters above them.
     """
 
     elastic: LargeHalfPlane
@@ -44,25 +43,25 @@ class LargeStripBody(SurfaceBody):
         """Solve over the tree; see `SurfaceBody.solve`."""
         factor = self.elastic.factor
         try:
-            factor.update(self._laws(reduced, right))
+            factor.update(self._local_conditions(reduced, right))
             factor.border_load = load
             unknowns, amounts = factor.unknowns(np.arange(factor.tree.n_leaves)), factor.errors()
         except SingularMatrixError as error:
             raise SingularResponse(str(error)) from error
-        assert factor.laws is not None  # `update` has set them
-        components = (factor.laws.factors[:, :2] @ unknowns[:, :, None])[:, :, 0]
+        assert factor.conditions is not None  # `update` has set them
+        components = (factor.conditions.factors[:, :2] @ unknowns[:, :, None])[:, :, 0]
         traction = self.at_acting(components[:, 0] + 1j * components[:, 1])
         return (reduced.direction.conj() * traction[reduced.node]).real, amounts
 
-    def _laws(self, reduced: ReducedConditions, right: FloatArray) -> ElementLaws:
-        """Return what the equations make of tractions and displacements on all elements; free ones have no traction."""
+    def _local_conditions(self, reduced: ReducedConditions, right: FloatArray) -> LocalConditions:
+        """Return the local conditions of all elements; elements outside of contact have no traction."""
         n = self.elastic.mesh.n_elements
         factors, given = np.zeros((n, 4, 2)), np.zeros((n, 4))
         factors[:, 2:] = np.eye(2)
         on_traction, on_displacement = np.zeros((2, self.n_contact, 2, 2))
         on_traction[:] = np.eye(2)
         value = np.zeros((self.n_contact, 2))
-        # one unknown of a node leaves a condition on the traction across it, two leave none
+        # a node with one unknown has no traction across its direction; a node with two has two conditions
         node, turn = reduced.node, self.turn[reduced.node]
         row = np.where(np.append(node[1:] == node[:-1], False), 0, 1)
         on_traction[node, 0] = _along(1j * reduced.direction * turn)
@@ -71,10 +70,10 @@ class LargeStripBody(SurfaceBody):
         value[node, row] = right
         local = NodeConditions(on_traction, on_displacement, value).solved(1.0 / self.stiffness_scale)
         factors[self.acting], given[self.acting] = local.factors, local.given
-        return ElementLaws(factors, given)
+        return LocalConditions(factors, given)
 
     def missing(self, misfit: ComplexArray, traction: ComplexArray, size: float) -> float:
-        """Return the displacements that are missing, or that the compression misses at some elements; relative."""
+        """Return the larger relative residual: of `SurfaceBody`, or of the uncompressed equations at some elements."""
         nodes = self._sampled
         field = self.on_surface(traction)
         components = np.stack([field.real, field.imag], axis=1)
@@ -84,10 +83,10 @@ class LargeStripBody(SurfaceBody):
 
     @cached_property
     def _sampled(self) -> IntArray:
-        places = (np.arange(_SAMPLED) + 0.5) / _SAMPLED * self.n_contact
-        return np.unique(self.acting[places.astype(int)])
+        positions = (np.arange(_SAMPLED) + 0.5) / _SAMPLED * self.n_contact
+        return np.unique(self.acting[positions.astype(int)])
 
 
 def _along(numbers: ComplexArray) -> FloatArray:
-    """Return factors (n, 2) of components along tangent and normal of which the real part of a product is a sum."""
+    """Return the factors (n, 2) of tangential and normal component in the real parts of complex products."""
     return as_pairs(numbers)[:, ::-1]

@@ -9,10 +9,10 @@ import numpy as np
 
 from bemkit.arrays import ComplexArray, FloatArray
 from bemkit.operators.counts import OperationCounts
+from bemkit.operators.half_plane.cost import half_plane_work, strip_cost
 from bemkit.operators.half_plane.flexibility import mean_logarithms
-from bemkit.operators.half_plane.needs import half_plane_work, strip_needs
 from bemkit.operators.half_plane.surface import SurfaceElasticity
-from bemkit.operators.steklov_poincare.needs import BodyCase, BodyNeeds
+from bemkit.operators.steklov_poincare.cost import BodyCase, BodyCost
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,9 +35,9 @@ class HalfPlaneElasticity(SurfaceElasticity):
         """Operation counts of the flexibility."""
         return half_plane_work(self.mesh.n_elements)
 
-    def needs(self, case: BodyCase) -> BodyNeeds:
+    def cost(self, case: BodyCase) -> BodyCost:
         """Return counts, memory and time of the map."""
-        return strip_needs(case, has_tree=False)
+        return strip_cost(case, has_tree=False)
 
     def _displaced(self, traction: ComplexArray) -> ComplexArray:
         force = self.mesh.lengths * traction

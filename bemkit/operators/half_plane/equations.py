@@ -180,7 +180,7 @@ def potential_of(compression: Compression, forces: FloatArray) -> FloatArray:
     """
     tree, equations = compression.tree, compression.equations
     assert isinstance(equations, HalfPlaneEquations)
-    leaves = [tree.places(0, leaf) for leaf in range(tree.n_leaves)]
+    leaves = [tree.positions(0, leaf) for leaf in range(tree.n_leaves)]
     sources = [[forces[places].ravel() for places in leaves]]
     for skeletons in compression.skeletons:
         gathered = [each.row_map.gather(source) for each, source in zip(skeletons, sources[-1], strict=True)]

@@ -10,13 +10,13 @@ import numpy as np
 
 from bemkit.arrays import ComplexArray
 from bemkit.operators.counts import OperationCounts
+from bemkit.operators.half_plane.cost import strip_cost
 from bemkit.operators.half_plane.elasticity import HalfPlaneElasticity
 from bemkit.operators.half_plane.equations import HalfPlaneEquations, StripView, potential_of
 from bemkit.operators.half_plane.far_drive import FarMotion
-from bemkit.operators.half_plane.needs import strip_needs
 from bemkit.operators.hierarchy.factor import Factor
 from bemkit.operators.hierarchy.tree import ClusterTree
-from bemkit.operators.steklov_poincare.needs import BodyCase, BodyNeeds
+from bemkit.operators.steklov_poincare.cost import BodyCase, BodyCost
 
 _LEAF = 96
 """Elements of a leaf."""
@@ -39,9 +39,9 @@ class LargeHalfPlane(HalfPlaneElasticity):
         """Nothing is counted: no whole matrix is formed."""
         return OperationCounts()
 
-    def needs(self, case: BodyCase) -> BodyNeeds:
+    def cost(self, case: BodyCase) -> BodyCost:
         """Return memory and time of the map."""
-        return strip_needs(case, has_tree=True)
+        return strip_cost(case, has_tree=True)
 
     @cached_property
     def factor(self) -> Factor:

@@ -15,10 +15,10 @@ import numpy as np
 
 from bemkit.arrays import ComplexArray, FloatArray
 from bemkit.errors import InputError
-from bemkit.operators.half_plane.needs import periodic_needs
+from bemkit.operators.half_plane.cost import periodic_cost
 from bemkit.operators.half_plane.surface import SurfaceElasticity
 from bemkit.operators.material import Material
-from bemkit.operators.steklov_poincare.needs import BodyCase, BodyNeeds
+from bemkit.operators.steklov_poincare.cost import BodyCase, BodyCost
 
 _EQUAL = 1e-6
 """Relative difference of the lengths of equal elements: numbers hold those of a million elements to 1e-10."""
@@ -67,9 +67,9 @@ class PeriodicElasticity(SurfaceElasticity):
                 "period: remove the grading, and let parts end where equal elements do"
             )
 
-    def needs(self, case: BodyCase) -> BodyNeeds:
+    def cost(self, case: BodyCase) -> BodyCost:
         """Return memory and time of the map."""
-        return periodic_needs(case)
+        return periodic_cost(case)
 
     @cached_property
     def flexibility(self) -> FloatArray:

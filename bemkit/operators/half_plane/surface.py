@@ -19,7 +19,7 @@ from bemkit.operators.counts import Factorisation, FactorKind, OperationCounts
 from bemkit.operators.half_plane.far_drive import FarMotion
 from bemkit.operators.material import Material
 from bemkit.operators.pair_form import Tag
-from bemkit.operators.steklov_poincare.needs import BodyCase, BodyNeeds
+from bemkit.operators.steklov_poincare.cost import BodyCase, BodyCost
 from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions
 from bemkit.operators.steklov_poincare.protocol import BoundaryMap, CondensedMap
 
@@ -65,7 +65,7 @@ class SurfaceElasticity(BoundaryMap, ABC):
         return frozenset({Tag.SYMMETRIC})
 
     @abstractmethod
-    def needs(self, case: BodyCase) -> BodyNeeds:
+    def cost(self, case: BodyCase) -> BodyCost:
         """Return counts, memory and time of the map."""
 
     @property

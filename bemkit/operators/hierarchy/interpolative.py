@@ -1,10 +1,10 @@
 """Interpolative decomposition: a few columns of a matrix, and all others as combinations of these.
 
-With the pivoted QR factorisation A P = Q [R1 R2] of [GuEisenstat1996], stopped where the next pivot is below the
-tolerance times the first one, A is A[:, skeleton] times [1, R1^-1 R2]. A matrix with many more rows than its rank is
-first multiplied from the left by a few random rows: its columns depend on each other in the same way
-[HalkoMartinssonTropp2011], and LU with partial pivoting of these combinations finds a skeleton as good as that of QR
-in less time [DongMartinsson2023].
+The pivoted QR factorisation A P = Q [R1 R2] of [GuEisenstat1996] stops where the next pivot is below the tolerance
+times the first one. Then A is A[:, skeleton] times [1, R1^-1 R2]. A matrix with many more rows than its rank is first
+replaced by a few random combinations of its rows, whose columns have the same linear relations
+[HalkoMartinssonTropp2011]. LU with partial pivoting of these combinations finds a skeleton as good as that of QR in
+less time [DongMartinsson2023].
 """
 
 from __future__ import annotations
@@ -18,25 +18,25 @@ import numpy as np
 from bemkit.arrays import FloatArray, IntArray
 
 _SPARE = 10
-"""Random rows beyond the rank; with fewer of them a decomposition is made anew from more."""
+"""Random combinations beyond the rank; a decomposition with fewer is repeated with more combinations."""
 _SKETCHED = 0.3
-"""Tolerance of a sketch by that asked for: the remainder of LU of random combinations is a few times that of QR."""
+"""Tolerance of LU relative to that of QR: the remainder of random combinations is a few times larger."""
 _ROUND_OFF = 5e-14
-"""No tolerance of a sketch is smaller: pivots below that are round-off of the sums, and would raise the rank."""
+"""Smallest tolerance of LU: smaller pivots are round-off of the combinations."""
 _KEPT, _MOST_KEPT = 8, 2**19
-"""Arrays of random numbers that are kept, and their largest size: 4 MB each."""
+"""Number of cached arrays of random numbers, and their largest size: 4 MB each."""
 
 
 @dataclass(frozen=True, eq=False)
 class Interpolation:
-    """How n values follow from k of them.
+    """Interpolation of n values from k of them, the skeleton.
 
     Parameters
     ----------
     skeleton : (k,) array
-        Ascending.
+        Indices, ascending.
     rest : (n - k,) array
-        The others.
+        Indices of the other values.
     weights : (k, n - k) array
         Value ``rest[j]`` is the sum of ``weights[i, j]`` times value ``skeleton[i]``.
     """
@@ -63,27 +63,27 @@ class Interpolation:
         return result
 
     def gather(self, values: FloatArray) -> FloatArray:
-        """Return sums (k, ...) at the skeleton of values (n, ...) by the same weights: the transpose of `matrix`."""
+        """Apply the transpose of `matrix` to values (n, ...); return (k, ...)."""
         gathered: FloatArray = values[self.skeleton]
         gathered += self.weights @ values[self.rest]
         return gathered
 
     def scaled(self, sizes: FloatArray) -> Interpolation:
-        """Return the same for values that were multiplied by sizes (n,) before."""
+        """Return the interpolation of the original values from that of values multiplied by sizes (n,)."""
         weights = self.weights * sizes[self.skeleton, None]
         weights /= sizes[self.rest]
         return Interpolation(self.skeleton, self.rest, weights)
 
 
 def interpolative(matrix: FloatArray, tolerance: float) -> Interpolation:
-    """Choose columns of a matrix by which all of them are interpolated.
+    """Choose columns of a matrix from which all of its columns are interpolated.
 
     Parameters
     ----------
     matrix : (m, n) array
         Overwritten if its columns are contiguous.
     tolerance : float
-        Size of the remainder of a column, relative to the largest column.
+        Largest remainder of a column, relative to the largest column.
 
     Returns
     -------
@@ -106,28 +106,27 @@ def interpolative(matrix: FloatArray, tolerance: float) -> Interpolation:
 
 @dataclass(frozen=True, eq=False)
 class Block:
-    """Rows of a matrix.
+    """Weighted rows of a matrix.
 
     Parameters
     ----------
     entries : (m, n) array
     weights : (m,) array
-        What each row counts.
     """
 
     entries: FloatArray
     weights: FloatArray
 
     def weighted(self) -> FloatArray:
-        """Return all rows (m, n) with their weights."""
+        """Return the rows (m, n) multiplied by their weights."""
         return self.entries * self.weights[:, None]
 
-    def combined(self, numbers: slice, first: int) -> FloatArray:
-        """Return random combinations (n_rows, n) of the rows by their numbers; `first` counts the rows of others."""
+    def combined(self, combinations: slice, first: int) -> FloatArray:
+        """Return random combinations (n_combinations, n) of the rows; `first` is the index of row 0 in all blocks."""
         m = len(self.entries)
-        random = _random(_power_of_two(numbers.stop), _power_of_two(first + m))[numbers, first : first + m]
-        combinations: FloatArray = (random * self.weights) @ self.entries
-        return combinations
+        random = _random(_power_of_two(combinations.stop), _power_of_two(first + m))[combinations, first : first + m]
+        combined: FloatArray = (random * self.weights) @ self.entries
+        return combined
 
 
 def sketched(
@@ -144,43 +143,43 @@ def sketched(
     Parameters
     ----------
     blocks : sequence of Block
-        The rows; each block is compared with its own largest column, so that all of them count.
+        Rows of the matrix. Each block is scaled by its largest column, so that blocks of small entries count as much.
     sizes : (n,) array
-        By which columns are multiplied before they are compared; the weights returned hold without.
+        Scale factors of the columns, for pivoting only.
     tolerance : float
-        As of `interpolative`.
+        See `interpolative`.
     guess : int or None
-        Of the rank; a wrong one costs time, nothing else. None takes all rows, which keeps more digits of rows that are
-        far smaller than others.
+        Guessed rank; a wrong guess only costs time. None takes all rows, which keeps more digits of rows that are far
+        smaller than others.
     chosen : (n,) array, optional
-        The columns that are interpolated, by default all.
+        Columns to interpolate, by default all.
     kinds : (n,) array, optional
-        Numbers 0, 1 ...: a column is compared with the largest one of its kind, by default of all.
+        Kinds 0, 1 ... of the columns: the tolerance is relative to the largest column of the same kind.
     """
     columns = slice(None) if chosen is None else chosen
     firsts = np.cumsum([0, *(len(block.entries) for block in blocks)]).tolist()
     parts: list[FloatArray] = []
     while True:
-        n_known, n_rows = len(parts[0]) if parts else 0, 0 if guess is None else guess + _SPARE
+        n_present, n_rows = len(parts[0]) if parts else 0, 0 if guess is None else guess + _SPARE
         if is_whole := guess is None or n_rows >= firsts[-1]:
             parts = [block.weighted()[:, columns] for block in blocks]
-        else:
-            some = slice(n_known, n_rows)
-            more = [block.combined(some, first)[:, columns] for block, first in zip(blocks, firsts, strict=False)]
+        else:  # add combinations to those of the last round
+            new = slice(n_present, n_rows)
+            more = [block.combined(new, first)[:, columns] for block, first in zip(blocks, firsts, strict=False)]
             parts = [np.concatenate(pair) for pair in zip(parts, more, strict=True)] if parts else more
-        sketch, scales = _compared(parts, sizes, kinds, is_whole=is_whole)
-        of_sketch = max(_SKETCHED * tolerance, _ROUND_OFF)
-        result = interpolative(sketch, tolerance) if is_whole else _of_sketch(sketch, of_sketch)
+        sketch, scales = _scaled_sketch(parts, sizes, kinds, is_whole=is_whole)
+        lu_tolerance = max(_SKETCHED * tolerance, _ROUND_OFF)
+        result = interpolative(sketch, tolerance) if is_whole else _of_sketch(sketch, lu_tolerance)
         if result is not None:
             return result.scaled(scales)
         assert guess is not None  # all rows are always enough
         guess += guess // 2
 
 
-def _compared(
+def _scaled_sketch(
     parts: list[FloatArray], sizes: FloatArray, kinds: IntArray | None, *, is_whole: bool
 ) -> tuple[FloatArray, FloatArray]:
-    """Return the rows, or the sum of the combinations, of blocks of one size, and the factors (n,) of their columns."""
+    """Return the scaled rows, or the sum of scaled combinations, and the factors (n,) of the columns."""
     scaled = [part * sizes for part in parts]
     for part in scaled:
         part /= _norms(part).max(initial=0.0) or 1.0
@@ -194,23 +193,23 @@ def _compared(
 
 
 def _of_sketch(sketch: FloatArray, tolerance: float) -> Interpolation | None:
-    """Interpolate the columns of random combinations (n_rows, n) by LU; None if these are too few for the rank.
+    """Interpolate the columns of random combinations (n_rows, n) by LU; return None if they are too few for the rank.
 
-    Overwrites `sketch`. Each combination estimates the remainder of every column after the pivots, to a factor of order
-    one, so that a pivot is the largest column left. The last ones are looked at to find that all are small.
+    Overwrites `sketch`. The k-th combination estimates the remainder of each column after k - 1 pivots, up to a factor
+    of order one, so that the pivot is the largest remaining column. All of the last pivots must be small.
     """
     from scipy.linalg.lapack import dgetrf, dtrtrs
 
     n_rows, n = sketch.shape
     largest = _norms(sketch).max(initial=0.0) / np.sqrt(n_rows)
     factored, swaps, _ = dgetrf(sketch.T, overwrite_a=1)
-    left = np.flatnonzero(np.abs(np.diagonal(factored)) > tolerance * largest)
-    rank = int(left[-1]) + 1 if left.size else 0
+    large = np.flatnonzero(np.abs(np.diagonal(factored)) > tolerance * largest)
+    rank = int(large[-1]) + 1 if large.size else 0
     if rank + _SPARE > n_rows and rank < n:
         return None
     order = np.arange(n)
-    for one, two in enumerate(swaps.tolist()):
-        order[one], order[two] = order[two], order[one]
+    for row, pivot in enumerate(swaps.tolist()):
+        order[row], order[pivot] = order[pivot], order[row]
     weights = np.zeros((rank, n - rank))
     if weights.size:
         weights = dtrtrs(factored[:rank, :rank], factored[rank:, :rank].T, lower=1, trans=1, unitdiag=1)[0]
@@ -218,7 +217,7 @@ def _of_sketch(sketch: FloatArray, tolerance: float) -> Interpolation | None:
 
 
 def _sorted(order: IntArray, weights: FloatArray) -> Interpolation:
-    """Return an interpolation whose skeleton comes first in an order (n,) of all values."""
+    """Return an interpolation from an order (n,) of all values that begins with the skeleton."""
     rank = len(weights)
     by_row = np.argsort(order[:rank])
     return Interpolation(order[:rank][by_row], order[rank:], np.ascontiguousarray(weights[by_row]))
@@ -230,7 +229,7 @@ def _norms(matrix: FloatArray) -> FloatArray:
 
 
 def _random(n_rows: int, n_columns: int) -> FloatArray:
-    """Return the same random numbers for the same shape; large arrays are made anew, so that few bytes are kept."""
+    """Return the same random numbers for the same shape; only small arrays are cached."""
     make = _kept_random if n_rows * n_columns <= _MOST_KEPT else _kept_random.__wrapped__
     return make(n_rows, n_columns)
 

@@ -15,16 +15,16 @@ from bemkit.operators.hierarchy.tree import ClusterTree
 from bemkit.operators.linear.dense import SingularMatrixError
 
 _PREFERRED = 0.1
-"""A condition is solved for a quantity of its own direction as long as the best choice is not ten times better."""
+"""One quantity of each direction is eliminated unless the determinant of another pair is ten times larger."""
 _KNOWN = np.array(list(itertools.combinations(range(4), 2)))
 """(6, 2): the pairs of (t_1, t_2, u_1, u_2) for which two conditions can be solved."""
 _UNKNOWN = np.array([sorted(set(range(4)) - set(pair), key=lambda k: k % 2) for pair in _KNOWN.tolist()])
-"""(6, 2): the others, those along the first direction before those along the second one."""
+"""(6, 2): the remaining quantities of each pair, those along the first direction first."""
 
 
 @dataclass(frozen=True, eq=False)
-class ElementLaws:
-    """Local conditions of each element: (t_x, t_y, u_x, u_y) = factors @ z + given.
+class LocalConditions:
+    """Conditions of each element, solved for two unknowns z: (t_x, t_y, u_x, u_y) = factors @ z + given.
 
     Parameters
     ----------
@@ -35,15 +35,15 @@ class ElementLaws:
     factors: FloatArray
     given: FloatArray
 
-    def take(self, rows: IntArray) -> ElementLaws:
-        """Return those of some elements."""
-        return ElementLaws(self.factors[rows], self.given[rows])
+    def take(self, rows: IntArray) -> LocalConditions:
+        """Return the conditions of some elements."""
+        return LocalConditions(self.factors[rows], self.given[rows])
 
 
 def solve_for_two(
     on_traction: FloatArray, on_displacement: FloatArray, value: FloatArray, displacement_unit: float
-) -> tuple[ElementLaws, BoolArray]:
-    """Solve two conditions a node for two of its four quantities; the other two remain unknown.
+) -> tuple[LocalConditions, BoolArray]:
+    """Solve the two conditions of each node for two of its four quantities; the other two become the unknowns z.
 
     Parameters
     ----------
@@ -51,14 +51,13 @@ def solve_for_two(
         Axes node, condition, component.
     value : (n, 2) array
     displacement_unit : float [m/Pa]
-        Typical displacement per traction, by which the choice compares the two.
+        Typical displacement per traction; makes the determinants of different pairs comparable.
 
     Returns
     -------
-    laws : ElementLaws
-        What the conditions were solved for follows exactly, the others are z.
+    local : LocalConditions
     is_determined : (n,) bool array
-        Whether the conditions are two; the laws of other nodes are zero.
+        Whether the two conditions are independent; the local conditions of other nodes are zero.
     """
     conditions = np.concatenate([on_traction, on_displacement], axis=2)
     scaled = conditions * np.array([1.0, 1.0, displacement_unit, displacement_unit])
@@ -68,8 +67,9 @@ def solve_for_two(
         [np.abs(scaled[:, 0, i] * scaled[:, 1, j] - scaled[:, 0, j] * scaled[:, 1, i]) for i, j in _KNOWN], axis=1
     )
     best = determinants.max(axis=1)
-    own = np.where(_KNOWN[:, 0] % 2 != _KNOWN[:, 1] % 2, determinants, 0.0)
-    choice = np.where(own.max(axis=1) >= _PREFERRED * best, own.argmax(axis=1), determinants.argmax(axis=1))
+    of_both_directions = np.where(_KNOWN[:, 0] % 2 != _KNOWN[:, 1] % 2, determinants, 0.0)
+    is_preferred = of_both_directions.max(axis=1) >= _PREFERRED * best
+    choice = np.where(is_preferred, of_both_directions.argmax(axis=1), determinants.argmax(axis=1))
     nodes = np.flatnonzero(best > 0.0)
     of_known, of_unknown = (
         np.take_along_axis(conditions[nodes], pairs[choice[nodes], None, :], axis=2) for pairs in (_KNOWN, _UNKNOWN)
@@ -79,7 +79,7 @@ def solve_for_two(
     factors, given = np.zeros((len(value), 4, 2)), np.zeros((len(value), 4))
     factors[rows, known], factors[rows, unknown, [0, 1]] = -inverse @ of_unknown, 1.0
     given[rows, known] = (inverse @ value[nodes, :, None])[:, :, 0]
-    return ElementLaws(factors, given), best > 0.0
+    return LocalConditions(factors, given), best > 0.0
 
 
 def _inverse(matrices: FloatArray) -> FloatArray:
@@ -92,7 +92,7 @@ def _inverse(matrices: FloatArray) -> FloatArray:
 
 @dataclass(frozen=True, eq=False)
 class NodeConditions:
-    """Two linear conditions ``A_t t + A_u u = c`` at some elements, in the frames of these.
+    """Two linear conditions ``A_t t + A_u u = c`` for each of some elements, in the frame of the element.
 
     Parameters
     ----------
@@ -107,7 +107,7 @@ class NodeConditions:
 
     @classmethod
     def given(cls, is_displacement: BoolArray, traction: FloatArray, displacement: FloatArray) -> NodeConditions:
-        """Return conditions that prescribe one of the two along each direction; all arrays are (n, 2)."""
+        """Return conditions that prescribe traction or displacement along each direction; all arrays are (n, 2)."""
         unit = np.eye(2)
         return cls(
             np.where(is_displacement, 0.0, 1.0)[:, :, None] * unit,
@@ -115,32 +115,32 @@ class NodeConditions:
             np.where(is_displacement, displacement, traction),
         )
 
-    def beside(self, traction: FloatArray, displacement: FloatArray) -> NodeConditions:
-        """Return the right-hand sides after known tractions and displacements, (n, 2) in the frames."""
-        known = np.einsum("nrk,nk->nr", self.on_traction, traction)
-        known += np.einsum("nrk,nk->nr", self.on_displacement, displacement)
-        return replace(self, value=self.value - known)
+    def relative_to(self, traction: FloatArray, displacement: FloatArray) -> NodeConditions:
+        """Return the conditions for the differences from known tractions and displacements, (n, 2) in the frames."""
+        fulfilled = np.einsum("nrk,nk->nr", self.on_traction, traction)
+        fulfilled += np.einsum("nrk,nk->nr", self.on_displacement, displacement)
+        return replace(self, value=self.value - fulfilled)
 
     def take(self, elements: IntArray) -> NodeConditions:
-        """Return those at some of the elements."""
+        """Return the conditions of some of the elements."""
         return NodeConditions(self.on_traction[elements], self.on_displacement[elements], self.value[elements])
 
-    def solved(self, displacement_unit: float) -> ElementLaws:
-        """Return tractions and displacements under these conditions, in the frames of elements; see `solve_for_two`.
+    def solved(self, displacement_unit: float) -> LocalConditions:
+        """Solve the conditions of each element, in its frame; see `solve_for_two`.
 
         Raises
         ------
         UndeterminedError
             If the two conditions at an element are not independent.
         """
-        laws, is_determined = solve_for_two(self.on_traction, self.on_displacement, self.value, displacement_unit)
+        local, is_determined = solve_for_two(self.on_traction, self.on_displacement, self.value, displacement_unit)
         if not is_determined.all():
             raise UndeterminedError("the two conditions at a contact node are not independent")
-        return laws
+        return local
 
 
 class UndeterminedError(SingularMatrixError):
-    """Two conditions at an element that are only one."""
+    """The two conditions of an element are linearly dependent."""
 
 
 class BodyFactor(Protocol):
@@ -148,160 +148,172 @@ class BodyFactor(Protocol):
 
     @property
     def tree(self) -> ClusterTree:
-        """Its order numbers everything else."""
+        """The tree; all arrays of elements are in its order."""
 
     @property
     def equations(self) -> BoundaryEquations:
         """The equations."""
 
     @property
-    def laws(self) -> ElementLaws | None:
-        """The conditions on all elements."""
+    def conditions(self) -> LocalConditions | None:
+        """The latest conditions on all elements."""
 
     @property
     def n_updates(self) -> int:
-        """How often conditions were taken over."""
+        """Number of calls of `update`."""
 
-    def expect(self, given: Iterable[FloatArray]) -> None:
-        """Announce, before the first `update`, the loads of the laws."""
+    def prepare(self, loads: Iterable[FloatArray]) -> None:
+        """Announce, before the first `update`, the given parts of later conditions."""
 
-    def update(self, laws: ElementLaws) -> None:
-        """Take over the conditions on all elements."""
+    def update(self, conditions: LocalConditions) -> None:
+        """Set the conditions on all elements."""
 
     def unknowns(self, leaves: IntArray) -> FloatArray:
         """Return the unknowns z (n, 2) of the elements of some leaves."""
 
     def responses(self, leaf: int, given: FloatArray, leaves: IntArray) -> FloatArray:
-        """Return the unknowns z (n, 2, k) of the elements of some leaves if nothing is given but in one leaf."""
+        """Return the unknowns z (n, 2, k) of the elements of some leaves under k loads that act on one leaf only."""
 
     def errors(self) -> FloatArray:
-        """Return the unknowns (n_border,) of the boundary as a whole."""
+        """Return the border unknowns (n_border,)."""
 
 
 class HierarchicalSystem:
-    """Boundary equations over a tree, with two conditions on each element along its own directions.
+    """Boundary equations over a tree, with two conditions on each element in the frame of the element.
 
     Parameters
     ----------
     factor : BodyFactor
     frame : (n_elements, 2, 2) array
-        Rows are the directions of the conditions of each element.
+        Rows are the two directions of each element.
     displacement_unit : float [m/Pa]
-        Displacement by traction of a single element.
+        Displacement per traction of a single element.
     """
 
     def __init__(self, factor: BodyFactor, frame: FloatArray, displacement_unit: float) -> None:
         self.factor, self._tree, self._order, self._unit = factor, factor.tree, factor.tree.order, displacement_unit
-        self._place = np.empty_like(self._order)
-        self._place[self._order] = np.arange(self._order.size)
+        self._position = np.empty_like(self._order)
+        self._position[self._order] = np.arange(self._order.size)
         self._frame = frame
 
     @property
     def n_answers(self) -> int:
-        """How often conditions were asked for; what is known everywhere belongs to the last ones."""
+        """Number of solved sets of conditions; `full_state` belongs to the last one."""
         return self.factor.n_updates
 
-    def expect(self, given: Iterable[FloatArray]) -> None:
-        """Announce, before the first `state`, the loads of `laws`, (n_elements, 4) each: their sums are then cheap."""
-        self.factor.expect(given)
+    def prepare(self, loads: Iterable[FloatArray]) -> None:
+        """Announce, before the first `state`, given parts (n_elements, 4): responses to their sums are then cheap."""
+        self.factor.prepare(loads)
 
-    def state(self, known: ElementLaws, elements: IntArray, conditions: NodeConditions) -> FloatArray:
+    def state(self, known: LocalConditions, elements: IntArray, conditions: NodeConditions) -> FloatArray:
         """Return (t_1, t_2, u_1, u_2) of some elements, (n, 4), in their frames.
 
         Parameters
         ----------
-        known : ElementLaws
-            Of all other elements, by `laws`.
+        known : LocalConditions
+            Conditions of all other elements, from `local_conditions`.
         elements : (n,) array
         conditions : NodeConditions
-            Of these elements.
+            Conditions of these elements.
 
         Raises
         ------
         UndeterminedError
-            If conditions of an element are not independent.
+            If the conditions of an element are not independent.
         SingularMatrixError
             If the conditions do not determine the response.
         """
         factors, given = known.factors, known.given
-        places = self._place[elements]
+        positions = self._position[elements]
         local = conditions.solved(self._unit)
         if elements.size:
-            own = turned(local, self._frame[elements])
+            in_plane = rotated(local, self._frame[elements])
             factors, given = factors.copy(), given.copy()
-            factors[places], given[places] = own.factors, own.given
-        self.factor.update(ElementLaws(factors, given))
-        leaves = self._tree.leaves_of(places)
+            factors[positions], given[positions] = in_plane.factors, in_plane.given
+        self.factor.update(LocalConditions(factors, given))
+        leaves = self._tree.leaves_of(positions)
         unknowns = np.empty((self._order.size, 2))
-        unknowns[self._places_in(leaves)] = self.factor.unknowns(leaves)
-        state: FloatArray = (local.factors @ unknowns[places, :, None])[:, :, 0] + local.given
+        unknowns[self._positions_in(leaves)] = self.factor.unknowns(leaves)
+        state: FloatArray = (local.factors @ unknowns[positions, :, None])[:, :, 0] + local.given
         return state
 
-    def responses(self, known: ElementLaws, moved: IntArray, elements: IntArray) -> FloatArray:
-        """Return (t_1, t_2, u_1, u_2) of some elements, (n, 4, n_moved), under unit displacements of others one by one.
+    def responses(self, known: LocalConditions, directions: IntArray, elements: IntArray) -> FloatArray:
+        """Return the states of some elements under a unit displacement of each of some directions.
 
         Parameters
         ----------
-        known : ElementLaws
-            Of all elements, by `laws`; values there are ignored.
-        moved : (n_moved,) array
-            Directions 2 * element + direction that `known` holds fast.
+        known : LocalConditions
+            Conditions of all elements, from `local_conditions`; the given parts are ignored.
+        directions : (n_directions,) array
+            Directions 2 * element + component that `known` holds fast.
         elements : (n,) array
+
+        Returns
+        -------
+        (n, 4, n_directions) array
+            (t_1, t_2, u_1, u_2) in the frames of the elements.
         """
         self.factor.update(known)
-        places = self._place[elements]
-        leaves = self._tree.leaves_of(places)
-        at = np.searchsorted(self._places_in(leaves), places)
-        result = np.empty((elements.size, 4, moved.size))
-        moved_place, unit = self._place[moved // 2], self._frame[moved // 2, moved % 2]
-        for leaf in self._tree.leaves_of(moved_place).tolist():
-            own = self._tree.places(0, leaf)
-            columns = np.flatnonzero((moved_place >= own.start) & (moved_place < own.stop))
-            given = np.zeros((own.stop - own.start, 4, columns.size))
-            given[moved_place[columns] - own.start, 2:, np.arange(columns.size)] = unit[columns]
-            unknowns = self.factor.responses(leaf, given, leaves)[at]
-            states = np.einsum("nqz,nzk->nqk", known.factors[places], unknowns)
-            is_own = np.flatnonzero((places >= own.start) & (places < own.stop))
-            states[is_own] += given[places[is_own] - own.start]
+        positions = self._position[elements]
+        leaves = self._tree.leaves_of(positions)
+        rows = np.searchsorted(self._positions_in(leaves), positions)
+        result = np.empty((elements.size, 4, directions.size))
+        moved, unit = self._position[directions // 2], self._frame[directions // 2, directions % 2]
+        for leaf in self._tree.leaves_of(moved).tolist():
+            in_leaf = self._tree.positions(0, leaf)
+            columns = np.flatnonzero((moved >= in_leaf.start) & (moved < in_leaf.stop))
+            given = np.zeros((in_leaf.stop - in_leaf.start, 4, columns.size))
+            given[moved[columns] - in_leaf.start, 2:, np.arange(columns.size)] = unit[columns]
+            unknowns = self.factor.responses(leaf, given, leaves)[rows]
+            states = np.einsum("nqz,nzk->nqk", known.factors[positions], unknowns)
+            is_in_leaf = np.flatnonzero((positions >= in_leaf.start) & (positions < in_leaf.stop))
+            states[is_in_leaf] += given[positions[is_in_leaf] - in_leaf.start]
             result[:, :, columns] = states
+        halves = result[:, :2], result[:, 2:]
         local: FloatArray = np.concatenate(
-            [np.einsum("nkc,ncm->nkm", self._frame[elements], each) for each in (result[:, :2], result[:, 2:])], axis=1
+            [np.einsum("nkc,ncm->nkm", self._frame[elements], quantity) for quantity in halves], axis=1
         )
         return local
 
-    def everywhere(self) -> tuple[FloatArray, FloatArray]:
+    def full_state(self) -> tuple[FloatArray, FloatArray]:
         """Return tractions and displacements (n_elements, 2) in x and y under the conditions of the last `state`."""
-        laws = self.factor.laws
-        assert laws is not None  # `state` comes first
+        conditions = self.factor.conditions
+        assert conditions is not None  # `state` comes first
         unknowns = self.factor.unknowns(np.arange(self._tree.n_leaves))
-        states = ((laws.factors @ unknowns[:, :, None])[:, :, 0] + laws.given)[self._place]
+        states = ((conditions.factors @ unknowns[:, :, None])[:, :, 0] + conditions.given)[self._position]
         return states[:, :2], states[:, 2:]
 
     def residual(self, elements: IntArray, traction: FloatArray, displacement: FloatArray) -> FloatArray:
-        """Return the residual (n, 2) of the equations of some elements, without any compression, as displacements.
+        """Return the residual of the uncompressed equations of some elements.
 
         Parameters
         ----------
         elements : (n,) array
         traction, displacement : (n_elements, 2) arrays
-            As `everywhere` has returned them.
+            From `full_state`.
+
+        Returns
+        -------
+        (n, 2) array [m]
         """
-        places, equations = self._place[elements], self.factor.equations
-        by_place = traction[self._order], displacement[self._order]
-        errors = equations.border.errors.reshape(self._order.size, 2, -1)[places] @ self.factor.errors()
-        residual: FloatArray = equations.residual(places, *by_place) + errors
+        positions, equations = self._position[elements], self.factor.equations
+        in_tree_order = traction[self._order], displacement[self._order]
+        errors = equations.border.errors.reshape(self._order.size, 2, -1)[positions] @ self.factor.errors()
+        residual: FloatArray = equations.residual(positions, *in_tree_order) + errors
         return residual
 
-    def laws(self, conditions: NodeConditions) -> ElementLaws:
-        """Return what conditions on all elements make of their tractions and displacements, by place, in x and y."""
-        return turned(conditions.solved(self._unit), self._frame).take(self._order)
+    def local_conditions(self, conditions: NodeConditions) -> LocalConditions:
+        """Solve conditions on all elements; return them in x and y, in the order of the tree."""
+        return rotated(conditions.solved(self._unit), self._frame).take(self._order)
 
-    def _places_in(self, leaves: IntArray) -> IntArray:
-        return np.concatenate([np.zeros(0, np.intp), *(np.r_[self._tree.places(0, leaf)] for leaf in leaves.tolist())])
+    def _positions_in(self, leaves: IntArray) -> IntArray:
+        return np.concatenate(
+            [np.zeros(0, np.intp), *(np.r_[self._tree.positions(0, leaf)] for leaf in leaves.tolist())]
+        )
 
 
-def turned(laws: ElementLaws, frame: FloatArray) -> ElementLaws:
-    """Return laws along directions, the rows of (n, 2, 2), in x and y."""
-    turn = np.zeros((len(frame), 4, 4))
-    turn[:, :2, :2] = turn[:, 2:, 2:] = frame.transpose(0, 2, 1)
-    return ElementLaws(turn @ laws.factors, (turn @ laws.given[:, :, None])[:, :, 0])
+def rotated(local: LocalConditions, frame: FloatArray) -> LocalConditions:
+    """Return conditions in frames, whose directions are the rows of (n, 2, 2), in x and y instead."""
+    rotation = np.zeros((len(frame), 4, 4))
+    rotation[:, :2, :2] = rotation[:, 2:, 2:] = frame.transpose(0, 2, 1)
+    return LocalConditions(rotation @ local.factors, (rotation @ local.given[:, :, None])[:, :, 0])

@@ -1,8 +1,8 @@
-"""Boundary equations on few elements, which are joined from those of a mesh: what an iteration leaves to be solved.
+"""Groups of elements for the coarse equations of the preconditioner.
 
-Elements are joined where nothing happens: groups end at corners and where conditions change, and become longer in
-proportion to their distance from there. So the number of groups hardly depends on the number of elements, and the
-singularities of the solution at these places, which no smoothing on one scale catches, are among what is solved.
+Groups end at corners and where conditions change, and their length grows in proportion to the distance from there. So
+the number of groups hardly depends on the number of elements. The coarse equations resolve the singularities of the
+solution at these points, which smoothing on one scale misses.
 """
 
 from __future__ import annotations
@@ -16,23 +16,23 @@ from bemkit.arrays import FloatArray, IntArray
 from bemkit.geometry.mesh import BoundaryMesh
 
 _MOST = 1200
-"""Groups beyond which fewer are tried."""
+"""Largest number of groups; with more, the next growth is tried."""
 _WIDEST = 128
-"""A group is at most so long by the length of its closed curve."""
+"""Smallest number of groups of a closed curve."""
 _GROWTHS = (0.35, 1.0, 4.0)
-"""Length of a group by its distance from the nearest place where conditions change, the best first."""
+"""Length of a group relative to its distance from the nearest change of conditions, the best first."""
 _CORNER, _TURN = 0.3, 0.2
-"""Angles [rad] between neighbours at which groups end and become short; and within one group."""
+"""Angle [rad] between neighbours at which groups end and are short, and largest rotation within one group."""
 
 
 @dataclass(frozen=True, eq=False)
 class ElementGroups:
-    """Groups of elements that follow each other along the boundary.
+    """Groups of consecutive elements of a boundary.
 
     Parameters
     ----------
     mesh : BoundaryMesh
-        Of the groups, as straight elements.
+        One straight element for each group.
     group : (n_elements,) array
         The group of each element.
     middle : (n_groups,) array
@@ -45,28 +45,28 @@ class ElementGroups:
 
     @classmethod
     def of(cls, mesh: BoundaryMesh, kind: IntArray) -> ElementGroups:
-        """Join elements.
+        """Group the elements of a mesh.
 
         Parameters
         ----------
         mesh : BoundaryMesh
-            Of straight elements, without symmetry.
+            Straight elements without symmetry.
         kind : (n_elements,) array
-            Elements of different kinds are not joined, unless there would be too many groups.
+            A group contains elements of one kind, unless there would be too many groups.
         """
-        for growth, kinds in (*((each, kind) for each in _GROWTHS), (_GROWTHS[-1], np.zeros_like(kind))):
+        for growth, kinds in (*((growth, kind) for growth in _GROWTHS), (_GROWTHS[-1], np.zeros_like(kind))):
             firsts = [_firsts(mesh, loop, kinds[loop], growth) for loop in mesh.loops]
-            if sum(each.size for each in firsts) <= _MOST:
+            if sum(first.size for first in firsts) <= _MOST:
                 break
         group, middle, nodes, elements, count = np.empty(mesh.n_elements, np.intp), [], [], [], 0
         for loop, first in zip(mesh.loops, firsts, strict=True):
             sizes = np.diff(np.append(first, loop.size + first[0]))
-            turned = np.roll(loop, -first[0])
-            group[turned] = count + np.repeat(np.arange(first.size), sizes)
-            middle.append(turned[first - first[0] + sizes // 2])
+            from_first = np.roll(loop, -first[0])
+            group[from_first] = count + np.repeat(np.arange(first.size), sizes)
+            middle.append(from_first[first - first[0] + sizes // 2])
             nodes.append(mesh.start[loop[first]])
-            own = count + np.arange(first.size)
-            elements.append(np.stack([own, np.roll(own, -1)], axis=1))
+            loop_groups = count + np.arange(first.size)
+            elements.append(np.stack([loop_groups, np.roll(loop_groups, -1)], axis=1))
             count += first.size
         coarse = BoundaryMesh(np.concatenate(nodes), np.concatenate(elements), is_exterior=mesh.is_exterior)
         return cls(coarse, group, np.concatenate(middle))
@@ -74,19 +74,22 @@ class ElementGroups:
     def mean(self, values: FloatArray) -> FloatArray:
         """Return the means (n_groups, k) of values (n_elements, k)."""
         counts = np.bincount(self.group)
-        return np.stack([np.bincount(self.group, each) / counts for each in values.T], axis=1)
+        return np.stack([np.bincount(self.group, column) / counts for column in values.T], axis=1)
 
 
 def _firsts(mesh: BoundaryMesh, loop: IntArray, kind: IntArray, growth: float) -> IntArray:
-    """Return where groups begin in a loop, ascending."""
+    """Return the positions in a loop, ascending, of the first element of each group."""
+    # stretches end at corners and where the kind changes
     chord = (mesh.end[loop] - mesh.start[loop]) @ np.array([1.0, 1j])
     turn = np.angle(chord / np.roll(chord, 1))
     sharp = np.flatnonzero((kind != np.roll(kind, 1)) | (np.abs(turn) > _CORNER))
     begin = int(sharp[0]) if sharp.size else 0
     ends = np.concatenate([[0.0], np.cumsum(np.roll(mesh.lengths[loop], -begin))])
-    turned = np.floor(np.cumsum(np.roll(turn, -begin)) / _TURN)
-    cuts = [np.zeros(1, np.intp), np.flatnonzero(np.diff(turned)) + 1]
     stops = np.append(sharp - begin, loop.size) if sharp.size else np.array([0, loop.size])
+    # groups on curved parts end after a fixed rotation
+    n_rotations = np.floor(np.cumsum(np.roll(turn, -begin)) / _TURN)
+    cuts = [np.zeros(1, np.intp), np.flatnonzero(np.diff(n_rotations)) + 1]
+    # groups grow from both ends of each stretch
     for first, last in itertools.pairwise(stops):
         nodes = ends[first : last + 1]
         steps = _steps(nodes[1] - nodes[0], 0.5 * (nodes[-1] - nodes[0]), growth, ends[-1] / _WIDEST)
@@ -94,13 +97,14 @@ def _firsts(mesh: BoundaryMesh, loop: IntArray, kind: IntArray, growth: float) -
         steps = _steps(nodes[-1] - nodes[-2], 0.5 * (nodes[-1] - nodes[0]), growth, ends[-1] / _WIDEST)
         before = np.searchsorted(nodes, nodes[-1] - steps)
         cuts.append(first + np.concatenate([[0], after, before]))
-    places = np.unique(np.concatenate(cuts))
-    return np.sort((places[places < loop.size] + begin) % loop.size)
+    positions = np.unique(np.concatenate(cuts))
+    return np.sort((positions[positions < loop.size] + begin) % loop.size)
 
 
 def _steps(shortest: float, half: float, growth: float, widest: float) -> FloatArray:
-    """Return distances from an end that grow in proportion, and from some place on by equal steps, up to the middle."""
-    turning = min(half, max(shortest, widest / growth))
-    geometric = shortest * (1.0 + growth) ** np.arange(max(0.0, np.log(turning / shortest)) / np.log1p(growth) + 1.0)
+    """Return distances from an end up to the middle: a geometric sequence, then steps of the largest length."""
+    last_geometric = min(half, max(shortest, widest / growth))
+    n_growths = max(0.0, np.log(last_geometric / shortest)) / np.log1p(growth)
+    geometric = shortest * (1.0 + growth) ** np.arange(n_growths + 1.0)
     distances = np.concatenate([geometric, np.arange(geometric[-1] + widest, half, widest)])
     return distances[distances <= half]

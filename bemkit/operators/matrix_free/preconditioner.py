@@ -1,8 +1,8 @@
-"""Two levels that approximate the inverse of boundary equations with two conditions on each element.
+"""A two-level preconditioner of boundary equations with two conditions on each element.
 
-The slow part of a solution is that of the equations on groups of elements (`coarse_equations`), solved directly. What
-oscillates from element to element hardly feels the rest of the boundary: there the equations are 1/2 for unknown
-displacements, and the single layer for unknown tractions, whose inverse pyamg's hierarchy gives
+Equations on groups of elements (`coarse_equations`), solved directly, give the smooth part of a solution. The part that
+oscillates from element to element hardly depends on the rest of the boundary: there the equations reduce to 1/2 for
+unknown displacements and to the single layer for unknown tractions. pyamg's hierarchy inverts the latter
 (`traction_hierarchy`).
 """
 
@@ -15,7 +15,7 @@ import numpy as np
 from bemkit.arrays import BoolArray, FloatArray
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.operators.collocation.equations import CollocationEquations, collocation_border
-from bemkit.operators.hierarchy.system import ElementLaws
+from bemkit.operators.hierarchy.system import LocalConditions
 from bemkit.operators.linear.dense import DenseLU
 from bemkit.operators.material import Material
 from bemkit.operators.matrix_free.coarse_equations import ElementGroups
@@ -24,24 +24,24 @@ from bemkit.operators.matrix_free.traction_hierarchy import TractionHierarchy
 _CHUNK = 16
 """Groups whose columns are evaluated at a time."""
 _COUPLED = 1e-6
-"""Cosine of the angle between the directions of two unknowns that are not perpendicular."""
+"""Largest cosine of the angle between two directions that count as perpendicular."""
 
 
 @dataclass(frozen=True, eq=False)
 class Preconditioner:
-    """Approximate inverse of the equations under one kind of conditions.
+    """Approximate inverse of the equations under given factors of the local conditions.
 
     Parameters
     ----------
     groups : ElementGroups
     coarse : DenseLU
-        Of their equations.
+        Factors of the equations on groups.
     is_traction : (n_elements, 2) bool array
-        The unknowns that act as tractions, the others as displacements.
+        Whether an unknown acts as a traction rather than a displacement.
     units : (n_elements, 2) array
-        Those of the unknowns in the iteration.
+        Scales of the unknowns in the iteration.
     inverse : (n_elements, 2, 2) array
-        From x and y to the directions along which they act.
+        From x and y to the directions of the unknowns.
     tractions : TractionHierarchy
     """
 
@@ -58,37 +58,37 @@ class Preconditioner:
         mesh: BoundaryMesh,
         material: Material,
         equations: CollocationEquations,
-        laws: ElementLaws,
+        conditions: LocalConditions,
         traction_unit: float,
     ) -> Preconditioner:
-        """Return the inverse under conditions, whose given values are ignored.
+        """Return the approximate inverse under local conditions; their given parts are ignored.
 
         Raises
         ------
         SingularMatrixError
             If the conditions do not hold the body.
         """
-        of_traction, of_displacement = laws.factors[:, :2], laws.factors[:, 2:]
+        of_traction, of_displacement = conditions.factors[:, :2], conditions.factors[:, 2:]
         compliance = (mesh.lengths / material.plane_modulus)[:, None]
         is_traction = compliance * np.linalg.norm(of_traction, axis=1) > np.linalg.norm(of_displacement, axis=1)
         along = np.where(is_traction[:, None], of_traction, of_displacement)
-        # unknowns of equal conditions, which also slip in one direction
+        # elements of one kind have the same unknowns and slip, if at all, in the same direction
         cosine = np.einsum("ni,ni->n", along[:, :, 0], along[:, :, 1])
         kind = is_traction @ np.array([1, 2]) + 4 * np.sign(np.where(np.abs(cosine) > _COUPLED, cosine, 0.0))
         groups = ElementGroups.of(mesh, kind.astype(np.intp))
-        coarse = _coarse(groups.mesh, material, equations, laws.factors[groups.middle])
-        following = mesh.node_elements[mesh.elements[:, 1], 1]
-        tractions = TractionHierarchy.of(is_traction, following, mesh.lengths, equations.constants)
+        coarse = _coarse(groups.mesh, material, equations, conditions.factors[groups.middle])
+        next_element = mesh.node_elements[mesh.elements[:, 1], 1]
+        tractions = TractionHierarchy.of(is_traction, next_element, mesh.lengths, equations.constants)
         units = np.where(is_traction, traction_unit, 1.0)
         return cls(groups, coarse, is_traction, units, np.linalg.inv(along), tractions)
 
     def unknowns(self, x: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return the unknowns of elements (n_elements, 2) and of the border (n_border,) from those of the iteration."""
+        """Return the element unknowns (n_elements, 2) and border unknowns (n_border,) of an iterate."""
         n = self.units.size
         return self.units * x[:n].reshape(-1, 2), x[n:]
 
     def apply(self, equations: FloatArray, balances: FloatArray) -> FloatArray:
-        """Return the unknowns of the iteration for residuals (n_elements, 2) and (n_border,)."""
+        """Apply the approximate inverse to residuals (n_elements, 2) and (n_border,); return an iterate."""
         means = self.groups.mean(equations)
         of_groups = self.coarse.solve(np.concatenate([means.ravel(), balances]))
         z = np.einsum("nij,nj->ni", self.inverse, equations - means[self.groups.group])
@@ -100,18 +100,18 @@ class Preconditioner:
 
 
 def _coarse(mesh: BoundaryMesh, material: Material, fine: CollocationEquations, factors: FloatArray) -> DenseLU:
-    """Factor the equations of groups whose tractions and displacements are factors (n_groups, 4, 2) of unknowns."""
+    """Factor the equations of groups under factors (n_groups, 4, 2) of their local conditions."""
     order, takes_slopes, length = np.arange(n := len(factors)), fine.acted_on.shape[1] > 1, fine.constants.log_length
     border = collocation_border(mesh, material, order, takes_slopes=takes_slopes)
     of_groups = CollocationEquations.of(mesh, material, order, border, takes_slopes=takes_slopes, log_length=length)
     balances = border.balances.reshape(-1, n, 4)
-    # by columns: the LU of what is stored by rows is that of the transpose, whose pivots grow on graded groups
+    # stored by columns: stored by rows, LAPACK would factor the transpose, whose pivots grow on graded groups
     matrix = np.zeros((2 * n + len(balances), 2 * n + len(balances)), order="F")
     for begin in range(0, n, _CHUNK):
-        own = np.arange(begin, min(begin + _CHUNK, n))
-        entries = of_groups.block(np.arange(2 * n), (4 * own[:, None] + np.arange(4)).ravel())
-        of_unknowns = np.einsum("rnq,nqz->rnz", entries.reshape(2 * n, -1, 4), factors[own])
-        matrix[: 2 * n, 2 * begin : 2 * begin + 2 * own.size] = of_unknowns.reshape(2 * n, -1)
+        chunk = np.arange(begin, min(begin + _CHUNK, n))
+        entries = of_groups.block(np.arange(2 * n), (4 * chunk[:, None] + np.arange(4)).ravel())
+        of_unknowns = np.einsum("rnq,nqz->rnz", entries.reshape(2 * n, -1, 4), factors[chunk])
+        matrix[: 2 * n, 2 * begin : 2 * begin + 2 * chunk.size] = of_unknowns.reshape(2 * n, -1)
     matrix[2 * n :, : 2 * n] = np.einsum("bnq,nqz->bnz", balances, factors).reshape(len(balances), -1)
     matrix[: 2 * n, 2 * n :] = border.errors
     return DenseLU(matrix, "the system of the body on groups of elements")

@@ -1,14 +1,14 @@
-"""An approximate inverse of the single layer on the elements whose tractions are unknown, from pyamg's hierarchy.
+"""An approximate inverse of the single layer on the elements with unknown tractions, from pyamg's hierarchy.
 
-The single layer smoothes by one order: on waves of the number xi along a straight boundary it is pi kappa / (8 pi mu
-(1 - nu) |xi|). Its inverse, of the order one, is a difference before and after an operator of the order minus one,
-which the additive multilevel sum over a hierarchy of piecewise linear functions is [BramblePasciakXu1990]:
+The single layer has the order -1: a wave of number xi along a straight boundary is multiplied by pi kappa / (8 pi mu
+(1 - nu) |xi|). Its inverse has the order 1. It is approximated by differences before and after an operator of the order
+-1, the additive multilevel sum over a hierarchy of piecewise linear functions [BramblePasciakXu1990]:
 
     D^T (c I + P_1 P_1^T + P_1 P_2 P_2^T P_1^T + ...) D,        D the jumps between elements.
 
-The prolongations are those of the Ruge-Stueben hierarchy [RugeStueben1987] of a string along these elements, whichever
-these are and however long: it needs nothing but the sparse matrix of the string. A Jacobi step takes the kinks out of
-them: these are waves of all lengths, which the sum would count several times.
+The prolongations come from the Ruge-Stueben hierarchy [RugeStueben1987] of a string along these elements, which may
+have any lengths; only the sparse matrix of the string is needed. A Jacobi step smooths the prolongations: their kinks
+contain waves of all lengths, which the sum would count several times.
 """
 
 from __future__ import annotations
@@ -25,25 +25,25 @@ if TYPE_CHECKING:
     from scipy.sparse import csr_matrix
 
 _STRENGTH, _FINEST, _SMOOTHING = 2.1, 1.5, 0.5
-"""The multilevel sum by |xi|, on chains of 512 elements; with this weight c of the finest level, which represents all
-levels that would be finer, and this damping of the Jacobi step it varies by a tenth, with 1 and 0 by a factor of two.
-"""
+"""The multilevel sum times |xi|, the weight c of the finest level, and the damping of the Jacobi step. On chains of 512
+elements the sum then varies by a tenth; with c = 1 and no damping it varies by a factor of two."""
 _HOLD = 1e-6
-"""Springs to the ground, by those of the string, that make the matrix of a closed string definite."""
+"""Stiffness of springs to the ground relative to the string; they make the matrix of a closed string definite."""
 _COARSEST = 10
+"""Largest number of unknowns of the coarsest level."""
 
 
 @dataclass(frozen=True, eq=False)
 class TractionHierarchy:
-    """The inverse for one set of unknown tractions.
+    """Approximate inverse of the single layer for one set of unknown tractions.
 
     Parameters
     ----------
     unknowns : (k,) array
-        2 * place + number of the unknown tractions.
+        Indices 2 * element + component of the unknown tractions.
     jumps : (n_jumps, k) sparse matrix
     prolongations : tuple of sparse matrices
-        From each level to the next finer one, the finest first.
+        From each level to the next finer level, finest first.
     scale : (k,) array [Pa/m]
     """
 
@@ -54,23 +54,24 @@ class TractionHierarchy:
 
     @classmethod
     def of(
-        cls, is_traction: BoolArray, following: IntArray, lengths: FloatArray, constants: Constants
+        cls, is_traction: BoolArray, next_element: IntArray, lengths: FloatArray, constants: Constants
     ) -> TractionHierarchy:
-        """Return the inverse for the unknowns (n_elements, 2) that are tractions; `following` is the next element."""
+        """Return the inverse for those of the unknowns (n_elements, 2) that are tractions."""
         from pyamg import ruge_stuben_solver
         from scipy.sparse import csr_matrix, diags_array
 
         unknowns = np.flatnonzero(is_traction)
-        place, number = np.divmod(unknowns, 2)
-        starts, ends = unknowns, 2 * following[place] + number
-        joints = np.unique(np.concatenate([starts, ends]))
+        element, component = np.divmod(unknowns, 2)
+        # a jump at each end of an element; jumps between two unknowns coincide
+        starts, ends = unknowns, 2 * next_element[element] + component
+        jump_keys = np.unique(np.concatenate([starts, ends]))
         k = unknowns.size
-        rows = np.searchsorted(joints, np.concatenate([starts, ends]))
+        rows = np.searchsorted(jump_keys, np.concatenate([starts, ends]))
         entries = np.repeat([-1.0, 1.0], k)
-        jumps = csr_matrix((entries, (rows, np.tile(np.arange(k), 2))), shape=(joints.size, k))
+        jumps = csr_matrix((entries, (rows, np.tile(np.arange(k), 2))), shape=(jump_keys.size, k))
         prolongations: tuple[csr_matrix, ...] = ()
         if k > _COARSEST:
-            string = (jumps @ diags_array(1.0 / lengths[place]) @ jumps.T).tocsr()
+            string = (jumps @ diags_array(1.0 / lengths[element]) @ jumps.T).tocsr()
             string += diags_array(_HOLD * string.diagonal())
             hierarchy = ruge_stuben_solver(csr_matrix(string), max_coarse=_COARSEST, max_levels=40)
             prolongations = tuple(_smoothed(level.P, level.A) for level in hierarchy.levels[:-1])
@@ -79,11 +80,11 @@ class TractionHierarchy:
             unknowns,
             jumps,
             prolongations,
-            1.0 / (_STRENGTH * np.pi * kappa * constants.single * lengths[place]),
+            1.0 / (_STRENGTH * np.pi * kappa * constants.single * lengths[element]),
         )
 
     def apply(self, displacement: FloatArray) -> FloatArray:
-        """Return the tractions (k,) that cause displacements (k,) along them, as far as these oscillate."""
+        """Return the tractions (k,) that cause oscillating displacements (k,)."""
         levels = [self.jumps @ displacement]
         for prolongation in self.prolongations:
             levels.append(prolongation.T @ levels[-1])
@@ -95,7 +96,7 @@ class TractionHierarchy:
 
 
 def _smoothed(prolongation: csr_matrix, matrix: csr_matrix) -> csr_matrix:
-    """Return a prolongation without its kinks, after one damped Jacobi step for the matrix of the finer level."""
+    """Smooth a prolongation by one damped Jacobi step with the matrix of the finer level."""
     from scipy.sparse import diags_array
 
     step = diags_array(_SMOOTHING / matrix.diagonal()) @ (matrix @ prolongation)

@@ -16,7 +16,7 @@ from bemkit.operators.linear.dense import DenseLU
 from bemkit.operators.linear.threads import for_each_chunk
 from bemkit.operators.material import Material
 from bemkit.operators.pair_form import Tag
-from bemkit.operators.steklov_poincare.needs import CHUNK_PAIRS, BodyCase, BodyNeeds, collocation_needs
+from bemkit.operators.steklov_poincare.cost import CHUNK_PAIRS, BodyCase, BodyCost, collocation_cost
 from bemkit.operators.steklov_poincare.nodal_conditions import GivenData, NodalConditions, turn_columns
 from bemkit.operators.steklov_poincare.protocol import BoundaryMap, CondensedMap
 from bemkit.stopwatch import assembling
@@ -59,9 +59,9 @@ class CollocationElasticity(BoundaryMap):
             return frozenset()
         return frozenset({Tag.KILLS_RIGID_MOTIONS if self.slopes else Tag.KILLS_TRANSLATIONS})
 
-    def needs(self, case: BodyCase) -> BodyNeeds:
+    def cost(self, case: BodyCase) -> BodyCost:
         """Return counts, memory and time of the map."""
-        return collocation_needs(case, takes_slopes=self.slopes)
+        return collocation_cost(case, takes_slopes=self.slopes)
 
     def stiffness(self) -> FloatArray:
         """Return S, (n_dofs, n_dofs) [Pa]: the stiffness when all displacements are retained."""

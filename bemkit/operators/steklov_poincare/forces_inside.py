@@ -25,7 +25,7 @@ from bemkit.operators.steklov_poincare.protocol import CondensedMap, SteklovPoin
 
 if TYPE_CHECKING:
     from bemkit.operators.particular_solutions import ParticularSolution
-    from bemkit.operators.steklov_poincare.needs import BodyCase, BodyNeeds
+    from bemkit.operators.steklov_poincare.cost import BodyCase, BodyCost
 
 _MORE_POINTS = 5
 
@@ -77,25 +77,25 @@ class ForcesInside:
             inner_force=max(self.inner_force, other.inner_force),
         )
 
-    def add_to(self, weightless: CondensedMap, conditions: NodalConditions) -> CondensedMap:
+    def add_to(self, without_body_forces: CondensedMap, conditions: NodalConditions) -> CondensedMap:
         """Return a condensed map under forces inside.
 
         Parameters
         ----------
-        weightless : CondensedMap
+        without_body_forces : CondensedMap
             Under what is left of the given data: see `left_of`.
         conditions : NodalConditions
         """
         along = conditions.in_frames(self.displacement)
         shift = along[conditions.is_retained]
         return _HeavyMap(
-            stiffness=weightless.stiffness,
-            load=weightless.load + weightless.stiffness @ shift,
-            sensitivity=weightless.sensitivity,
-            work=weightless.work,
+            stiffness=without_body_forces.stiffness,
+            load=without_body_forces.load + without_body_forces.stiffness @ shift,
+            sensitivity=without_body_forces.sensitivity,
+            work=without_body_forces.work,
             volume_force=self.volume_force,
             inner_force=self.inner_force,
-            weightless=weightless,
+            without_body_forces=without_body_forces,
             inside=self,
             conditions=conditions,
             along=along,
@@ -108,10 +108,10 @@ class ForcesInside:
         displacement = np.where(conditions.is_fixed, conditions.displacement - own, 0.0)
         return replace(conditions, displacement=displacement), force - self.force
 
-    def under(self, weightless: CondensedMap, conditions: NodalConditions, force: FloatArray) -> CondensedMap:
+    def under(self, without_body_forces: CondensedMap, conditions: NodalConditions, force: FloatArray) -> CondensedMap:
         """Return a condensed body without forces inside under other data and these."""
         left, left_force = self.left_of(conditions, force)
-        return self.add_to(weightless.under(left_force, left.displacement), conditions)
+        return self.add_to(without_body_forces.under(left_force, left.displacement), conditions)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -120,7 +120,7 @@ class _HeavyMap(CondensedMap):
 
     Parameters
     ----------
-    weightless : CondensedMap
+    without_body_forces : CondensedMap
         Without what acts inside.
     inside : ForcesInside
     conditions : NodalConditions
@@ -130,7 +130,7 @@ class _HeavyMap(CondensedMap):
         The same along the retained directions.
     """
 
-    weightless: CondensedMap
+    without_body_forces: CondensedMap
     inside: ForcesInside
     conditions: NodalConditions
     along: FloatArray
@@ -138,16 +138,16 @@ class _HeavyMap(CondensedMap):
 
     def recover(self, retained_displacement: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return displacement and force of all nodes."""
-        displacement, force = self.weightless.recover(retained_displacement - self.shift)
+        displacement, force = self.without_body_forces.recover(retained_displacement - self.shift)
         return displacement + self.inside.displacement, force + self.inside.force
 
     def under(self, force: FloatArray, displacement: FloatArray) -> CondensedMap:
         """Return the map under other loads and the same forces inside."""
-        return self.inside.under(self.weightless, replace(self.conditions, displacement=displacement), force)
+        return self.inside.under(self.without_body_forces, replace(self.conditions, displacement=displacement), force)
 
     def follow(self, directions: IntArray) -> tuple[FloatArray, FloatArray]:
         """Return what free directions do."""
-        response, at_rest = self.weightless.follow(directions)
+        response, at_rest = self.without_body_forces.follow(directions)
         return response, at_rest + self.along.ravel()[directions] - response @ self.shift
 
 
@@ -157,56 +157,58 @@ def condensed_under(
     """Return a condensed body under other displacements, forces and, if given, forces inside; nothing is factored."""
     if inside is None:
         return condensed.under(force, conditions.displacement)
-    return inside.under(condensed.weightless or condensed, conditions, force)
+    return inside.under(condensed.without_body_forces or condensed, conditions, force)
 
 
 @dataclass(frozen=True, eq=False)
-class HeavyElasticity:
+class ElasticityWithBodyForces:
     """An elastic map under forces and heat inside the body; fulfils `SteklovPoincare`.
 
     Parameters
     ----------
-    weightless : SteklovPoincare
+    without_body_forces : SteklovPoincare
         Any map of a bounded body.
     inside : ForcesInside
         On its space of displacements.
     """
 
-    weightless: SteklovPoincare
+    without_body_forces: SteklovPoincare
     inside: ForcesInside
 
     @property
     def material(self) -> Material:
         """The material of the body."""
-        return self.weightless.material
+        return self.without_body_forces.material
 
     @property
     def displacement_space(self) -> BoundarySpace:
         """The space of the displacements."""
-        return self.weightless.displacement_space
+        return self.without_body_forces.displacement_space
 
     @property
     def traction_space(self) -> BoundarySpace:
         """The space of the tractions."""
-        return self.weightless.traction_space
+        return self.without_body_forces.traction_space
 
     @property
     def tags(self) -> frozenset[Tag]:
         """Those of the map without forces inside."""
-        return self.weightless.tags
+        return self.without_body_forces.tags
 
-    def needs(self, case: BodyCase) -> BodyNeeds:
+    def cost(self, case: BodyCase) -> BodyCost:
         """Return the costs of the map without forces inside."""
-        return self.weightless.needs(case)
+        return self.without_body_forces.cost(case)
 
     def condense(self, conditions: NodalConditions, force: FloatArray) -> CondensedMap:
         """Condense the map without forces inside, and add these; see `SteklovPoincare.condense`."""
-        return self.inside.add_to(self.weightless.condense(*self.inside.left_of(conditions, force)), conditions)
+        return self.inside.add_to(
+            self.without_body_forces.condense(*self.inside.left_of(conditions, force)), conditions
+        )
 
     def element_tractions(self, displacement: FloatArray, force: FloatArray) -> FloatArray:
         """Return all tractions (n_elements, n_local, 2) [Pa], those of the particular solution projected."""
         inside = self.inside
-        left = self.weightless.element_tractions(displacement - inside.displacement, force - inside.force)
+        left = self.without_body_forces.element_tractions(displacement - inside.displacement, force - inside.force)
         return left + self._particular_tractions
 
     @cached_property
@@ -221,7 +223,7 @@ class HeavyElasticity:
         """Return displacement and force less those of the particular solution."""
         return displacement - self.inside.displacement, force - self.inside.force
 
-    def energy_beyond(self, displacement: FloatArray, force: FloatArray) -> FloatArray:
+    def further_energy(self, displacement: FloatArray, force: FloatArray) -> FloatArray:
         """Return the parts (4,) of the elastic energy [J/m] that a body has beyond the one of the map, f_h u_h / 2.
 
         Parameters
@@ -236,7 +238,7 @@ class HeavyElasticity:
         do the first on the interpolant of u_p, and the tractions, which hold normals only by interpolation, on the
         small rest.
         """
-        traction = self.weightless.element_tractions(displacement, force)
+        traction = self.without_body_forces.element_tractions(displacement, force)
         at_nodes, rest, of_heat = self._work_on_particular
         strained = without_motion(self.traction_space.mesh, dof_points(self.displacement_space), displacement)
         pairs = (force, at_nodes), (traction, rest), (of_heat, strained)

@@ -30,8 +30,8 @@ from bemkit.operators.linear.solvers import (
 from bemkit.operators.material import Material
 from bemkit.operators.pair_form import Tag
 from bemkit.operators.rigid_modes import traction_free_modes
+from bemkit.operators.steklov_poincare.cost import BodyCase, BodyCost, galerkin_cost
 from bemkit.operators.steklov_poincare.layer_operators import assemble_layers, dilatation_of
-from bemkit.operators.steklov_poincare.needs import BodyCase, BodyNeeds, galerkin_needs
 from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions, integrate_traction
 from bemkit.operators.steklov_poincare.protocol import BoundaryMap, CondensedMap
 from bemkit.operators.steklov_poincare.schur import SchurCondensation
@@ -120,9 +120,9 @@ class GalerkinElasticity(BoundaryMap):
         tags = {Tag.SYMMETRIC, Tag.POSITIVE_SEMIDEFINITE}
         return frozenset(tags if self.mesh.is_exterior else tags | {Tag.KILLS_RIGID_MOTIONS})
 
-    def needs(self, case: BodyCase) -> BodyNeeds:
+    def cost(self, case: BodyCase) -> BodyCost:
         """Return counts, memory and time of the map."""
-        return galerkin_needs(case, self.traction_space.n_dofs, self.displacement_space.degree)
+        return galerkin_cost(case, self.traction_space.n_dofs, self.displacement_space.degree)
 
     @cached_property
     def factors(self) -> GalerkinFactors:
@@ -193,10 +193,10 @@ class GalerkinElasticity(BoundaryMap):
 
     def stiffness(self) -> FloatArray:
         """Return S, (n_dofs, n_dofs) [Pa]; of an incompressible body without the pressure that keeps the volume."""
-        if not self._volume.yields:
+        if not self._volume.compliance:
             return self.factors.matrix
         change = self._volume.change
-        return np.asarray(self.factors.matrix + change @ change.T / self._volume.yields)
+        return np.asarray(self.factors.matrix + change @ change.T / self._volume.compliance)
 
     def condense(self, conditions: NodalConditions, force: FloatArray) -> CondensedMap:
         """Eliminate every direction that is not retained, by a Schur complement, with the linear solver of the map."""

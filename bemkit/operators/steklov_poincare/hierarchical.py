@@ -1,4 +1,4 @@
-"""Elastic maps whose equations are compressed over a tree instead of stored; see `bemkit.operators.hierarchy`."""
+"""Elastic maps whose equations are compressed over a tree; see `bemkit.operators.hierarchy`."""
 
 from __future__ import annotations
 
@@ -10,28 +10,28 @@ from bemkit.arrays import BoolArray, FloatArray, IntArray
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.operators.collocation.images import collocation_equations
 from bemkit.operators.hierarchy.factor import Factor
-from bemkit.operators.hierarchy.system import BodyFactor, ElementLaws, HierarchicalSystem, NodeConditions
+from bemkit.operators.hierarchy.system import BodyFactor, HierarchicalSystem, LocalConditions, NodeConditions
 from bemkit.operators.hierarchy.tree import ClusterTree
 from bemkit.operators.linear.dense import SingularMatrixError
 from bemkit.operators.linear.solvers import Hierarchical, MatrixFree
 from bemkit.operators.material import Material
 from bemkit.operators.steklov_poincare.collocation import CollocationElasticity
-from bemkit.operators.steklov_poincare.hierarchical_needs import hierarchical_needs
-from bemkit.operators.steklov_poincare.needs import BodyCase, BodyNeeds
+from bemkit.operators.steklov_poincare.cost import BodyCase, BodyCost
+from bemkit.operators.steklov_poincare.hierarchical_cost import hierarchical_cost
 from bemkit.operators.steklov_poincare.nodal_conditions import GivenData, NodalConditions, free_modes, turning
 from bemkit.operators.steklov_poincare.protocol import CondensedMap
 
 LEAF_SIZE = 88
-"""Elements of a leaf: larger ones cost more to factor, smaller ones have skeletons nearly as large as themselves."""
+"""Elements of a leaf: larger leaves cost more to factor, smaller ones have skeletons nearly as large as themselves."""
 _LARGEST_RESIDUAL, _SAMPLED = 1e3, 16
-"""Residual by the tolerance of the compression, found at so many elements, beyond which equations are inexact. It is
+"""Largest accepted residual relative to the tolerance of the compression, and number of sampled elements. The ratio is
 below one on all bodies that were tried."""
 _FAR = 10.0
-"""A rigid motion so much larger than the strained displacements is subtracted."""
+"""Ratio of a rigid motion to the remaining displacements from which on it is subtracted."""
 
 
 class InexactEquationsError(SingularMatrixError):
-    """Compressed equations that are not as accurate as their tolerance says."""
+    """Compressed equations are less accurate than their tolerance."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -47,7 +47,7 @@ class _EquationsMap(CondensedMap):
 
     @classmethod
     def of(cls, loaded: LoadedSystem, stiffness: FloatArray) -> _EquationsMap:
-        """Return the map of a body whose stiffness is known."""
+        """Return the map for a known stiffness."""
         at_rest = cls(stiffness=stiffness, load=np.zeros(0), loaded=loaded)
         if not loaded.retained.size:
             return at_rest
@@ -58,10 +58,10 @@ class _EquationsMap(CondensedMap):
     def recover(self, retained_displacement: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return displacement and force of all elements."""
         displacement, traction = self.loaded.recovered(retained_displacement)
-        return displacement, traction * self.loaded.map.mesh.lengths[:, None]
+        return displacement, traction * self.loaded.elastic.mesh.lengths[:, None]
 
     def follow(self, directions: IntArray) -> tuple[FloatArray, FloatArray]:
-        """Return what free directions do."""
+        """Return response and displacement at rest of free directions."""
         displacement, _ = self.recover(np.zeros(self.loaded.retained.size))
         at_rest = self.loaded.conditions.in_frames(displacement).ravel()[directions]
         return self.loaded.responses(directions)[1], at_rest
@@ -80,7 +80,7 @@ class HierarchicalCollocation(CollocationElasticity):
     material : Material
     options : Hierarchical or MatrixFree
     slopes : bool
-        As of `CollocationElasticity`.
+        See `CollocationElasticity`.
     """
 
     def __init__(
@@ -94,13 +94,13 @@ class HierarchicalCollocation(CollocationElasticity):
         """Return a map with the equations of another one."""
         return cls(elastic.mesh, elastic.material, options, slopes=elastic.slopes)
 
-    def needs(self, case: BodyCase) -> BodyNeeds:
-        """Return memory and time of the map; ranks, and with them counts, are not predicted."""
+    def cost(self, case: BodyCase) -> BodyCost:
+        """Return memory and time of the map; counts depend on ranks and are not predicted."""
         if isinstance(self.options, MatrixFree):
-            from bemkit.operators.matrix_free.needs import matrix_free_needs
+            from bemkit.operators.matrix_free.cost import matrix_free_cost
 
-            return matrix_free_needs(case, self.options, takes_slopes=self.slopes)
-        return hierarchical_needs(case, self.options, takes_slopes=self.slopes)
+            return matrix_free_cost(case, self.options, takes_slopes=self.slopes)
+        return hierarchical_cost(case, self.options, takes_slopes=self.slopes)
 
     def system(self, conditions: NodalConditions, may_be_loaded: BoolArray, may_move: BoolArray) -> HierarchicalSystem:
         """Return the equations in the frames of the elements, compressed or not stored.
@@ -138,8 +138,7 @@ class HierarchicalCollocation(CollocationElasticity):
         InputError
             If the equations are solved without being stored.
         InexactEquationsError
-            If the boundary equations, all integrals in closed form and none compressed, are not fulfilled by a sample
-            of the solutions.
+            If a sampled solution does not fulfil the uncompressed boundary equations.
         """
         loaded = LoadedSystem.of(self, conditions, force)
         condensed = _EquationsMap.of(loaded, loaded.stiffness())
@@ -158,55 +157,55 @@ class LoadedSystem:
 
     Parameters
     ----------
-    map : HierarchicalCollocation
+    elastic : HierarchicalCollocation
     conditions : NodalConditions
-        Of the elements.
+        Conditions of the elements.
     system : HierarchicalSystem
-    known : ElementLaws
-        Of all elements; on elements with retained directions only what holds them fast.
-    may_be_loaded : (n_elements,) bool array
-        Elements for whose tractions the equations have columns.
-    may_move : (n_elements,) bool array
-        The same for displacements.
+    known : LocalConditions
+        Local conditions of all elements; retained directions are held fast.
+    may_be_loaded, may_move : (n_elements,) bool arrays
+        Elements whose traction, and whose displacement, has columns in the equations.
     force : (n_elements, 2) array [N/m]
         Given forces, in x and y.
     motions : (n_elements, 2, n_motions) array
         Rigid motions that no support resists and that cause no tractions.
-    travel : (n_motions,) array
-        One that is subtracted from all displacements. The compressed equations would hold it to their tolerance
-        only, which counts where a body moves by far more than it strains.
+    amplitudes : (n_motions,) array
+        Amplitudes of the rigid motion that is subtracted from all displacements. The compressed equations resolve
+        displacements only to their tolerance, which is too coarse if a body moves by far more than it strains.
     """
 
-    map: HierarchicalCollocation
+    elastic: HierarchicalCollocation
     conditions: NodalConditions
     system: HierarchicalSystem
-    known: ElementLaws
+    known: LocalConditions
     may_be_loaded: BoolArray
     may_move: BoolArray
     force: FloatArray
     motions: FloatArray
-    travel: FloatArray
+    amplitudes: FloatArray
 
     @classmethod
-    def of(cls, map: HierarchicalCollocation, conditions: NodalConditions, force: FloatArray) -> LoadedSystem:
-        """Compress the equations of a body, under its later loads, too."""
+    def of(cls, elastic: HierarchicalCollocation, conditions: NodalConditions, force: FloatArray) -> LoadedSystem:
+        """Compress the equations of a body for its present and later loads."""
         is_loaded, is_moved = _loaded(conditions, force)
         for given in conditions.later:
             is_loaded |= np.any(given.force != 0.0, axis=1)
             is_moved |= np.any(given.displacement != 0.0, axis=1)
         may_be_loaded = is_loaded | ~conditions.is_free.all(axis=1)
         may_move = is_moved | ~conditions.is_fixed.all(axis=1)
-        system = map.system(conditions, may_be_loaded, may_move)
-        motions = free_modes(map.displacement_space, conditions)
-        if not map.slopes:  # constant elements resist a rotation
+        system = elastic.system(conditions, may_be_loaded, may_move)
+        motions = free_modes(elastic.displacement_space, conditions)
+        if not elastic.slopes:  # without slopes a rotation causes tractions
             motions = motions[~turning(motions)]
         motions = np.ascontiguousarray(motions.transpose(1, 2, 0))
         at_rest = np.zeros(motions.shape[2])
-        nothing = ElementLaws(np.zeros((0, 4, 2)), np.zeros((0, 4)))
-        loaded = cls(map, conditions, system, nothing, may_be_loaded, may_move, force, motions, at_rest).moved(at_rest)
+        nothing = LocalConditions(np.zeros((0, 4, 2)), np.zeros((0, 4)))
+        loaded = cls(
+            elastic, conditions, system, nothing, may_be_loaded, may_move, force, motions, at_rest
+        ).subtracting(at_rest)
         if conditions.later:
             later = (loaded.under(conditions.in_plane(given.force), given.displacement) for given in conditions.later)
-            system.expect(each.known.given for each in (loaded, *later))
+            system.prepare(load.known.given for load in (loaded, *later))
         return loaded
 
     def under(self, force: FloatArray, displacement: FloatArray) -> LoadedSystem:
@@ -215,36 +214,43 @@ class LoadedSystem:
         is_loaded, is_moved = _loaded(conditions, force)
         if np.any(is_loaded & ~self.may_be_loaded) or np.any(is_moved & ~self.may_move):
             before = GivenData.of(self.conditions, self.force, self.conditions.displacement)
-            return LoadedSystem.of(self.map, replace(conditions, later=(*conditions.later, before)), force)
-        return replace(self, conditions=conditions, force=force).moved(-self.travel)
+            return LoadedSystem.of(self.elastic, replace(conditions, later=(*conditions.later, before)), force)
+        return replace(self, conditions=conditions, force=force).subtracting(-self.amplitudes)
 
     @property
     def motion(self) -> FloatArray:
         """(n_elements, 2) array [m]: the rigid motion that is subtracted, in x and y."""
-        motion: FloatArray = self.motions @ self.travel
+        motion: FloatArray = self.motions @ self.amplitudes
         return motion
 
-    def moved(self, travel: FloatArray) -> LoadedSystem:
-        """Return the equations of what is left of the displacements beside a further rigid motion (n_motions,)."""
-        other = replace(self, travel=self.travel + travel)
+    def subtracting(self, amplitudes: FloatArray) -> LoadedSystem:
+        """Return the equations after a further rigid motion, amplitudes (n_motions,), is subtracted."""
+        other = replace(self, amplitudes=self.amplitudes + amplitudes)
         conditions = self.conditions
         given = np.where(conditions.is_fixed, conditions.displacement - conditions.in_frames(other.motion), 0.0)
-        return replace(other, known=self.system.laws(self._held(given)))
+        return replace(other, known=self.system.local_conditions(self._with_displacements(given)))
 
-    def _held(self, displacement: FloatArray) -> NodeConditions:
-        """Return conditions of given tractions on free directions, and of displacements (n_elements, 2) on others."""
-        traction = self.conditions.in_frames(self.force) / self.map.mesh.lengths[:, None]
+    def _with_displacements(self, displacement: FloatArray) -> NodeConditions:
+        """Return conditions: given tractions on free directions, displacements (n_elements, 2) on the others."""
+        traction = self.conditions.in_frames(self.force) / self.elastic.mesh.lengths[:, None]
         return NodeConditions.given(~self.conditions.is_free, traction, displacement)
 
-    def travel_of(self, elements: IntArray, displacement: FloatArray) -> FloatArray | None:
-        """Return the rigid motion of some elements if it is far larger than what is left of their displacements."""
+    def large_motion(self, elements: IntArray, displacement: FloatArray) -> FloatArray | None:
+        """Return the amplitudes of the rigid motion of some elements if it is far larger than their strain.
+
+        Parameters
+        ----------
+        elements : (n,) array
+        displacement : (n, 2) array [m]
+            In x and y.
+        """
         motions = self.motions[elements].reshape(2 * elements.size, -1)
         if not motions.size:
             return None
-        travel: FloatArray = np.linalg.lstsq(motions, displacement.ravel(), rcond=None)[0].astype(float)
-        moved = motions @ travel
-        left = np.abs(displacement.ravel() - moved).max(initial=0.0)
-        return travel if np.abs(moved).max(initial=0.0) > _FAR * left else None
+        amplitudes: FloatArray = np.linalg.lstsq(motions, displacement.ravel(), rcond=None)[0].astype(float)
+        rigid = motions @ amplitudes
+        strain = np.abs(displacement.ravel() - rigid).max(initial=0.0)
+        return amplitudes if np.abs(rigid).max(initial=0.0) > _FAR * strain else None
 
     @property
     def retained(self) -> IntArray:
@@ -253,18 +259,18 @@ class LoadedSystem:
 
     def responses(self, directions: IntArray) -> tuple[FloatArray, FloatArray]:
         """Return tractions and displacements (k, n_retained) along directions under unit retained displacements."""
-        elements, number = np.unique(directions // 2, return_inverse=True)
+        elements, element_index = np.unique(directions // 2, return_inverse=True)
         states = self.system.responses(self.known, self.retained, elements)
-        along = directions % 2
-        return states[number, along], states[number, 2 + along]
+        component = directions % 2
+        return states[element_index, component], states[element_index, 2 + component]
 
     def stiffness(self) -> FloatArray:
-        """Return the forces (n_retained, n_retained) that unit displacements of retained directions take [N/m]."""
+        """Return the forces (n_retained, n_retained) under unit displacements of the retained directions [Pa]."""
         retained = self.retained
         if not retained.size:
             return np.zeros((0, 0))
-        stiffness = self.map.mesh.lengths[retained // 2, None] * self.responses(retained)[0]
-        # what no support resists costs no force, in the compressed equations but for their tolerance
+        stiffness = self.elastic.mesh.lengths[retained // 2, None] * self.responses(retained)[0]
+        # rigid motions that no support resists take no force; the compressed equations give some
         motions = np.einsum("nkc,ncm->nkm", self.conditions.frame, self.motions).reshape(self.force.size, -1)
         basis = np.linalg.qr(motions[retained])[0]
         return np.asarray(stiffness - (stiffness @ basis) @ basis.T)
@@ -274,23 +280,23 @@ class LoadedSystem:
         elements = np.unique(self.retained // 2)
         displacement = self.conditions.displacement.copy()
         displacement.ravel()[self.retained] = retained_displacement
-        held = np.einsum("nkc,nk->nc", self.conditions.frame[elements], displacement[elements])
-        travel = None if elements.size == 0 else self.travel_of(elements, held)
-        loaded = self if travel is None else self.moved(travel)
-        given = self._held(displacement - self.conditions.in_frames(loaded.motion)).take(elements)
+        in_plane = np.einsum("nkc,nk->nc", self.conditions.frame[elements], displacement[elements])
+        amplitudes = None if elements.size == 0 else self.large_motion(elements, in_plane)
+        loaded = self if amplitudes is None else self.subtracting(amplitudes)
+        given = self._with_displacements(displacement - self.conditions.in_frames(loaded.motion)).take(elements)
         self.system.state(loaded.known, elements, given)
-        traction, strained = self.system.everywhere()
+        traction, strained = self.system.full_state()
         return strained + loaded.motion, traction
 
     def residual(self, retained_displacement: FloatArray) -> float:
-        """Return the residual of the boundary equations at some elements by the largest displacement."""
+        """Return the largest residual at some elements, relative to the largest displacement."""
         displacement, traction = self.recovered(retained_displacement)
         n = self.force.shape[0]
         sampled = np.unique(np.linspace(0, n - 1, _SAMPLED).astype(int))
-        size = float(np.abs(displacement).max())
-        return float(np.abs(self.system.residual(sampled, traction, displacement)).max()) / size if size else 0.0
+        scale = float(np.abs(displacement).max())
+        return float(np.abs(self.system.residual(sampled, traction, displacement)).max()) / scale if scale else 0.0
 
 
 def _loaded(conditions: NodalConditions, force: FloatArray) -> tuple[BoolArray, BoolArray]:
-    """Return (n_elements,) where a force is given, and where a displacement other than zero is."""
+    """Return two masks (n_elements,): elements with a given force, and with a given displacement, other than zero."""
     return np.any(force != 0.0, axis=1), np.any(conditions.displacement != 0.0, axis=1)

@@ -1,4 +1,4 @@
-"""Protocol of every Steklov-Poincare operator, and of its condensed form."""
+"""Protocol of Steklov-Poincare operators and of their condensed form."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from bemkit.operators.pair_form import Tag
 from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions
 
 if TYPE_CHECKING:
-    from bemkit.operators.steklov_poincare.needs import BodyCase, BodyNeeds
+    from bemkit.operators.steklov_poincare.cost import BodyCase, BodyCost
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -26,21 +26,22 @@ class CondensedMap(ABC):
     Parameters
     ----------
     stiffness : (n_retained, n_retained) array
-        In weak form (forces, not tractions).
+        In weak form: forces, not tractions.
     load : (n_retained,) array
-        What the given loads and supports press onto the retained directions.
+        Forces that given loads and supports exert on the retained directions.
     sensitivity : (n_nodes, 2) array, optional
-        Sum of the sizes of all forces that a unit displacement of each node causes. Of thin bodies it is many orders
-        above the forces themselves, which then are differences and carry its round-off.
+        Sum of the magnitudes of all forces that a unit displacement of each node causes. For thin bodies it is many
+        orders larger than the resulting forces, which then contain its round-off.
     work : OperationCounts
-        Of the call that returned it: by `SteklovPoincare.condense` that includes the operators, by `under` it does not.
+        Operations of the call that returned the map; `SteklovPoincare.condense` includes the operators, `under` does
+        not.
     volume_force : (3,) array, optional
-        Resultants along x and y, and moment about the origin, of forces inside the body; none by default. Of a
-        half-plane, the loads that drive it from far away.
+        Resultants along x and y, and moment about the origin, of body forces; none by default. For a half-plane, the
+        loads that act far away.
     inner_force : float [N/m]
-        Sum of the magnitudes of the forces that body forces and heat exert on the boundary, balanced or not.
-    weightless : CondensedMap, optional
-        Of a body with forces or heat inside: the same body without; see
+        Sum of the magnitudes of the boundary forces of body forces and heat, balanced or not.
+    without_body_forces : CondensedMap, optional
+        The same body without body forces and heat, if it has any; see
         `bemkit.operators.steklov_poincare.forces_inside`.
     """
 
@@ -50,11 +51,11 @@ class CondensedMap(ABC):
     work: OperationCounts = field(default_factory=OperationCounts)
     volume_force: FloatArray | None = None
     inner_force: float = 0.0
-    weightless: CondensedMap | None = None
+    without_body_forces: CondensedMap | None = None
 
     @abstractmethod
     def recover(self, retained_displacement: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return displacement (n_nodes, 2) and total boundary force (n_nodes, 2) of all nodes, in x and y."""
+        """Return displacement and total boundary force of all nodes, (n_nodes, 2) each, in x and y."""
 
     @abstractmethod
     def under(self, force: FloatArray, displacement: FloatArray) -> CondensedMap:
@@ -70,26 +71,26 @@ class CondensedMap(ABC):
 
     @abstractmethod
     def follow(self, directions: IntArray) -> tuple[FloatArray, FloatArray]:
-        """Return response (k, n_retained) and at_rest (k,) of displacements of free directions (2 node + component).
+        """Return response (k, n_retained) and at_rest (k,) for free directions 2 node + component.
 
-        They are ``at_rest + response @ retained_displacement``.
+        Their displacements are ``at_rest + response @ retained_displacement``.
         """
 
 
 class BoundaryMap:
-    """Base of maps whose displacements all come from forces on the boundary of a body that ends somewhere."""
+    """Base of maps without body forces and without loads far away."""
 
     def own_fields(self, displacement: FloatArray, force: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return displacement and force."""
         return displacement, force
 
-    def energy_beyond(self, displacement: FloatArray, force: FloatArray) -> FloatArray:
-        """Return nothing."""
+    def further_energy(self, displacement: FloatArray, force: FloatArray) -> FloatArray:
+        """Return no further parts."""
         return np.zeros(0)
 
 
 class SteklovPoincare(Protocol):
-    """The elastic body seen from its boundary: nodal forces that go with displacements.
+    """Map of an elastic body from boundary displacements to nodal forces.
 
     Nothing is assembled before `condense`.
     """
@@ -108,25 +109,25 @@ class SteklovPoincare(Protocol):
 
     @property
     def tags(self) -> frozenset[Tag]:
-        """Whether the map is symmetric and positive semidefinite, and which motions cause no forces."""
+        """Properties of the map: symmetric, positive semidefinite, motions without forces."""
 
-    def needs(self, case: BodyCase) -> BodyNeeds:
-        """Return counts, memory and time that `condense` will take, for the plan; ``BodyNeeds()`` predicts none."""
+    def cost(self, case: BodyCase) -> BodyCost:
+        """Return the predicted counts, memory and time of `condense`; ``BodyCost()`` predicts none."""
 
     def condense(self, conditions: NodalConditions, force: FloatArray) -> CondensedMap:
-        """Eliminate every direction that is not retained, with the given nodal forces (n_nodes, 2) on the free ones."""
+        """Eliminate all directions that are not retained, under nodal forces (n_nodes, 2) on the free ones."""
 
     def own_fields(self, displacement: FloatArray, force: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return nodal displacements and forces (n_nodes, 2) less those of what acts inside the body or far away."""
+        """Return nodal displacements and forces (n_nodes, 2) minus those of body forces and of loads far away."""
 
-    def energy_beyond(self, displacement: FloatArray, force: FloatArray) -> FloatArray:
-        """Return the parts of the elastic energy [J/m] that what acts inside adds to that of `own_fields`."""
+    def further_energy(self, displacement: FloatArray, force: FloatArray) -> FloatArray:
+        """Return the parts of the elastic energy [J/m] that body forces and far loads add to that of `own_fields`."""
 
     def element_tractions(self, displacement: FloatArray, force: FloatArray) -> FloatArray:
-        """Return the tractions [Pa] that belong to what `CondensedMap.recover` gives.
+        """Return the tractions [Pa] of displacements and forces from `CondensedMap.recover`.
 
         Returns
         -------
         (n_elements, n_local, 2) array [Pa]
-            At the local nodes of the traction space, element by element; a new array.
+            At the local nodes of the traction space; a new array.
         """

@@ -18,7 +18,7 @@ from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions
 from bemkit.operators.steklov_poincare.protocol import BoundaryMap, CondensedMap, SteklovPoincare
 
 if TYPE_CHECKING:
-    from bemkit.operators.steklov_poincare.needs import BodyCase, BodyNeeds
+    from bemkit.operators.steklov_poincare.cost import BodyCase, BodyCost
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,9 +57,9 @@ class RigidlyConnected(BoundaryMap):
         """Promises of the map inside."""
         return self.elastic.tags
 
-    def needs(self, case: BodyCase) -> BodyNeeds:
+    def cost(self, case: BodyCase) -> BodyCost:
         """Return what the map inside takes, and the responses to the motions of connections."""
-        needs = self.elastic.needs(case)
+        needs = self.elastic.cost(case)
         responses = OperationCounts(right_hand_sides=3 * len(case.conditions.connected))
         return replace(needs, work=needs.work + responses)
 

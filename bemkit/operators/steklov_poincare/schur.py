@@ -56,7 +56,7 @@ class SchurCondensation:
         self._coupling = block_of(matrix, self._free, self._retained)
         self._of_fixed = matrix[:, self._fixed]
         self._volume = volume = self.volume.in_frames(conditions.frame).change
-        self._held = VolumeConstraint(self.factor, without_round_off(volume)[self._free], self.volume.yields)
+        self._held = VolumeConstraint(self.factor, without_round_off(volume)[self._free], self.volume.compliance)
         self._response, self._pressures = self._held.solve(-self._coupling, -volume[self._retained].T)
         stiffness = block_of(matrix, self._retained, self._retained) + multiply(self._coupling.T, self._response)
         stiffness += volume[self._retained] @ self._pressures

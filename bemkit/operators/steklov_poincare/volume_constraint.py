@@ -15,19 +15,19 @@ from bemkit.operators.steklov_poincare.nodal_conditions import turn_columns
 
 @dataclass(frozen=True, eq=False)
 class Volume:
-    """How the volume of a body changes; the pressure is one more unknown: ``change.T @ u == yields * pressure``.
+    """How the volume of a body changes; the pressure is one more unknown: ``change.T @ u == compliance * pressure``.
 
     Parameters
     ----------
     change : (n_dofs, 0 or 1) array
         By displacements; the pressure exerts the forces ``change * pressure``. No column for an exterior.
-    yields : float
+    compliance : float
         By a unit pressure; zero if the body is incompressible. Dividing by it instead would cost the digits of nearly
         incompressible bodies.
     """
 
     change: FloatArray
-    yields: float
+    compliance: float
 
     def in_frames(self, frame: FloatArray) -> Volume:
         """Return the same for displacements in the frames of the nodes."""
@@ -46,34 +46,34 @@ class VolumeConstraint:
         Of the free directions.
     volume : (n_free, 0 or 1) array
         Their change of volume.
-    yields : float
+    compliance : float
         See `Volume`.
     """
 
     stiffness: Factor
     volume: FloatArray
-    yields: float
+    compliance: float
 
     @cached_property
     def _compliance(self) -> tuple[FloatArray, FloatArray]:
         """Displacements under a unit pressure, and the volume that they yield."""
         displacement = self.stiffness.solve(self.volume)
-        yielded = self.volume.T @ displacement + self.yields
-        if yielded.size and not yielded.min() > 0.0:
+        total_compliance = self.volume.T @ displacement + self.compliance
+        if total_compliance.size and not total_compliance.min() > 0.0:
             raise SingularMatrixError(
                 "the incompressible body (poisson_ratio 0.5) has no free boundary to make room, as supports and "
                 "contact take all of it: leave a part free, end the contact part by `where` before the boundary that "
                 "never touches, or give a poisson_ratio of 0.4999"
             )
-        return displacement, yielded
+        return displacement, total_compliance
 
     def solve(self, right: FloatArray, volume: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return displacements and pressure for given forces (n_free, ...) and changes of volume (0 or 1, ...)."""
         free = self.stiffness.solve(right)
         if not self.volume.shape[1]:
             return free, np.zeros(volume.shape)
-        displacement, yielded = self._compliance
-        pressure = (self.volume.T @ free - volume) / yielded[0, 0]
+        displacement, total_compliance = self._compliance
+        pressure = (self.volume.T @ free - volume) / total_compliance[0, 0]
         return free - displacement @ pressure, pressure
 
 

@@ -33,7 +33,7 @@ def test_blocks_between_leaves_follow_from_their_skeletons(
         for two in (1, 2, tree.n_leaves - 2):
             if one == two:
                 continue
-            rows = np.arange(2 * tree.places(0, one).start, 2 * tree.places(0, one).stop)
+            rows = np.arange(2 * tree.positions(0, one).start, 2 * tree.positions(0, one).stop)
             block = equations.block(rows, compression.unknowns[two])
             few = equations.block(leaves[one].rows, leaves[two].columns)
             error = np.abs(leaves[one].row_map.matrix() @ few @ leaves[two].column_map.matrix().T - block).max()
@@ -54,7 +54,7 @@ def test_columns_of_one_kind_are_compressed_alone(request: pytest.FixtureRequest
         compression = Compression.of(equations, tree, may_differ, 1e-9)
         leaves = compression.skeletons[0]
         for receiver, source in ((0, len(leaves) - 1), (len(leaves) - 1, 0), (1, 2)):
-            unknowns, own = compression.unknowns[source], tree.places(0, receiver)
+            unknowns, own = compression.unknowns[source], tree.positions(0, receiver)
             values = np.cos(place[unknowns // 4] + unknowns % 4)
             exact = equations.block(np.arange(2 * own.start, 2 * own.stop), unknowns) @ values
             between = equations.block(leaves[receiver].rows, leaves[source].columns)
@@ -86,7 +86,7 @@ def test_discs_hold_their_clusters_and_proxies_lie_around_them() -> None:
     for level in range(tree.n_levels):
         discs = Discs.around(tree, level, equations.supports)
         for cluster in range(discs.radius.size):
-            places = tree.places(level, cluster)
+            places = tree.positions(level, cluster)
             far = np.abs(equations.supports[:, places] - discs.centre[cluster]).max()
             assert far == pytest.approx(discs.radius[cluster])
             around = np.abs(proxy_points(discs, cluster, 8) - discs.centre[cluster])

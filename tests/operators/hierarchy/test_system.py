@@ -11,7 +11,7 @@ from bemkit.arrays import BoolArray, FloatArray
 from bemkit.geometry import BoundaryMesh, ExteriorOf, PlateWithHole, Polygon, Rectangle, discretise
 from bemkit.operators.collocation.images import collocation_equations
 from bemkit.operators.hierarchy.factor import Factor, SingularClusterError
-from bemkit.operators.hierarchy.system import ElementLaws, HierarchicalSystem, NodeConditions, UndeterminedError
+from bemkit.operators.hierarchy.system import HierarchicalSystem, LocalConditions, NodeConditions, UndeterminedError
 from bemkit.operators.hierarchy.tree import ClusterTree
 from bemkit.operators.linear.dense import SingularMatrixError
 from bemkit.operators.material import Material
@@ -74,13 +74,13 @@ def system_of(
     return HierarchicalSystem(factor, frame, mesh.diameter / mesh.n_elements / MATERIAL.plane_modulus)
 
 
-def laws_of(
+def local_conditions_of(
     system: HierarchicalSystem, mesh: BoundaryMesh, conditions: NodalConditions, force: FloatArray, kept: FloatArray
-) -> ElementLaws:
+) -> LocalConditions:
     displacement = conditions.displacement.copy()
     displacement[conditions.is_retained] = kept
     traction = np.einsum("nkc,nc->nk", conditions.frame, force) / mesh.lengths[:, None]
-    return system.laws(NodeConditions.given(~conditions.is_free, traction, displacement))
+    return system.local_conditions(NodeConditions.given(~conditions.is_free, traction, displacement))
 
 
 NOWHERE = np.zeros(0, np.intp)
@@ -97,8 +97,8 @@ def test_answers_are_those_of_dense_equations(name: str, slopes: bool) -> None:
     # round-off of LU is all that a single leaf adds
     for tolerance, is_dense in ((1e-6, False), (1e-11, False), (1e-13, True)):
         system = system_of(mesh, conditions.frame, slopes, tolerance, is_dense=is_dense)
-        system.state(laws_of(system, mesh, conditions, force, kept), NOWHERE, NOTHING)
-        traction, found = system.everywhere()
+        system.state(local_conditions_of(system, mesh, conditions, force, kept), NOWHERE, NOTHING)
+        traction, found = system.full_state()
         expected = all_force / mesh.lengths[:, None]
         # two to four times the tolerance are found on all shapes
         assert np.abs(found - displacement).max() <= 20.0 * tolerance * np.abs(displacement).max()
@@ -116,8 +116,8 @@ def test_small_elements_of_graded_meshes_keep_their_digits() -> None:
         MixedSystem(mesh, MATERIAL, conditions, "body", force, slopes=True).condensed().recover(kept)
     )
     system = system_of(mesh, conditions.frame, True, 1e-8)
-    system.state(laws_of(system, mesh, conditions, force, kept), NOWHERE, NOTHING)
-    traction, found = system.everywhere()
+    system.state(local_conditions_of(system, mesh, conditions, force, kept), NOWHERE, NOTHING)
+    traction, found = system.full_state()
     expected = all_force / mesh.lengths[:, None]
     # random combinations of all rows would lose three digits of these tractions
     assert np.abs(found - displacement).max() <= 20e-8 * np.abs(displacement).max()
@@ -130,7 +130,7 @@ def test_conditions_that_change_leave_what_a_new_factorisation_finds() -> None:
     system = system_of(mesh, conditions.frame, True, 1e-9)
     open_elements = np.flatnonzero(conditions.is_retained.any(axis=1))
     rng = np.random.default_rng(0)
-    laws = laws_of(system, mesh, conditions, force, kept)
+    local = local_conditions_of(system, mesh, conditions, force, kept)
     n_leaves = system.factor.compression.tree.n_leaves
     for changed in (open_elements, open_elements[:3], open_elements[:0]):
         some = np.isin(np.arange(mesh.n_elements), changed)[open_elements]
@@ -140,13 +140,13 @@ def test_conditions_that_change_leave_what_a_new_factorisation_finds() -> None:
             stiff[:, :, None] * np.eye(2),
             np.ones((open_elements.size, 2)),
         )
-        state = system.state(laws, open_elements, held)
+        state = system.state(local, open_elements, held)
         fresh = system_of(mesh, conditions.frame, True, 1e-9)
-        np.testing.assert_allclose(state, fresh.state(laws, open_elements, held), rtol=1e-12, atol=1e-13)
+        np.testing.assert_allclose(state, fresh.state(local, open_elements, held), rtol=1e-12, atol=1e-13)
         np.testing.assert_allclose(state[:, :2] + stiff * state[:, 2:], 1.0, rtol=1e-12)
         assert fresh.factor.n_factored == n_leaves
     assert 0 < system.factor.n_factored < n_leaves
-    system.state(laws, open_elements, held)
+    system.state(local, open_elements, held)
     assert system.factor.n_factored == 0
 
 
@@ -155,16 +155,18 @@ def test_a_body_that_nothing_holds_and_conditions_that_are_one_are_named() -> No
     n = mesh.n_elements
     frame = np.broadcast_to(np.eye(2), (n, 2, 2))
     system = system_of(mesh, frame, True, 1e-11)
-    nothing_held = system.laws(NodeConditions.given(np.zeros((n, 2), bool), np.zeros((n, 2)), np.zeros((n, 2))))
+    nothing_held = system.local_conditions(
+        NodeConditions.given(np.zeros((n, 2), bool), np.zeros((n, 2)), np.zeros((n, 2)))
+    )
     with pytest.raises(SingularMatrixError, match="check that supports and contacts hold the body"):
         system.state(nothing_held, NOWHERE, NOTHING)
     twice = np.array([[[1.0, 0.0], [2.0, 0.0]]])
     with pytest.raises(UndeterminedError, match="not independent"):
         system.state(nothing_held, np.array([0]), NodeConditions(0.0 * twice, twice, np.zeros((1, 2))))
     # and it goes on from there
-    held = system.laws(NodeConditions.given(np.ones((n, 2), bool), np.zeros((n, 2)), mesh.centres))
+    held = system.local_conditions(NodeConditions.given(np.ones((n, 2), bool), np.zeros((n, 2)), mesh.centres))
     system.state(held, NOWHERE, NOTHING)
-    traction, _ = system.everywhere()
+    traction, _ = system.full_state()
     # a uniform dilatation has the pressure 2 (mu + lambda) = 2 mu / (1 - 2 nu) on all sides
     pressure = 2.0 * MATERIAL.shear_modulus / (1.0 - 2.0 * MATERIAL.poisson_ratio)
     np.testing.assert_allclose(traction, pressure * mesh.normals, atol=1e-7 * pressure)
@@ -174,13 +176,13 @@ def test_a_leaf_that_becomes_singular_is_named() -> None:
     mesh = mesh_of("rectangle", 220)
     conditions, force, kept = conditions_of(mesh, 3)
     system = system_of(mesh, conditions.frame, True, 1e-9)
-    laws = laws_of(system, mesh, conditions, force, kept)
-    factors = laws.factors.copy()
+    local = local_conditions_of(system, mesh, conditions, force, kept)
+    factors = local.factors.copy()
     factors[7] = 0.0  # neither its traction nor its displacement is unknown
     with pytest.raises(SingularClusterError, match=r"a cluster of \d+ elements is singular.*linear solver 'direct'"):
-        system.factor.update(ElementLaws(factors, laws.given))
-    system.state(laws, NOWHERE, NOTHING)
-    traction, _ = system.everywhere()
+        system.factor.update(LocalConditions(factors, local.given))
+    system.state(local, NOWHERE, NOTHING)
+    traction, _ = system.full_state()
     assert np.isfinite(traction).all()
 
 
@@ -188,8 +190,8 @@ def test_an_interrupted_factorisation_loses_nothing(monkeypatch: pytest.MonkeyPa
     mesh = mesh_of("rectangle", 200)
     conditions, force, kept = conditions_of(mesh, 3)
     system, fresh = (system_of(mesh, conditions.frame, True, 1e-9) for _ in range(2))
-    laws, other = (laws_of(system, mesh, conditions, force, factor * kept) for factor in (1.0, 2.0))
-    system.state(laws, NOWHERE, NOTHING)
+    local, other = (local_conditions_of(system, mesh, conditions, force, factor * kept) for factor in (1.0, 2.0))
+    system.state(local, NOWHERE, NOTHING)
 
     def interrupted(*arguments: object) -> None:
         raise KeyboardInterrupt
@@ -198,10 +200,10 @@ def test_an_interrupted_factorisation_loses_nothing(monkeypatch: pytest.MonkeyPa
         patch.setattr(Factor, "_parent", interrupted)
         with pytest.raises(KeyboardInterrupt):
             system.state(other, NOWHERE, NOTHING)
-    for conditions_now in (laws, other):
-        system.state(conditions_now, NOWHERE, NOTHING)
-        fresh.state(conditions_now, NOWHERE, NOTHING)
-        for found, expected in zip(system.everywhere(), fresh.everywhere(), strict=True):
+    for present in (local, other):
+        system.state(present, NOWHERE, NOTHING)
+        fresh.state(present, NOWHERE, NOTHING)
+        for found, expected in zip(system.full_state(), fresh.full_state(), strict=True):
             np.testing.assert_allclose(found, expected, rtol=1e-12, atol=1e-13)
 
 
@@ -211,7 +213,7 @@ def test_clusters_that_do_not_change_keep_no_scattering_matrices_and_may_change_
     in_contact = np.arange(mesh.n_elements) < 80
     system = system_of(mesh, conditions.frame, True, 1e-9, in_contact)
     every = system_of(mesh, conditions.frame, True, 1e-9)
-    laws = laws_of(system, mesh, conditions, force, kept)
+    local = local_conditions_of(system, mesh, conditions, force, kept)
     n_leaves = system.factor.compression.tree.n_leaves
     nowhere_else = []
     for place in (0, 699, 350):
@@ -219,9 +221,9 @@ def test_clusters_that_do_not_change_keep_no_scattering_matrices_and_may_change_
             np.array([place]),
             NodeConditions.given(np.ones((1, 2), bool), np.zeros((1, 2)), np.ones((1, 2))),
         )
-        states = [each.state(laws, elements, one) for each in (system, every)]
+        states = [each.state(local, elements, one) for each in (system, every)]
         np.testing.assert_array_equal(*states)
-        for found, expected in zip(system.everywhere(), every.everywhere(), strict=True):
+        for found, expected in zip(system.full_state(), every.full_state(), strict=True):
             np.testing.assert_array_equal(found, expected)
         nowhere_else.append(system.factor.n_factored)
     assert system.factor.n_bytes < 0.9 * every.factor.n_bytes
@@ -238,15 +240,17 @@ def test_loads_that_are_expected_and_their_sums_factor_nothing(n_more: int) -> N
     system, fresh = (system_of(mesh, conditions.frame, True, 1e-9, each) for each in (in_contact, None))
     loads = np.stack([force, np.where(mesh.centres[:, :1] > 0.0, force, 0.0), np.cos(5.0 * mesh.centres) * force])
     shares = np.array([(1, 0, 0), (0.5, 0, 0), (1, 1, 0), (2, -3, 0), (0, 0, 0), (0, 0.1, 1), (1, 0, 0)])
-    laws = [laws_of(system, mesh, conditions, np.tensordot(share, loads, 1), 0.0 * kept) for share in shares]
+    local = [
+        local_conditions_of(system, mesh, conditions, np.tensordot(share, loads, 1), 0.0 * kept) for share in shares
+    ]
     more = [np.cos((6.0 + k) * mesh.centres) * force for k in range(n_more)]
-    expected_laws = [*laws[:3], *(laws_of(system, mesh, conditions, each, 0.0 * kept) for each in more)]
-    system.expect(each.given for each in expected_laws)
+    announced = [*local[:3], *(local_conditions_of(system, mesh, conditions, each, 0.0 * kept) for each in more)]
+    system.prepare(each.given for each in announced)
     factored = []
-    for each in laws:
+    for each in local:
         for solver in (system, fresh):
             solver.state(each, NOWHERE, NOTHING)
-        for found, expected in zip(system.everywhere(), fresh.everywhere(), strict=True):
+        for found, expected in zip(system.full_state(), fresh.full_state(), strict=True):
             # round-off of loads that take each other away, by what responses are larger than loads
             np.testing.assert_allclose(found, expected, rtol=0, atol=1e-11 * np.abs(expected).max())
         factored.append(system.factor.n_factored)

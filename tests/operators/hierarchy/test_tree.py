@@ -22,11 +22,11 @@ def test_leaves_hold_every_point_once_and_nearly_as_many_each(n: int, leaf_size:
     assert sizes.sum() == n
     places = np.arange(n)
     for leaf in range(tree.n_leaves):
-        np.testing.assert_array_equal(tree.leaves_of(places[tree.places(0, leaf)]), [leaf] if sizes[leaf] else [])
+        np.testing.assert_array_equal(tree.leaves_of(places[tree.positions(0, leaf)]), [leaf] if sizes[leaf] else [])
     for level in range(1, tree.n_levels + 1):
         for cluster in range(2 ** (tree.n_levels - level)):
-            one, two = (tree.places(level - 1, 2 * cluster + k) for k in (0, 1))
-            assert tree.places(level, cluster) == slice(one.start, two.stop)
+            one, two = (tree.positions(level - 1, 2 * cluster + k) for k in (0, 1))
+            assert tree.positions(level, cluster) == slice(one.start, two.stop)
             assert one.stop == two.start
 
 
@@ -34,7 +34,7 @@ def test_both_long_sides_of_a_strip_share_a_leaf() -> None:
     strip = discretise(Rectangle(100.0, 0.1).outline(), n_elements=400)
     tree = ClusterTree.of(strip.centres, 32)
     for leaf in range(tree.n_leaves):
-        y = strip.centres[tree.order[tree.places(0, leaf)]][:, 1]
+        y = strip.centres[tree.order[tree.positions(0, leaf)]][:, 1]
         assert y.min() == pytest.approx(0.0)
         assert y.max() == pytest.approx(0.1)
 
@@ -57,6 +57,6 @@ def test_a_leaf_holds_no_few_elements_far_from_the_others() -> None:
     tree = ClusterTree.of(block.centres, 88)
     z = block.centres[tree.order] @ np.array([1.0, 1.0j])
     for leaf in range(tree.n_leaves):
-        own = z[tree.places(0, leaf)]
+        own = z[tree.positions(0, leaf)]
         radius = np.abs(own - own.mean()).max()
         assert np.count_nonzero(np.abs(z - own.mean()) < 2.0 * radius) < 0.1 * z.size

@@ -1,31 +1,29 @@
-"""Whether the equations of collocation can be solved without storing them, and what that takes, from sizes.
+"""Predicted costs of matrix-free collocation equations, and reasons why equations must be stored.
 
-Times and memory are those of a square with 1e4 to 1e5 elements (`benchmarks/low_memory.py` measures what is
-estimated here).
+Times and memory are those of a square with 1e4 to 1e5 elements, measured by `benchmarks/low_memory.py`.
 """
 
 from __future__ import annotations
 
 from bemkit.operators.collocation import compiled
 from bemkit.operators.linear.solvers import MatrixFree
-from bemkit.operators.steklov_poincare.needs import BodyCase, BodyNeeds, PlanItem
+from bemkit.operators.steklov_poincare.cost import BodyCase, BodyCost, PlanItem
 
 _FEWEST_ELEMENTS = 200
 _MOST_LOOPS = 20
-"""Each closed curve of the boundary has an equation of its own, which is evaluated for each product."""
+"""Largest number of closed curves: each adds an equation that is evaluated for each product."""
 _BYTES, _BYTES_OF_GROUPS = 1.5e3, 5e6
-"""Bytes of an element: mesh, directions of the iteration, series, conditions and fields; and once, mostly
-for the equations of groups of elements."""
+"""Bytes of each element (mesh, search directions, series, conditions, fields), and of the coarse equations."""
 _EVALUATIONS, _EVALUATIONS_COMPILED = 4.5e3, 0.3e3
-"""Evaluations of a product for each element."""
+"""Evaluations of integrals for each element and product."""
 _STEPS = 17.0
-"""Products of a response from cold, to the tolerance of 1e-10."""
+"""Products of a response that starts from zero, to the tolerance 1e-10."""
 _RESPONSES = 6.0
-"""From cold that a load step takes; later ones begin near their solution."""
+"""Responses of a load step, counted as if they started from zero; later ones start near their solution."""
 
 
 def why_stored(case: BodyCase) -> str:
-    """Say why equations cannot do without being stored; empty if they can."""
+    """Return why the equations of a body must be stored; empty if they need not."""
     mesh = case.mesh
     if mesh.n_elements < _FEWEST_ELEMENTS:
         return f"{mesh.n_elements} elements are few"
@@ -40,8 +38,8 @@ def why_stored(case: BodyCase) -> str:
     return ""
 
 
-def matrix_free_needs(case: BodyCase, options: MatrixFree, *, takes_slopes: bool) -> BodyNeeds:
-    """Return what equations take that are not stored; how many steps an iteration takes is not predicted."""
+def matrix_free_cost(case: BodyCase, options: MatrixFree, *, takes_slopes: bool) -> BodyCost:
+    """Return the costs of equations that are not stored, for a typical number of iterations."""
     n = case.mesh.n_elements
     memory = int(_BYTES * n + _BYTES_OF_GROUPS)
     is_compiled, _ = compiled.expected(n)
@@ -58,4 +56,4 @@ def matrix_free_needs(case: BodyCase, options: MatrixFree, *, takes_slopes: bool
         PlanItem("algebraic multigrid (pyamg)", True, "its hierarchy inverts the single layer between elements"),
     )
     evaluations = of_product * _STEPS * _RESPONSES * len(case.loads)
-    return BodyNeeds(items=items, memory=memory, kept=memory, evaluations=evaluations, is_matrix_free=True)
+    return BodyCost(items=items, memory=memory, kept=memory, evaluations=evaluations, is_matrix_free=True)

@@ -1,7 +1,7 @@
-"""Costs of a Steklov-Poincare operator, predicted from sizes: items, counts, memory and operations.
+"""Predicted costs of a Steklov-Poincare operator: plan items, counts, memory and operations.
 
-Counts are exact. Memory adds up the matrices that are alive at the same time and the buffers of assembly; those of
-collocation, and the evaluations of integrals, were fitted once to runs of the shipped scenes with 50 to 800 elements.
+Counts are exact. Memory is the sum of the matrices that exist at the same time and the buffers of assembly. The buffers
+of collocation and the evaluations of integrals were fitted to runs of the shipped scenes with 50 to 800 elements.
 """
 
 from __future__ import annotations
@@ -22,17 +22,17 @@ from bemkit.operators.steklov_poincare.nodal_conditions import GivenData, NodalC
 
 _BYTES = 8
 CONTACT_STEPS = 8
-"""Steps of Newton's method for a contact problem; they hardly depend on its size."""
+"""Newton steps of a contact problem; they hardly depend on its size."""
 _SECONDS_PER_EVALUATION, _SECONDS_PER_FLOP = 2e-8, 1e-10
-"""Seconds of a common computer for a closed-form integral, and for a flop of a factorisation."""
+"""Time of a closed-form integral, and of a flop of a factorisation, on a common computer [s]."""
 CHUNK_PAIRS = 32768
-"""Pairs of a midpoint and an element that collocation evaluates at a time on each thread."""
+"""Pairs of a midpoint and an element that each thread of collocation evaluates at a time."""
 _OWN_SOLVER = ChosenLinearSolver(DenseCholesky(), "the map has a linear solver of its own")
 
 
 @dataclass(frozen=True)
 class PlanItem:
-    """One thing that is needed or skipped, and why.
+    """One operator, matrix or library that a scene needs or skips, and why.
 
     Parameters
     ----------
@@ -46,7 +46,7 @@ class PlanItem:
     reason: str
 
     def as_dict(self) -> dict[str, str | bool]:
-        """Return the entries as JSON can hold them."""
+        """Return the item as a JSON object."""
         return {"name": self.name, "needed": self.is_needed, "reason": self.reason}
 
 
@@ -57,16 +57,16 @@ class BodyCase:
     Parameters
     ----------
     mesh : BoundaryMesh
-        In any units; that on which the body is solved shares its spaces.
+        In any units.
     material : Material
     conditions : NodalConditions
-        Those of contact are retained.
+        Directions of contact nodes are retained.
     loads : tuple of GivenData
         Given forces and displacements of each load step.
     linear_solver : ChosenLinearSolver, optional
-        Taken for a symmetric map; by default that of collocation.
+        Solver of a symmetric map; collocation uses its own.
     is_condensed : bool
-        Whether contact sees the stiffness of the body even if its equations are compressed over a tree.
+        Whether the contact problem uses the stiffness of the body even if its equations are compressed over a tree.
     """
 
     mesh: BoundaryMesh
@@ -78,49 +78,49 @@ class BodyCase:
 
     @property
     def n_displacements(self) -> int:
-        """Components of all nodes."""
+        """Number of displacement components."""
         return self.conditions.is_fixed.size
 
     @property
     def n_fixed(self) -> int:
-        """Components that supports prescribe."""
+        """Number of components that supports prescribe."""
         return int(np.count_nonzero(self.conditions.is_fixed))
 
     @property
     def n_free(self) -> int:
-        """Components of known force."""
+        """Number of components with a given force."""
         return int(np.count_nonzero(self.conditions.is_free))
 
     @property
     def n_retained(self) -> int:
-        """Components that contact decides."""
+        """Number of components that contact determines."""
         return int(np.count_nonzero(self.conditions.is_retained))
 
     @property
     def n_curved(self) -> int:
-        """Curved elements."""
+        """Number of curved elements."""
         return int(np.count_nonzero(~self.mesh.is_straight))
 
 
 @dataclass(frozen=True)
-class BodyNeeds:
-    """Costs of a body until it is condensed, and its kept arrays.
+class BodyCost:
+    """Costs of the condensation of a body.
 
     Parameters
     ----------
     items : tuple of PlanItem
     work : OperationCounts
-        What `CondensedMap.work` will count after the last load step.
+        Predicted `CondensedMap.work` after the last load step.
     memory : int [bytes]
-        Largest sum of what exists at the same time.
+        Largest memory at one time.
     kept : int [bytes]
-        Of what is alive while the contact problem is solved.
+        Memory that is kept while the contact problem is solved.
     evaluations : float
-        Of closed-form integrals, at one point for one element, on each thread.
+        Closed-form integrals, each at one point for one element, on each thread.
     flops : float
-        Of dense linear algebra.
+        Flops of dense linear algebra.
     is_matrix_free : bool
-        Whether the contact problem has no matrix either: all of its work and memory is counted here.
+        Whether the contact problem forms no matrix either; its work and memory are then counted here.
     """
 
     items: tuple[PlanItem, ...] = ()
@@ -133,25 +133,25 @@ class BodyNeeds:
 
     @property
     def seconds(self) -> float:
-        """Run time of a common computer [s]."""
+        """Run time on a common computer [s]."""
         return seconds_of(self.evaluations, self.flops)
 
 
 def seconds_of(evaluations: float, flops: float) -> float:
-    """Return the run time of a common computer for closed-form integrals and flops [s]."""
+    """Return the run time of closed-form integrals and flops on a common computer [s]."""
     return _SECONDS_PER_EVALUATION * evaluations + _SECONDS_PER_FLOP * flops
 
 
-def galerkin_needs(case: BodyCase, n_tractions: int, degree: int) -> BodyNeeds:
-    """Return what a symmetric Galerkin map takes.
+def galerkin_cost(case: BodyCase, n_tractions: int, degree: int) -> BodyCost:
+    """Return the costs of a symmetric Galerkin map.
 
     Parameters
     ----------
     case : BodyCase
     n_tractions : int
-        Components of all traction dofs.
+        Number of traction components.
     degree : int
-        Of the displacements.
+        Degree of the displacements.
     """
     from bemkit.operators.integrals.pairs import Degrees
     from bemkit.operators.integrals.sweep import sweep_memory
@@ -161,13 +161,13 @@ def galerkin_needs(case: BodyCase, n_tractions: int, degree: int) -> BodyNeeds:
     assembled, is_curved = t * t + t * u + u * u, case.n_curved > 0
     is_bounded = not mesh.is_exterior
     n_pressures = len(mesh.loops) if case.material.is_incompressible else int(is_bounded)
-    # of the single layer: the resultants and the pressures; of the body: the one that goes with its volume
+    # right-hand sides with V: resultants and pressures; with the body: its volume
     n_columns = len(admissible_modes(mesh)) + n_pressures + int(is_bounded) + r + len(case.loads) + u
     factorisations = Factorisation(FactorKind.CHOLESKY, t), Factorisation(FactorKind.CHOLESKY, f)
-    # the factor of V, K twice, W and two copies of the sum; of curved elements four of W
+    # factor of V, K twice, W and two copies of the sum; with curved elements four copies of W
     largest = t * t + max(2 * t * u + 3 * u * u, t * u + 4 * u * u if is_curved else 0)
-    own = f * f + 2 * f * r + u * case.n_fixed
-    largest, kept = max(largest, assembled + 2 * u * u + own + r * r), assembled + own
+    of_condensation = f * f + 2 * f * r + u * case.n_fixed
+    largest, kept = max(largest, assembled + 2 * u * u + of_condensation + r * r), assembled + of_condensation
     flops = 2.0 * (t**3 / 3.0 + t * t * u + t * u * u) + 2.0 * (f**3 / 3.0 + 2.0 * f * f * r + 2.0 * f * r * r)
     work = OperationCounts(
         element_pairs=mesh.n_elements * mesh.whole.n_elements,
@@ -183,7 +183,7 @@ def galerkin_needs(case: BodyCase, n_tractions: int, degree: int) -> BodyNeeds:
     memory = max(_BYTES * assembled + buffers, _BYTES * largest)
     straight, curved = ((15.0, 18e3), (20.0, 35e3)) if degree < 2 else ((40.0, 30e3), (100.0, 55e3))
     evaluations = _evaluations(case, straight, curved) / threads
-    return BodyNeeds(_galerkin_items(case, n_tractions), work, memory, _BYTES * kept, evaluations, flops)
+    return BodyCost(_galerkin_items(case, n_tractions), work, memory, _BYTES * kept, evaluations, flops)
 
 
 def _galerkin_items(case: BodyCase, n_tractions: int) -> tuple[PlanItem, ...]:
@@ -203,21 +203,21 @@ def _galerkin_items(case: BodyCase, n_tractions: int) -> tuple[PlanItem, ...]:
     )
 
 
-def collocation_needs(case: BodyCase, *, takes_slopes: bool) -> BodyNeeds:
-    """Return what direct collocation with exchanged columns takes.
+def collocation_cost(case: BodyCase, *, takes_slopes: bool) -> BodyCost:
+    """Return the costs of direct collocation.
 
     Parameters
     ----------
     case : BodyCase
     takes_slopes : bool
-        Whether the double layer takes slopes between neighbouring elements.
+        Whether the displacements of the double layer vary linearly on each element.
     """
     u, r, mesh = case.n_displacements, case.n_retained, case.mesh
     n_single, n_double = case.n_fixed + r, case.n_free + r
     sweeps = _different_loads(case)
-    n_loaded, n_moved = sum(each.n_loaded for each in sweeps), sum(each.n_moved for each in sweeps)
+    n_loaded, n_moved = sum(data.n_loaded for data in sweeps), sum(data.n_moved for data in sweeps)
     order = u + len(admissible_modes(mesh)) + len(mesh.loops)
-    n_elements = mesh.n_elements  # all of them for the first data, later those with tractions if these suffice
+    n_elements = mesh.n_elements  # the first sweep takes all elements, later ones may take only loaded ones
     for later in sweeps[1:]:
         n_elements += mesh.n_elements if later.n_moved else int(np.count_nonzero(later.force.any(axis=1)))
     work = OperationCounts(
@@ -227,23 +227,23 @@ def collocation_needs(case: BodyCase, *, takes_slopes: bool) -> BodyNeeds:
         factorisations=(Factorisation(FactorKind.LU, order),),
         right_hand_sides=r + len(sweeps),
     )
-    # the system and its right-hand sides, and what LU copies of them
+    # the system, its right-hand sides, and the copies of LU
     system = (u + len(admissible_modes(mesh))) ** 2
     memory = _BYTES * (system + u * r) + int(max(195.0 * _pairs_in_chunks(mesh), _BYTES * 3.0 * u * r))
     evaluations = _evaluations(case, (12.0, 500.0), (15.0, 9500.0)) * n_elements / mesh.n_elements
     evaluations /= n_threads(mesh.n_elements * mesh.whole.n_elements)
     flops = 2.0 * (2.0 / 3.0 * order**3 + 2.0 * order**2 * r)
     items = _collocation_items(case, order, n_loaded, n_moved, takes_slopes)
-    return BodyNeeds(items, work, memory, _BYTES * (system + u * r), evaluations, flops)
+    return BodyCost(items, work, memory, _BYTES * (system + u * r), evaluations, flops)
 
 
 def _different_loads(case: BodyCase) -> list[GivenData]:
-    """Return the given data of the load steps that are not multiples of those before."""
-    found: list[GivenData] = []
+    """Return the given data of the load steps that are no multiples of the data before."""
+    different: list[GivenData] = []
     for data in case.loads:
-        if not found or data.factor_of(found[-1]) is None:
-            found.append(data)
-    return found
+        if not different or data.factor_of(different[-1]) is None:
+            different.append(data)
+    return different
 
 
 def _collocation_items(
@@ -281,23 +281,23 @@ def _zero_columns(name: str, reason: str, n_columns: int, n_all: int) -> PlanIte
 
 
 def _pairs_in_chunks(mesh: BoundaryMesh) -> int:
-    """Return how many element pairs are evaluated at the same time."""
+    """Return the number of element pairs that are evaluated at the same time."""
     n_pairs = mesh.n_elements * mesh.whole.n_elements
     return min(n_pairs, n_threads(n_pairs) * CHUNK_PAIRS)
 
 
 def _evaluations(case: BodyCase, straight: tuple[float, float], curved: tuple[float, float]) -> float:
-    """Return the evaluations of one sweep: for each pair, and for the close pairs of each element."""
+    """Return the evaluations of one sweep, from those of each far pair and of the near pairs of each element."""
     mesh, share = case.mesh, case.n_curved / case.mesh.n_elements
-    far, near = ((1.0 - share) * one + share * other for one, other in zip(straight, curved, strict=True))
+    far, near = ((1.0 - share) * flat + share * bent for flat, bent in zip(straight, curved, strict=True))
     n_sources = mesh.whole.n_elements
     return mesh.n_elements * (n_sources * far + near)
 
 
 def physical_memory() -> float:
-    """Return the memory of this computer, or what `ulimit -v` leaves to this process, if that is less [bytes].
+    """Return the memory of this computer, or the rest of the limit `ulimit -v` if that is smaller [bytes].
 
-    It is infinite on systems that do not report it.
+    It is infinite on systems that report neither.
     """
     try:
         page = float(os.sysconf("SC_PAGE_SIZE"))

@@ -1,7 +1,7 @@
-"""Whether boundary equations are compressed over a tree, and what that takes, predicted from sizes.
+"""Predicted costs of boundary equations compressed over a tree, and the choice between dense and compressed equations.
 
-Times and memory are those of a square with 1e3 to 1e6 elements (`benchmarks/large.py` measures what is estimated
-here); they hardly depend on the shape.
+Times and memory are those of a square with 1e3 to 1e6 elements, measured by `benchmarks/large.py`; they hardly depend
+on the shape.
 """
 
 from __future__ import annotations
@@ -21,26 +21,26 @@ from bemkit.operators.linear.solvers import (
     LinearSolverChoice,
     MatrixFree,
 )
-from bemkit.operators.steklov_poincare.needs import (
+from bemkit.operators.steklov_poincare.cost import (
     CONTACT_STEPS,
     BodyCase,
-    BodyNeeds,
+    BodyCost,
     PlanItem,
-    collocation_needs,
+    collocation_cost,
     seconds_of,
 )
 
 _DIRECT: LinearSolver = DenseCholesky()
 _FEWEST_ELEMENTS = 200
-"""Smallest number of leaves of a tree."""
+"""Smallest number of elements of compressed equations."""
 _MOST_LOOPS = 41
-"""An outer curve and 40 holes: each loop has an equation of its own that passes through the whole tree."""
+"""An outer curve and 40 holes: each closed curve adds an equation that passes through the whole tree."""
 _LEAST_COMPRESSIBILITY = 1e-8
-"""1/2 less Poisson's ratio: below, clusters of the tree, which are solved before these equations, lose the digits."""
+"""Smallest 1/2 - nu of a body with holes; below, the clusters of the tree are nearly singular."""
 _SHARE = 0.5
-"""Predicted share of the time of the dense equations below which they are compressed."""
+"""Largest predicted time, relative to that of dense equations, of compressed ones that are chosen automatically."""
 _FLOPS_OF_LARGE = 0.2
-"""Flops on small blocks that take as long as one flop of the factorisation of a large matrix."""
+"""Time of a flop in the factorisation of a large matrix relative to one on small blocks."""
 
 
 @dataclass(frozen=True)
@@ -50,13 +50,13 @@ class _Costs:
     Parameters
     ----------
     evaluations, compiled : float
-        In numpy, and compiled.
+        Evaluations of integrals in numpy, and their equivalent with compiled kernels.
     flops, of_step : float
-        Of the first factorisation, and of a contact step.
+        Flops of the first factorisation, and of a contact step.
     n_bytes, of_contact : float
-        Memory, and that of an element in contact besides, where both tractions and displacements are.
+        Memory, and additional memory of an element in contact.
     of_top : float
-        Memory besides for the largest clusters, whose ranks hardly depend on the number of elements.
+        Additional memory of the largest clusters, whose ranks hardly depend on the number of elements.
     """
 
     evaluations: float
@@ -70,16 +70,17 @@ class _Costs:
 
 _COLLOCATION = _Costs(14e3, 3e3, 0.4e6, 25e3, 8.6e3, 3.5e3, 9e6)
 _FLOPS_OF_STEP = 2e8
-"""Flops of a contact step on a mesh of any size, besides those that grow with the mesh."""
+"""Flops of a contact step that do not grow with the mesh."""
 _BYTES_OF_STATE, _FLOPS_OF_STATE = 40.0, 2e3
 """Costs of a stiffness for each pair of retained directions: tractions, displacements and the stiffness itself."""
 _DIGITS = 10.0
+"""Digits of the tolerance to which the costs belong."""
 LARGEST_BLOCK = 1000
-"""Order that the largest dense block of a tree hardly exceeds."""
+"""Typical order of the largest dense block of a tree."""
 
 
 def why_dense(case: BodyCase) -> str:
-    """Say why the equations of a body cannot be compressed; empty if they can."""
+    """Return why the equations of a body cannot be compressed; empty if they can."""
     mesh = case.mesh
     if mesh.n_elements < _FEWEST_ELEMENTS:
         return f"{mesh.n_elements} elements are few"
@@ -91,7 +92,7 @@ def why_dense(case: BodyCase) -> str:
 
 
 def _is_incompressible_with_holes(case: BodyCase) -> bool:
-    """Whether the pressure in each hole is all but free, which leaves a cluster with a hole nearly singular."""
+    """Whether the pressure in each hole is nearly undetermined, which makes clusters around holes nearly singular."""
     return len(case.mesh.loops) > 1 and case.material.effective_poisson_ratio > 0.5 - _LEAST_COMPRESSIBILITY
 
 
@@ -104,19 +105,20 @@ def choose_collocation_solver(
     ----------
     requested : LinearSolver, Hierarchical or Automatic
     case : BodyCase
-        Its linear solver is not used.
+        Its linear solver is ignored.
     memory : float [bytes]
-        Of the computer.
+        Memory of the computer.
     hindrance : str, optional
-        Why the equations cannot be compressed, before `why_dense`; empty if they can.
+        Further reason why the equations cannot be compressed.
 
     Returns
     -------
     ChosenLinearSolver
-        The compressed equations if they are asked for, or promise to be at least twice as fast, or nothing else fits.
+        Compressed equations if they are requested, predicted to be at least twice as fast, or the only ones that fit
+        into memory.
     """
     if isinstance(requested, MatrixFree):
-        from bemkit.operators.matrix_free.needs import why_stored
+        from bemkit.operators.matrix_free.cost import why_stored
 
         if not (stored := hindrance or why_stored(case)):
             return ChosenLinearSolver(_DIRECT, "asked for", requested)
@@ -126,19 +128,19 @@ def choose_collocation_solver(
         return ChosenLinearSolver(requested, "asked for")
     if hindrance := hindrance or why_dense(case):
         return ChosenLinearSolver(_DIRECT, f"the equations are not compressed, because {hindrance}")
-    dense = collocation_needs(case, takes_slopes=True)
+    dense = collocation_cost(case, takes_slopes=True)
     gain = _gain(requested, case, dense, memory)
     return gain if isinstance(gain, ChosenLinearSolver) else ChosenLinearSolver(_DIRECT, gain)
 
 
 def _gain(
-    requested: Automatic | Hierarchical, case: BodyCase, dense: BodyNeeds, memory: float
+    requested: Automatic | Hierarchical, case: BodyCase, dense: BodyCost, memory: float
 ) -> ChosenLinearSolver | str:
-    """Return the compressed equations if they are worth it, or say why they are not."""
+    """Return the compressed equations if they gain time or fit into memory, or else the reason against them."""
     if isinstance(requested, Hierarchical):
         return ChosenLinearSolver(_DIRECT, "asked for", requested)
     options = Hierarchical()
-    compressed = _needs(case, options)
+    compressed = _cost(case, options)
     of_dense = _FLOPS_OF_LARGE * (dense.flops + CONTACT_STEPS * 2.0 / 3.0 * case.n_retained**3)
     share = compressed.seconds / seconds_of(dense.evaluations, of_dense)
     if share < _SHARE:
@@ -149,8 +151,8 @@ def _gain(
     return f"compressed over a tree they would take {share:.2g} times as long"
 
 
-def hierarchical_needs(case: BodyCase, options: Hierarchical, *, takes_slopes: bool) -> BodyNeeds:
-    """Return the costs of the compressed equations, without counts, because ranks are not predicted."""
+def hierarchical_cost(case: BodyCase, options: Hierarchical, *, takes_slopes: bool) -> BodyCost:
+    """Return the costs of the compressed equations; counts depend on ranks and are not predicted."""
     slopes = "rotations then cause no tractions" if takes_slopes else "the method of the source paper"
     reason = f"compressed over a tree to {options.tolerance:g}: {case.linear_solver.reason}"
     items = (
@@ -159,14 +161,14 @@ def hierarchical_needs(case: BodyCase, options: Hierarchical, *, takes_slopes: b
         PlanItem("hypersingular operator W", False, "collocation takes only the displacement equation"),
         *_tree_items(case, options),
     )
-    return replace(_needs(case, options), items=items)
+    return replace(_cost(case, options), items=items)
 
 
 def _tree_items(case: BodyCase, options: Hierarchical) -> tuple[PlanItem, PlanItem, PlanItem]:
-    """Say how the tree is solved, which kernels are used, and what the others would cost."""
+    """Return the items of the linear solver and of the kernels, with the time of the other kernels."""
     is_compiled, why = compiled.expected(case.mesh.n_elements)
-    here, there = (_needs(case, options, is_compiled=each).seconds for each in (is_compiled, not is_compiled))
-    others = f"{'numpy' if is_compiled else 'compiled ones'} would take about {there:.3g} s instead of {here:.3g} s"
+    chosen, other = (_cost(case, options, is_compiled=choice).seconds for choice in (is_compiled, not is_compiled))
+    others = f"{'numpy' if is_compiled else 'compiled ones'} would take about {other:.3g} s instead of {chosen:.3g} s"
     return (
         PlanItem("linear solver of the body", True, "LU of the clusters of the tree; no matrix of the whole body"),
         PlanItem("compiled kernels (numba)", is_compiled, f"{why}; {others}"),
@@ -174,7 +176,7 @@ def _tree_items(case: BodyCase, options: Hierarchical) -> tuple[PlanItem, PlanIt
     )
 
 
-def _needs(case: BodyCase, options: Hierarchical, *, is_compiled: bool | None = None) -> BodyNeeds:
+def _cost(case: BodyCase, options: Hierarchical, *, is_compiled: bool | None = None) -> BodyCost:
     costs = _COLLOCATION
     n, digits = case.mesh.n_elements, -math.log10(options.tolerance) / _DIGITS
     n_both = int(np.count_nonzero(case.conditions.is_retained.any(axis=1)))
@@ -190,4 +192,4 @@ def _needs(case: BodyCase, options: Hierarchical, *, is_compiled: bool | None = 
         memory += int(_BYTES_OF_STATE * case.n_retained**2)
         flops += _FLOPS_OF_STATE * case.n_retained**2
     is_matrix_free = not case.is_condensed
-    return BodyNeeds(memory=memory, kept=memory, evaluations=evaluations, flops=flops, is_matrix_free=is_matrix_free)
+    return BodyCost(memory=memory, kept=memory, evaluations=evaluations, flops=flops, is_matrix_free=is_matrix_free)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from bemkit.operators.counts import Entries, Factorisation, FactorKind, OperationCounts
-from bemkit.operators.steklov_poincare.needs import CONTACT_STEPS, BodyCase, BodyNeeds, PlanItem
+from bemkit.operators.steklov_poincare.cost import CONTACT_STEPS, BodyCase, BodyCost, PlanItem
 
 _BYTES = 8
 _BYTES_OF_TREE = 10_000
@@ -16,7 +16,7 @@ _RESPONSES, _ITERATIONS, _FLOPS_OF_TRANSFORM = 20, 40, 500.0
 """About, of a rough surface: responses, iterations of each, and work on each node in an iteration."""
 
 
-def strip_needs(case: BodyCase, *, has_tree: bool) -> BodyNeeds:
+def strip_cost(case: BodyCase, *, has_tree: bool) -> BodyCost:
     """Return the costs of a half-plane, with its flexibility as a matrix or, where its motion is free, over a tree."""
     n, n_acting = case.mesh.n_elements, case.n_retained + case.n_fixed
     items = (
@@ -27,7 +27,7 @@ def strip_needs(case: BodyCase, *, has_tree: bool) -> BodyNeeds:
     )
     square, matrix = _BYTES * n_acting * n_acting, _BYTES * n * n
     if case.is_condensed:  # both components of the whole strip, and the inverse
-        return BodyNeeds(
+        return BodyCost(
             items=items,
             work=half_plane_work(n, n_acting),
             memory=32 * matrix,
@@ -38,7 +38,7 @@ def strip_needs(case: BodyCase, *, has_tree: bool) -> BodyNeeds:
     if has_tree and not case.n_fixed:
         leaves = PlanItem("tree of clusters", True, f"{n} elements are many: one factor over them")
         kept = _BYTES_OF_TREE * n
-        return BodyNeeds(
+        return BodyCost(
             items=(*items, leaves),
             memory=kept,
             kept=kept,
@@ -48,7 +48,7 @@ def strip_needs(case: BodyCase, *, has_tree: bool) -> BodyNeeds:
     kept = matrix + 3 * square  # the equations of closed nodes, at most all, and their factor
     flops = CONTACT_STEPS * 2.0 / 3.0 * float(n_acting) ** 3
     memory = max(4 * matrix, kept)
-    return BodyNeeds(
+    return BodyCost(
         items=items,
         work=half_plane_work(n),
         memory=memory,
@@ -59,7 +59,7 @@ def strip_needs(case: BodyCase, *, has_tree: bool) -> BodyNeeds:
     )
 
 
-def periodic_needs(case: BodyCase) -> BodyNeeds:
+def periodic_cost(case: BodyCase) -> BodyCost:
     """Return the costs of a periodic half-plane."""
     n = case.mesh.n_elements
     items = (
@@ -72,7 +72,7 @@ def periodic_needs(case: BodyCase) -> BodyNeeds:
     )
     kept = _BYTES * _BASIS * case.n_retained
     flops = _RESPONSES * _ITERATIONS * n * (_FLOPS_OF_TRANSFORM + 4.0 * _ITERATIONS)
-    return BodyNeeds(items=items, memory=kept, kept=kept, flops=flops, is_matrix_free=True)
+    return BodyCost(items=items, memory=kept, kept=kept, flops=flops, is_matrix_free=True)
 
 
 def half_plane_work(n_elements: int, n_acting: int = 0) -> OperationCounts:
