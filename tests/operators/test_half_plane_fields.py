@@ -6,12 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from mpmath import polylog
 from scipy.optimize import minimize_scalar
 
 import bemkit as bk
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.surface import Surface
-from bemkit.operators.half_plane.fields import HalfPlaneFields
+from bemkit.operators.half_plane.fields import HalfPlaneFields, dilogarithm
 from bemkit.operators.half_plane.maps import half_plane_map
 from bemkit.operators.material import Material, Plane
 from bemkit.operators.somigliana.locate import PointNotInsideError
@@ -101,6 +102,14 @@ def test_a_periodic_surface_is_a_row_of_strips() -> None:
     # tractions without resultant: images decay like the square of the distance
     np.testing.assert_allclose(periodic.stress(x), images, atol=1e-4)
     np.testing.assert_allclose(periodic.displacement(x + np.array([3.0, 0.0])), periodic.displacement(x), atol=1e-12)
+
+
+def test_the_dilogarithm_is_exact_up_to_the_unit_circle() -> None:
+    """Both branches of its series, and its branch point; the tolerance is round-off of values up to pi^2 / 6."""
+    radii = np.concatenate([np.linspace(0.0, 1.0, 12)[1:], 1.0 - np.logspace(-12, -3, 5)])
+    z = np.concatenate([np.outer(radii, np.exp(1j * np.linspace(0.1, 6.2, 9))).ravel(), [1.0 - 1e-9 + 1e-9j, 0.5 + 0j]])
+    exact = [complex(polylog(2, complex(each))) for each in z]
+    assert dilogarithm(z, np.log1p(-z)) == pytest.approx(np.array(exact), abs=2e-15)
 
 
 def test_the_fields_of_a_solved_scene_join_its_surface() -> None:
