@@ -14,7 +14,7 @@ from bemkit.geometry.spaces import BoundarySpace, dof_points
 from bemkit.operators.rigid_modes import without_motion
 from bemkit.operators.steklov_poincare import SteklovPoincare
 from bemkit.scene.body_scene import BodyScene
-from bemkit.scene.conditions import Free, Load, RigidConnection
+from bemkit.scene.conditions import DistributedLoad, Free
 
 _MORE_POINTS = 4
 """Gauss points of an element at which given loads are evaluated, beyond the degree of the tractions."""
@@ -52,7 +52,7 @@ def insert_loads(
     is_free = np.ones(mesh.n_elements, bool)
     for part, elements in scene.parts_on(mesh):
         is_free[elements] = isinstance(part.condition, Free) and part.name not in touching
-        if isinstance(part.condition, Load) and not isinstance(part.condition, RigidConnection):
+        if isinstance(part.condition, DistributedLoad):
             points, normals = mesh.points(elements, xi), mesh.normals_at(elements, xi)
             values = part.condition.at(points.reshape(-1, 2), normals.reshape(-1, 2)).reshape(points.shape)
             traction[elements] = np.einsum("lq,eqc->elc", projection, values)

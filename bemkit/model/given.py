@@ -33,7 +33,16 @@ from bemkit.operators.steklov_poincare.nodal_conditions import (
     supported,
 )
 from bemkit.scene.body_scene import BodyScene
-from bemkit.scene.conditions import Clamped, Force, Load, Part, PrescribedDisplacement, RigidConnection, Roller
+from bemkit.scene.conditions import (
+    Clamped,
+    DistributedLoad,
+    Force,
+    Load,
+    Part,
+    PrescribedDisplacement,
+    RigidConnection,
+    Roller,
+)
 
 if TYPE_CHECKING:
     from bemkit.operators.half_plane.far_drive import FarMotion
@@ -68,7 +77,7 @@ def _connected(scene: BodyScene, mesh: BoundaryMesh, space: BoundarySpace) -> tu
     connected = [(part.name, nodes) for part, nodes in parts if isinstance(part.condition, RigidConnection)]
     for name, nodes in connected:
         for part, others in parts:
-            may_share = isinstance(part.condition, Load) and not isinstance(part.condition, RigidConnection)
+            may_share = isinstance(part.condition, DistributedLoad)
             if part.name != name and not may_share and np.intersect1d(nodes, others).size:
                 raise InputError(
                     f"part {name!r} is rigid and meets part {part.name!r}: leave a piece of the boundary between them "

@@ -75,15 +75,19 @@ class PrescribedDisplacement:
 
 
 class Load:
-    """A condition that gives the traction."""
+    """A condition that gives forces: those of a traction."""
 
     def at(self, points: FloatArray, normals: FloatArray) -> FloatArray:
         """Return the traction at (n, 2) points [m] with unit normals as an (n, 2) array [Pa]."""
         raise NotImplementedError
 
 
+class DistributedLoad(Load):
+    """A load that acts at each point: the traction of the solution equals it."""
+
+
 @dataclass(frozen=True)
-class Traction(Load):
+class Traction(DistributedLoad):
     """A load per area in the directions x and y.
 
     Parameters
@@ -109,7 +113,7 @@ class Traction(Load):
 
 
 @dataclass(frozen=True)
-class Pressure(Load):
+class Pressure(DistributedLoad):
     """A load against the outward normal, and optionally along the boundary.
 
     Parameters
@@ -172,20 +176,31 @@ class Force:
             if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
                 raise InputError(f"{name} is {value!r}: give a finite number, the resultant on the whole part")
 
-    def over(self, area: float, middle: FloatArray, second_moment: float) -> Traction:
+    def over(self, area: float, middle: FloatArray, second_moment: float) -> Traction | RigidConnection:
         """Return the load on a part of an area [m^2], middle (2,) [m] and second moment of its area [m^4]."""
 
         def component(axis: int, x: FloatArray, y: FloatArray) -> FloatArray:
             turning = self.moment / second_moment * turned_left(np.column_stack([x, y]) - middle)
             return np.asarray((self.x, self.y)[axis] / area + turning[:, axis])
 
-        kind = RigidConnection if self.is_rigid else Traction
-        return kind(partial(component, 0), partial(component, 1))
+        traction = Traction(partial(component, 0), partial(component, 1))
+        return RigidConnection(traction) if self.is_rigid else traction
 
 
 @dataclass(frozen=True)
-class RigidConnection(Traction):
-    """The part moves as a rigid body, with the resultants of a traction: a placed `Force`."""
+class RigidConnection(Load):
+    """The part moves as a rigid body under the resultants of a traction: a placed `Force`.
+
+    Parameters
+    ----------
+    traction : Traction
+    """
+
+    traction: Traction
+
+    def at(self, points: FloatArray, normals: FloatArray) -> FloatArray:
+        """Return the traction that has the resultants, as `Traction.at`."""
+        return self.traction.at(points, normals)
 
 
 @dataclass(frozen=True)
@@ -292,4 +307,5 @@ class Part:
         points, length = placement.forward(points), float(lengths.sum())
         middle: FloatArray = lengths @ points / length
         second_moment = float(lengths @ np.sum((points - middle) ** 2, axis=1))
-        return replace(self, condition=self.condition.over(thickness * length, middle, thickness * second_moment))
+        placed = self.condition.over(thickness * length, middle, thickness * second_moment)
+        return replace(self, condition=cast(Condition, placed))  # no kind of scene files: a placed one

@@ -173,7 +173,7 @@ class HalfPlaneFields(PotentialFields):
 
 
 _Kernels = Callable[[ComplexArray, ComplexArray], tuple[ComplexArray, ComplexArray]]
-"""From ends t of elements and points z below them: log (t - z) or log sin pi (t - z), and its derivative or integral in z."""
+"""From ends t of elements and points z: log (t - z) or log sin pi (t - z), and its derivative or integral in z."""
 
 
 def _slope(ends: ComplexArray, z: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
@@ -205,7 +205,7 @@ def _wave(ends: ComplexArray, z: ComplexArray) -> ComplexArray:
 
 def _log_sine(arm: ComplexArray, log: ComplexArray) -> ComplexArray:
     """Return log sin(pi w) for w above the real axis from log(1 - exp(2 pi i w))."""
-    return -1j * np.pi * arm + _AT_DEPTH + log
+    return np.asarray(-1j * np.pi * arm + _AT_DEPTH + log)
 
 
 def dilogarithm(z: ComplexArray, log: ComplexArray) -> ComplexArray:

@@ -11,7 +11,7 @@ import numpy as np
 from bemkit.arrays import FloatArray, IntArray
 from bemkit.geometry.spaces import element_nodes
 from bemkit.operators.rigid_modes import rigid_motions
-from bemkit.scene.conditions import Clamped, Contact, Load, PrescribedDisplacement, RigidConnection, Roller
+from bemkit.scene.conditions import Clamped, Contact, DistributedLoad, PrescribedDisplacement, RigidConnection, Roller
 from bemkit.testing.independent_check.views import BodyView
 
 CONTACT_LIMIT = 1e-6
@@ -135,7 +135,7 @@ def _tractions(solution: BodyView, points: FloatArray, normals: FloatArray) -> F
     traction = np.zeros_like(points)
     for part in solution.scene.parts:
         elements = solution.mesh.part(part.name)
-        if isinstance(part.condition, Load) and not isinstance(part.condition, RigidConnection):
+        if isinstance(part.condition, DistributedLoad):
             load = part.condition.at(points[elements].reshape(-1, 2), normals[elements].reshape(-1, 2))
             traction[elements] = load.reshape(traction[elements].shape)
         elif not isinstance(part.condition, Contact):
