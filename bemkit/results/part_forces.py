@@ -176,7 +176,11 @@ def nodal_resultant(name: str, forces: FloatArray, acting_at: FloatArray) -> Par
 
 
 def contact_forces(
-    table: ContactTable, depth: float, resultants: Sequence[PartForce], transitions: Sequence[Transition]
+    table: ContactTable,
+    depth: float,
+    resultants: Sequence[PartForce],
+    lengths: Sequence[float],
+    transitions: Sequence[Transition],
 ) -> tuple[ContactForce, ...]:
     """Return the forces and sizes of each contact.
 
@@ -187,12 +191,14 @@ def contact_forces(
         Thickness that forces act on.
     resultants : sequence of PartForce
         Of each contact part of the table.
+    lengths : sequence of float [m]
+        Of the same parts; weights of a corner node may include a share of the next part.
     transitions : sequence of Transition
         Of the same table.
     """
     return tuple(
-        ContactForce(**(vars(resultant) | contact_sizes(table, depth, resultant.name, transitions)))
-        for resultant in resultants
+        ContactForce(**(vars(resultant) | contact_sizes(table, depth, resultant.name, length, transitions)))
+        for resultant, length in zip(resultants, lengths, strict=True)
     )
 
 
@@ -205,14 +211,16 @@ def forces_on_parts(on_sides: Iterable[tuple[tuple[str, str], PartForce]]) -> di
     return forces
 
 
-def contact_sizes(table: ContactTable, depth: float, part: str, transitions: Sequence[Transition]) -> dict[str, float]:
+def contact_sizes(
+    table: ContactTable, depth: float, part: str, length: float, transitions: Sequence[Transition]
+) -> dict[str, float]:
     """Return the entries of `ContactForce` besides the resultant."""
     nodes = table.rows(part)
     closed = nodes & (table.status != NodeStatus.SEPARATED)
     return {
         "force_normal": -depth * float(table.weight[nodes] @ table.sigma_n[nodes]),
         "force_tangential": depth * float(table.weight[nodes] @ table.sigma_t[nodes]),
-        "contact_length": _contact_length(table, part, transitions),
+        "contact_length": min(length, _contact_length(table, part, transitions)),
         "peak_pressure": float(np.max(-table.sigma_n[nodes], initial=0.0)),
         "largest_slip": float(np.abs(table.u_t[closed]).max(initial=0.0)),
     }

@@ -171,7 +171,10 @@ class SolvedScene:
 
     def part_length(self, contact: str) -> float:
         """Return the length of boundary that can touch in a contact [m]."""
-        return float(self.contact.weight[self.contact.rows(contact)].sum())
+        side, weights = self.contact_sides[contact][0], self.contact.weight[self.contact.rows(contact)]
+        mesh = self.bodies[side.body].mesh
+        # weights of a corner node may include a share of the next part
+        return float(min(weights.sum(), mesh.lengths[mesh.part(side.part)].sum()))
 
     @property
     def contact_traction_size(self) -> float:

@@ -61,6 +61,8 @@ def solution_of(
         for own in resultants
         for pair in zip(sides[own[0].name], own, strict=False)  # no side of a rigid body
     )
+    on_sides = [(prepared.bodies[rows.body].mesh, rows.part) for rows in prepared.rows]
+    lengths = [float(mesh.lengths[mesh.part(part)].sum()) for mesh, part in on_sides]
     transitions = find_transitions(table, table.u_t - model.problem.slip_origin * model.units.displacement)
     solution = Solution(
         scene=prepared.scene,
@@ -71,7 +73,7 @@ def solution_of(
         contact_sides=sides,
         contact_directions=prepared.frame[:, 0].copy(),
         friction_bound=bound_at(table, law),
-        contacts=contact_forces(table, depth, [own[0] for own in resultants], transitions),
+        contacts=contact_forces(table, depth, [own[0] for own in resultants], lengths, transitions),
         rigid={
             body.name: RigidResult(body.name, *(depth * reaction).tolist(), *moved.tolist())
             for body, (moved, reaction) in zip(prepared.scene.rigid, model.rigid_bodies(state), strict=True)

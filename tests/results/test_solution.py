@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+import bemkit as bk
 from bemkit.results.contact_table import ContactTable, find_transitions
 from bemkit.results.part_forces import contact_sizes
 from bemkit.results.solution import BoundaryFields, Solution
@@ -195,4 +196,24 @@ def test_each_run_of_nodes_with_partners_has_its_own_contact_length() -> None:
     rows = table([STICK] * 3 + [SEPARATED] * 3 + [SEPARATED, FORWARD], s=s, x=s)
     (end,) = find_transitions(rows)
     assert end.s == 21.0
-    assert contact_sizes(rows, 1.0, "a", (end,))["contact_length"] == pytest.approx(3.0 + 1.0, rel=1e-12)
+    assert contact_sizes(rows, 1.0, "a", 30.0, (end,))["contact_length"] == pytest.approx(3.0 + 1.0, rel=1e-12)
+
+
+def test_a_contact_beside_a_part_that_faces_nothing_is_no_longer_than_its_part() -> None:
+    """The weight of the corner node includes half an element of the other part."""
+    square = bk.Polygon(((0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)), ("floor", "right", "top", "left"))
+    scene = bk.Scene(
+        title="block in a corner",
+        shape=square,
+        material=bk.Material(1.0, 0.3),
+        parts=(
+            bk.Part("floor", bk.Contact(bk.RigidHalfPlane()), ("floor",)),
+            bk.Part("right", bk.Contact(bk.RigidHalfPlane((0.0, -9.0))), ("right",)),
+            bk.Part("load", bk.Traction(y=-1e-3), ("top",)),
+        ),
+        law=bk.Frictionless(),
+        mesh=bk.MeshOptions(elements=32),
+    )
+    solution = bk.run(scene)
+    assert solution.contacts[0].contact_length == pytest.approx(1.0, rel=1e-12)
+    assert solution.part_length("floor") == pytest.approx(1.0, rel=1e-12)
