@@ -34,6 +34,7 @@ def interruptible() -> Iterator[None]:
     is_main = threading.current_thread() is threading.main_thread()
     if not is_main or signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
         yield
+        raise_missed_interrupt()
         return
     signal.signal(signal.SIGINT, _Remembering())
     try:

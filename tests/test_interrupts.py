@@ -56,6 +56,20 @@ def test_one_that_is_swallowed_after_the_last_step_ends_it_too() -> None:
         swallow()
 
 
+@SWALLOWED
+def test_inside_another_statement_it_ends_the_inner_one() -> None:
+    went_on: list[bool] = []
+
+    def outer() -> None:
+        with interruptible():
+            swallow()
+        went_on.append(True)
+
+    with pytest.raises(KeyboardInterrupt), interruptible():
+        outer()
+    assert not went_on
+
+
 def test_others_raise_at_once() -> None:
     with interruptible():
         with pytest.raises(KeyboardInterrupt):

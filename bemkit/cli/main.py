@@ -19,6 +19,7 @@ import click
 from bemkit.cli.exit_codes import BAD_INPUT, INTERRUPTED, PIPE_CLOSED, TERMINATED, exit_code_of_error
 from bemkit.cli.streams import PipeClosedError, complain, guarded_streams
 from bemkit.errors import BemkitError, one_line
+from bemkit.interrupts import interruptible
 from bemkit.version import __version__
 
 _COMMANDS = {
@@ -61,7 +62,8 @@ def main(arguments: list[str] | None = None) -> None:
 def _run_to_end(arguments: list[str] | None) -> int:
     """Run the command line and return its exit code; the one place where errors end."""
     try:
-        code = commands.main(args=arguments, prog_name="bemkit", standalone_mode=False)
+        with interruptible():
+            code = commands.main(args=arguments, prog_name="bemkit", standalone_mode=False)
         sys.stdout.flush()
     except click.exceptions.NoArgsIsHelpError as error:
         print(error.format_message())

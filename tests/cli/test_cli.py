@@ -11,9 +11,12 @@ import re
 import signal
 import subprocess
 import sys
+import threading
 import time
 import types
+import weakref
 from pathlib import Path
+from typing import Any
 
 import click
 import pytest
@@ -392,6 +395,28 @@ def test_a_real_ctrl_c_ends_with_130() -> None:
     assert process.returncode == 130
     assert errors.strip() == "bemkit: error: interrupted"
     assert os.listdir() == []
+
+
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
+def test_ctrl_c_that_python_drops_while_a_command_loads_ends_it(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    load = commands.get_command
+
+    def swallowing(*arguments: Any) -> Any:
+        body = threading.Event()
+        reference = weakref.ref(body, lambda _: signal.raise_signal(signal.SIGINT))
+        del body
+        assert reference() is None
+        return load(*arguments)
+
+    monkeypatch.setattr(commands, "get_command", swallowing)
+    try:
+        assert call("cite", "paper-1") == 130
+    finally:
+        signal.signal(signal.SIGINT, before)
+    assert "bemkit: error: interrupted" in capsys.readouterr().err
 
 
 STAGES = {
