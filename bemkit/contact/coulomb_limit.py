@@ -16,7 +16,7 @@ from bemkit.contact.limit_load import WITHOUT_BOUND, largest_factor
 from bemkit.contact.solvability import with_violated_nodes
 from bemkit.errors import InputError
 
-_N_STEPS = 60
+MOST_PROGRAMMES = 60
 """Most linear programmes with given friction bounds; walls of 30 to 60 blocks take 10 to 50."""
 _SHARE = 0.6
 """Share of the last normal forces in the next ones: without the mean, states of equal factors alternate."""
@@ -67,7 +67,13 @@ _WITHOUT_LIMIT = CoulombLimit(np.inf, np.inf, np.inf, np.inf)
 
 
 def coulomb_limit(
-    motions: RigidMotions, constant: FloatArray, growing: FloatArray, cohesion: FloatArray, slope: FloatArray
+    motions: RigidMotions,
+    constant: FloatArray,
+    growing: FloatArray,
+    cohesion: FloatArray,
+    slope: FloatArray,
+    *,
+    most_programmes: int = MOST_PROGRAMMES,
 ) -> CoulombLimit | None:
     """Return load factors of collapse; the parameters are those of `bemkit.contact.limit_load.largest_factor`.
 
@@ -76,6 +82,8 @@ def coulomb_limit(
     motions : (n_motions, 2 n) array or sparse array
     constant, growing : (n_motions,) arrays [N]
     cohesion, slope : (n,) arrays [N], [-]
+    most_programmes : int
+        With given friction bounds.
 
     Returns
     -------
@@ -112,7 +120,7 @@ def coulomb_limit(
             cohesion[points] / scale,
             slope[points],
         )
-        return _limit(blocks)
+        return _limit(blocks, most_programmes)
 
     # sliding does not dilate: only points that the motion presses, or that hold without pressure, join
     found = with_violated_nodes(scaled, cohesion / scale, 0.0 * slope, programme)
@@ -143,7 +151,7 @@ class _Blocks:
         return sparse.csc_array(self.growing[:, None])
 
 
-def _limit(blocks: _Blocks) -> tuple[CoulombLimit, FloatArray | None]:
+def _limit(blocks: _Blocks, most_programmes: int) -> tuple[CoulombLimit, FloatArray | None]:
     """Return the factors, without dimension, and the velocities of the last collapse; nan and None if there is none."""
     none = CoulombLimit(np.nan, np.nan, np.nan, np.nan), None
     pressing = _pressing_forces_at_the_limit(blocks)
@@ -153,7 +161,7 @@ def _limit(blocks: _Blocks) -> tuple[CoulombLimit, FloatArray | None]:
         least = _pressing_forces_near(blocks, 0.0, np.zeros(pressing.size))
         pressing = pressing if least is None else least
     factor, smallest, velocities, n_steady = np.nan, np.inf, None, 0
-    for _ in range(_N_STEPS):
+    for _ in range(most_programmes):
         found = _largest_with_bound(blocks, blocks.bound(pressing))
         if found is None:
             break

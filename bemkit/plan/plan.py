@@ -200,11 +200,19 @@ def check_memory(plan: Plan) -> None:
     _check(plan.sizes.n_elements, plan.memory, plan.is_compressed)
 
 
-def check_elements(scene: Scene) -> None:
+def check_elements(scene: Scene, *, few: int = _FEW, many: int = _MANY) -> None:
     """Refuse a number of elements whose matrices cannot fit into this computer, before the mesh is made.
 
     Memory grows with the square of that number, or linearly where the equations are compressed: the plans for small
     meshes predict the cost of a large one. Half-planes of many elements have no matrices.
+
+    Parameters
+    ----------
+    scene : Scene
+    few : int
+        Elements of the mesh from whose plan larger ones are extrapolated, but no fewer than its sides need.
+    many : int
+        Elements that are divided and planned in a moment, whether they fit or not.
 
     Raises
     ------
@@ -214,8 +222,8 @@ def check_elements(scene: Scene) -> None:
     if len(scene.placed_bodies) > 1:
         return
     n_elements, outline = scene.only.mesh.elements, scene.only.shape.outline()
-    few = max(_FEW, few_on(outline))
-    if n_elements is None or n_elements <= max(_MANY, few) or outline.surface is not None:
+    few = max(few, few_on(outline))
+    if n_elements is None or n_elements <= max(many, few) or outline.surface is not None:
         return
     plan, growth = _plan_of(scene, few), n_elements / few
     if plan.is_compressed:  # on meshes where what does not grow is all there

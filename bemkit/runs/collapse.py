@@ -8,7 +8,7 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from bemkit.arrays import FloatArray
-from bemkit.contact.coulomb_limit import CoulombLimit, coulomb_limit
+from bemkit.contact.coulomb_limit import MOST_PROGRAMMES, CoulombLimit, coulomb_limit
 from bemkit.contact.limit_load import largest_factor, least_force
 from bemkit.errors import InputError
 from bemkit.formulas import choices
@@ -68,7 +68,7 @@ def largest_load_factor(scene: Scene, *, meshes: Meshes = None) -> float:
     return factor
 
 
-def coulomb_load_factor(scene: Scene, *, meshes: Meshes = None) -> CoulombLimit:
+def coulomb_load_factor(scene: Scene, *, meshes: Meshes = None, most_programmes: int = MOST_PROGRAMMES) -> CoulombLimit:
     """Return load factors at which a scene with Coulomb friction, which does not dilate, collapses.
 
     Parameters
@@ -76,6 +76,8 @@ def coulomb_load_factor(scene: Scene, *, meshes: Meshes = None) -> CoulombLimit:
     scene : Scene
     meshes : mapping of str to BoundaryMesh, optional
         Both as for `largest_load_factor`.
+    most_programmes : int
+        Linear programmes after which the search for a state of collapse ends.
 
     Returns
     -------
@@ -90,7 +92,9 @@ def coulomb_load_factor(scene: Scene, *, meshes: Meshes = None) -> CoulombLimit:
         If friction has a cap, or no state of collapse was found.
     """
     case = _limit_analysis(scene, meshes)
-    found = coulomb_limit(case.motions, case.constant, case.growing, *case.only_friction)
+    found = coulomb_limit(
+        case.motions, case.constant, case.growing, *case.only_friction, most_programmes=most_programmes
+    )
     if found is None:
         raise UnsolvableSceneError(_UNSOLVABLE)
     return found

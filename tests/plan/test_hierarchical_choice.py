@@ -16,7 +16,7 @@ from bemkit.model.prepared import prepare
 from bemkit.operators.linear.solvers import ChosenLinearSolver, DenseCholesky
 from bemkit.operators.steklov_poincare.galerkin import GalerkinElasticity
 from bemkit.plan import check_elements
-from bemkit.plan import plan as plan_module
+from bemkit.results.solved_steps import with_times
 from bemkit.runs.nested import run_nested
 from tests.scenes import Perforated, paper, squeezed
 
@@ -132,28 +132,23 @@ def test_tolerances_out_of_range_are_refused(tolerance: float) -> None:
         bk.Hierarchical(tolerance)
 
 
-def test_large_compressed_scenes_begin_on_coarser_meshes(monkeypatch: pytest.MonkeyPatch) -> None:
-    assert run._cascade(scene_of(16384)) == (1024, 16)
-    assert not run._cascade(scene_of(16000))
-    assert not run._cascade(scene_of(20000, linear_solver=DenseCholesky()))
-    assert not run._cascade(scene_of(20000, load_factors=(0.5, 1.0)))
-    monkeypatch.setattr(run, "_LARGE", 1000)
-    monkeypatch.setattr(run, "_COARSEST", 60)
-    scene = scene_of(1000, linear_solver=bk.Hierarchical())
-    records, meshes = [], []
+def test_large_compressed_scenes_begin_on_coarser_meshes() -> None:
+    assert run.cascade_of(scene_of(16384)) == (1024, 16)
+    assert not run.cascade_of(scene_of(16000))
+    assert not run.cascade_of(scene_of(20000, linear_solver=DenseCholesky()))
+    assert not run.cascade_of(scene_of(20000, load_factors=(0.5, 1.0)))
 
-    def kept(*arguments: object, **options: object) -> tuple[bk.Solution, ...]:
-        meshes.extend(run_nested(*arguments, **options))  # type: ignore[arg-type]
-        return tuple(meshes)
 
-    monkeypatch.setattr("bemkit.runs.nested.run_nested", kept)
-    solution = bk.run(scene, callback=records.append)
-    assert solution.mesh.n_elements == 1000
-    assert solution.is_converged
-    assert solution.outer_steps <= 4 < len(records) - solution.outer_steps
+def test_each_mesh_of_a_cascade_starts_from_the_one_before() -> None:
+    scene, records = scene_of(1000, linear_solver=bk.Hierarchical()), []
+    meshes = run_nested(scene, coarsest=60, ratio=16, callback=records.append)
+    assert [mesh.mesh.n_elements for mesh in meshes] == [62, 1000]
+    assert all(mesh.is_converged for mesh in meshes)
+    assert meshes[-1].outer_steps <= 4 < len(records) - meshes[-1].outer_steps
     # times are those of all meshes
-    assert solution.timings["total"] == pytest.approx(sum(mesh.timings["total"] for mesh in meshes))
-    assert solution.timings["total"] > meshes[-1].timings["total"]
+    total = with_times(meshes[-1], meshes).timings["total"]
+    assert total == pytest.approx(sum(mesh.timings["total"] for mesh in meshes))
+    assert total > meshes[-1].timings["total"]
 
 
 def test_a_ratio_of_meshes_below_two_is_refused() -> None:
@@ -161,19 +156,16 @@ def test_a_ratio_of_meshes_below_two_is_refused() -> None:
         run_nested(scene_of(400), ratio=1)
 
 
-def test_a_body_of_many_sides_takes_no_mesh_that_is_too_coarse_for_it(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_body_of_many_sides_takes_no_mesh_that_is_too_coarse_for_it() -> None:
     """A plate with 40 holes in place of one with 1000, whose 2004 sides are more than 20000 elements divided by 16."""
     parts = (
         bk.Part("floor", bk.Contact(bk.RigidHalfPlane((0.0, -1.0), (0.0, 1.0))), sides=("bottom",)),
         bk.Part("press", bk.Pressure(0.1), sides=("top",)),
     )
     scene = scene_of(900, shape=Perforated(8, 5), parts=parts, linear_solver=bk.Hierarchical())
-    for module, name, value in ((run, "_COARSEST", 40), (run, "_LARGE", 50), (plan_module, "_FEW", 50)):
-        monkeypatch.setattr(module, name, value)
-    monkeypatch.setattr(plan_module, "_MANY", 100)
-    check_elements(scene)
-    assert not run._cascade(scene)
-    cascade = run._cascade(replace(scene, mesh=replace(scene.mesh, elements=6000)))
+    check_elements(scene, few=50, many=100)
+    assert not run.cascade_of(scene, coarsest=40, large=50)
+    cascade = run.cascade_of(replace(scene, mesh=replace(scene.mesh, elements=6000)), coarsest=40, large=50)
     assert cascade is not None
     assert cascade[1] == 16
 

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Callable
+from functools import partialmethod
 from typing import Any
 
 import numpy as np
@@ -92,38 +94,41 @@ def test_a_point_that_is_no_number_has_no_magnitude() -> None:
         check_magnitude(np.array([[0.0, np.nan], [1.0, 0.0]]), "curve")
 
 
-@pytest.mark.parametrize("is_contact", [True, False])
-def test_results_that_are_not_finite_are_never_converged(is_contact: bool, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Whatever overflows on the way back to physical units."""
+@pytest.fixture
+def with_fields(monkeypatch: pytest.MonkeyPatch) -> Callable[[Callable[..., Any]], None]:
+    """Return a function that lets another one make the fields of models, of theirs, the model and its state."""
     actual = Model.boundary_fields
+    return lambda other: monkeypatch.setattr(Model, "boundary_fields", partialmethod(other, actual))
 
-    def overflowing(*arguments: object) -> object:
-        return [(displacement, traction, np.inf) for displacement, traction, _ in actual(*arguments)]
 
-    monkeypatch.setattr(Model, "boundary_fields", overflowing)
+@pytest.mark.parametrize("is_contact", [True, False])
+def test_results_that_are_not_finite_are_never_converged(is_contact: bool, with_fields) -> None:
+    """Whatever overflows on the way back to physical units."""
+
+    def overflowing(model: Model, actual: Callable[..., Any], state: ContactState) -> Any:
+        return [(displacement, traction, np.inf) for displacement, traction, _ in actual(model, state)]
+
+    with_fields(overflowing)
     assert bk.run(block(is_contact=is_contact)).status is bk.Status.NOT_FINITE
 
 
-def test_states_that_are_not_finite_end_as_a_status_without_warnings_of_numpy(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_states_that_are_not_finite_end_as_a_status_without_warnings_of_numpy(with_fields) -> None:
     """As random scene 117 of seed 3002, a plate that nothing holds sideways, on its way to infinity."""
-    actual = Model.boundary_fields
 
-    def infinite(model: Model, state: ContactState) -> Any:
+    def infinite(model: Model, actual: Callable[..., Any], state: ContactState) -> Any:
         return actual(model, ContactState(np.full_like(state.displacement, np.inf), state.traction))
 
-    monkeypatch.setattr(Model, "boundary_fields", infinite)
+    with_fields(infinite)
     solution = bk.run(block())
     assert solution.status is bk.Status.NOT_FINITE
     assert np.isnan(solution.energy)
 
 
-def test_so_do_those_of_several_bodies(monkeypatch: pytest.MonkeyPatch) -> None:
-    actual = Model.boundary_fields
-
-    def infinite(model: Model, state: ContactState) -> Any:
+def test_so_do_those_of_several_bodies(with_fields) -> None:
+    def infinite(model: Model, actual: Callable[..., Any], state: ContactState) -> Any:
         return actual(model, ContactState(state.displacement, np.full_like(state.traction, np.inf)))
 
-    monkeypatch.setattr(Model, "boundary_fields", infinite)
+    with_fields(infinite)
     solution = bk.run(with_overrides(bk.load_scene("two-cylinders"), discretisation="hp", accuracy=0.05))
     assert solution.status is bk.Status.NOT_FINITE
     assert np.isnan(solution.energy)

@@ -4,19 +4,20 @@ from __future__ import annotations
 
 import dataclasses
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 import pytest
 
 import bemkit as bk
-import bemkit.runs.adaptive
+from bemkit.contact.body import ContactState
+from bemkit.contact.problem import ContactProblem
 from bemkit.geometry.meshing.partition import STEEPEST, better_partition
 from bemkit.reference import DiscBetweenPlates
 from bemkit.runs.adaptive import _best_last, _Refinement, run_adaptive
 from bemkit.runs.density import DensityMeshes
 from bemkit.runs.earlier_steps import EarlierSteps
 from bemkit.runs.mesh_sequence import Level
+from tests.failing_solver import Failing
 from tests.scenes import contact_error, disc, paper, reference_values, square, wavy
 from tests.slow import slow_except
 
@@ -169,40 +170,33 @@ def test_times_and_solves_are_those_of_all_meshes() -> None:
     assert [record.step for record in best.history] == list(range(len(best.history)))
 
 
-def test_a_finer_mesh_that_fails_leaves_the_result_of_the_coarser_one(monkeypatch: pytest.MonkeyPatch) -> None:
-    scene = paper(1, mesh=bk.MeshOptions(accuracy=1e-3))
+def paper_solved_by(solver: bk.ContactSolver, accuracy: float) -> bk.Scene:
+    return dataclasses.replace(paper(1, mesh=bk.MeshOptions(accuracy=accuracy)), solver=solver)
 
-    solved = _Refinement.solved
 
-    def failing(refinement: Any, level: Level, start: bk.Solution | None) -> bk.Solution:
-        solution = solved(refinement, level, start)
-        return solution if level.n_elements < 100 else dataclasses.replace(solution, status=bk.Status.STALLED)
-
-    monkeypatch.setattr(_Refinement, "solved", failing)
-    failed, best = run_adaptive(scene)
+def test_a_finer_mesh_that_fails_leaves_the_result_of_the_coarser_one() -> None:
+    solver = Failing(fails=lambda problem, start: problem.n_contact > 40)
+    failed, best = run_adaptive(paper_solved_by(solver, 1e-3))
     assert failed.status is bk.Status.STALLED
     assert best.status is bk.Status.ACCURACY_NOT_REACHED
     assert f"was not reached: the solve on {failed.mesh.n_elements} elements ended stalled (certificate" in best.message
     assert best.linear_solves > failed.linear_solves
 
 
-def test_a_start_that_leads_nowhere_is_left_for_a_cold_one(monkeypatch: pytest.MonkeyPatch) -> None:
-    def failing(scene: bk.Scene, mesh: bk.BoundaryMesh, start: bk.Solution | None, *_: Any) -> bk.Solution:
-        solution = bk.run(scene, mesh=mesh, start=start)
-        return solution if start is None else dataclasses.replace(solution, status=bk.Status.STALLED)
+def test_a_start_that_leads_nowhere_is_left_for_a_cold_one() -> None:
+    def is_warm(problem: ContactProblem, start: ContactState) -> bool:
+        return not np.array_equal(start.displacement, problem.sticking_state.displacement)
 
-    monkeypatch.setattr(bemkit.runs.adaptive, "run_on_mesh", failing)
-    assert run_adaptive(paper(1, mesh=bk.MeshOptions(accuracy=1e-2)))[-1].is_converged
+    assert run_adaptive(paper_solved_by(Failing(fails=is_warm), 1e-2))[-1].is_converged
 
 
-def test_a_finer_mesh_that_is_refused_loses_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
-    def refusing(scene: bk.Scene, mesh: bk.BoundaryMesh, start: bk.Solution | None, *_: Any) -> bk.Solution:
-        if start is not None:
+def test_a_finer_mesh_that_is_refused_loses_nothing() -> None:
+    def refuse(problem: ContactProblem, start: ContactState) -> bool:
+        if problem.n_contact > 40:
             raise bk.InputError("no memory left")
-        return bk.run(scene, mesh=mesh)
+        return False
 
-    monkeypatch.setattr(bemkit.runs.adaptive, "run_on_mesh", refusing)
-    (best,) = run_adaptive(paper(1, mesh=bk.MeshOptions(accuracy=1e-3)))
+    (best,) = run_adaptive(paper_solved_by(Failing(fails=refuse), 1e-3))
     assert best.status is bk.Status.ACCURACY_NOT_REACHED
     assert "elements cannot be solved (no memory left)" in best.message
 

@@ -43,6 +43,11 @@ class CongruentCouplings:
 
     _known: dict[Hashable, tuple[Placement, MortarCoupling]] = field(default_factory=dict)
 
+    @property
+    def n_coupled(self) -> int:
+        """Number of couplings that were computed."""
+        return len(self._known)
+
     def couple(self, non_mortar: PlacedSide, mortar: PlacedSide, without: IntArray, reach: float) -> MortarCoupling:
         """Return the coupling of two sides; see `bemkit.contact.mortar.coupling.couple`."""
         key = _key(non_mortar, mortar, without, reach)

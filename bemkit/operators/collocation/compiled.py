@@ -7,6 +7,7 @@ once for an installation, because numba keeps the result on disk; loading it tak
 from __future__ import annotations
 
 import importlib.util
+from collections.abc import Callable
 from functools import cache
 
 import numpy as np
@@ -40,20 +41,29 @@ def layer_for(n_elements: int) -> Layer:
 @cache
 def loaded() -> tuple[Layer, str]:
     """Return the compiled layer or, if there is none, that of numpy, and say in one line why."""
-    if not is_installed():
-        return straight_layer, _MISSING
-    try:
-        from bemkit.operators.collocation.compiled_layer import compiled_layer
+    return checked(_compiled_layer) if is_installed() else (straight_layer, _MISSING)
 
-        announce("load compiled kernels")
+
+def _compiled_layer() -> Layer:
+    from bemkit.operators.collocation.compiled_layer import compiled_layer
+
+    announce("load compiled kernels")
+    layer: Layer = compiled_layer
+    return layer
+
+
+def checked(load: Callable[[], Layer]) -> tuple[Layer, str]:
+    """Return the layer that a function loads, or that of numpy if it does not work, and say in one line why."""
+    try:
+        layer = load()
         x, start, end = np.array([0.5 + 1.0j]), np.array([0.0j]), np.array([1.0 + 0.0j])
         constants, one = Constants(1.0, 1.0, 0.3, 1.0), np.zeros(1, np.intp)
         for is_double in (False, True):
             unknown = Unknowns(one[None], np.ones((1, 1, 1 + is_double), complex), one)
-            values = compiled_layer(constants, is_double, x, np.array([-1]), (start, end), unknown)
+            values = layer(constants, is_double, x, np.array([-1]), (start, end), unknown)
             if not np.isfinite(values).all():
                 return straight_layer, "numba computes wrong numbers here: the kernels run in numpy"
     except Exception as error:  # a broken installation raises anything
         short = printable(f"{type(error).__name__}: {error}")[:120]
         return straight_layer, f"numba does not work here ({short}): the kernels run in numpy"
-    return compiled_layer, "numba is installed"
+    return layer, "numba is installed"

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import sys
-import types
 from collections.abc import Callable, Iterator
 
 import numpy as np
@@ -190,29 +188,30 @@ def test_without_numba_the_plan_says_what_to_install(without: Callable[..., None
     assert "takes longer" in compiled.expected(999)[1]
 
 
-@pytest.mark.usefixtures("unloaded")
 @pytest.mark.parametrize(("fault", "words"), [(RuntimeError("no\nLLVM"), "no LLVM"), (np.nan, "wrong numbers")])
-def test_a_broken_numba_is_replaced_by_numpy_and_named_in_one_line(
-    monkeypatch: pytest.MonkeyPatch, fault: float | Exception, words: str
-) -> None:
+def test_a_broken_numba_is_replaced_by_numpy_and_named_in_one_line(fault: float | Exception, words: str) -> None:
     def broken(*arguments: object) -> np.ndarray:
         if isinstance(fault, Exception):
             raise fault
         return np.array([fault])
 
-    module = types.ModuleType("compiled_layer")
-    module.compiled_layer = broken  # type: ignore[attr-defined]
-    name = "bemkit.operators.collocation.compiled_layer"
-    monkeypatch.setitem(sys.modules, name, module)
-    monkeypatch.setattr(sys.modules["bemkit.operators.collocation"], "compiled_layer", module, raising=False)
-    monkeypatch.setattr(compiled, "is_installed", lambda: True)
-    monkeypatch.setattr(compiled, "MANY_ELEMENTS", 0)
-    layer, why = compiled.loaded()
+    layer, why = compiled.checked(lambda: broken)
     assert layer is straight_layer
     assert words in why
     assert "\n" not in why
-    columns = collocation_equations(straight(Rectangle(1.0, 1.0), 8), MATERIAL, np.arange(8), takes_slopes=True)
-    assert np.isfinite(columns.block(np.arange(16), np.arange(32))).all()
+
+
+def test_a_numba_that_cannot_be_loaded_is_named() -> None:
+    def load() -> Layer:
+        raise ImportError("numba needs an older numpy")
+
+    layer, why = compiled.checked(load)
+    assert layer is straight_layer
+    assert "ImportError: numba needs an older numpy" in why
+
+
+def test_a_layer_that_works_is_kept() -> None:
+    assert compiled.checked(lambda: straight_layer) == (straight_layer, "numba is installed")
 
 
 @pytest.mark.usefixtures("backend")
