@@ -8,6 +8,7 @@ from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.shapes import ElasticHalfPlane
 from bemkit.geometry.surface import Surface
 from bemkit.operators.half_plane.elasticity import HalfPlaneElasticity
+from bemkit.operators.half_plane.equations import HalfPlaneEquations
 from bemkit.operators.half_plane.flexibility import mean_logarithms
 from bemkit.operators.half_plane.maps import half_plane_map
 from bemkit.operators.material import Material, Plane
@@ -121,3 +122,14 @@ def test_a_strip_has_open_ends_and_the_body_below() -> None:
 def _of(shape: ElasticHalfPlane) -> tuple[np.ndarray, np.ndarray]:
     curve = shape.outline().sides[0].curve
     return curve.point(np.array([0.0, 0.5, 1.0])), np.array([[0, 1], [1, 2]])
+
+
+def test_kept_logarithms_do_not_grow_with_the_sets_of_nodes_that_are_asked_for() -> None:
+    places = np.linspace(0.0, 1.0, 501)
+    equations = HalfPlaneEquations(places, MATERIAL, np.zeros((0, 500), complex))
+    everywhere = np.arange(500)
+    for first in range(500):
+        seen = equations.kept_logarithms(np.array([first, (first + 7) % 500]), everywhere)
+        assert sum(each.size for each in equations.kept.values()) <= 400 * 500  # logarithms for each element
+    np.testing.assert_array_equal(seen, equations.logarithms(np.array([499, 6]), everywhere))
+    assert equations.kept_logarithms(everywhere, np.array([499, 6])).base is not None  # the transposed one, kept

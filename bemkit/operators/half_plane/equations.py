@@ -18,6 +18,9 @@ from bemkit.operators.hierarchy.interpolative import Block, Interpolation, sketc
 from bemkit.operators.hierarchy.skeletons import Compression, LevelView, Skeleton
 from bemkit.operators.material import Material
 
+_MOST_KEPT = 400
+"""Logarithms for each element that are kept; leaves and siblings of one tree take 160."""
+
 
 @dataclass(frozen=True, eq=False)
 class HalfPlaneEquations:
@@ -31,7 +34,7 @@ class HalfPlaneEquations:
     motions : (n_motions, n) array
         The motions R that forces far away drive.
     kept : dict
-        Logarithms of leaves and siblings, which are needed again.
+        Logarithms of leaves, siblings and sampled nodes, which are needed again.
     """
 
     places: FloatArray
@@ -71,11 +74,14 @@ class HalfPlaneEquations:
         return logarithms_between(self.places, first, second).reshape(one.size, two.size)
 
     def kept_logarithms(self, one: IntArray, two: IntArray) -> FloatArray:
-        """Return the same, evaluated once."""
+        """Return the same, evaluated once unless many others came between; the oldest are dropped."""
         key, other = (one.tobytes(), two.tobytes()), (two.tobytes(), one.tobytes())
         if other in self.kept:
             return self.kept[other].T
         if key not in self.kept:
+            most = _MOST_KEPT * self.lengths.size
+            while self.kept and sum(each.size for each in self.kept.values()) + one.size * two.size > most:
+                del self.kept[next(iter(self.kept))]
             self.kept[key] = self.logarithms(one, two)
         return self.kept[key]
 
