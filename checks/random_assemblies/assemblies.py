@@ -17,7 +17,7 @@ from bemkit.solvers.base import ContactSolver
 from bemkit.solvers.fallbacks import Fallbacks
 from bemkit.solvers.fixed_point import FixedPoint
 from bemkit.solvers.ssn import SemismoothNewton
-from bemkit.studies.stability.similar_bodies import BodiesSimilarity
+from bemkit.studies.stability.similarity import Similarity
 from checks.random_assemblies import blocks, corners, round_bodies
 from checks.random_assemblies.members import Layout, Members
 from checks.random_scenes.draw import Draw, RandomCase
@@ -62,14 +62,14 @@ def random_assembly(seed: int, index: int) -> RandomCase:
     return RandomCase(seed, index, _history(draw, elsewhere) if sheared is None else (sheared,))
 
 
-def _similarity(draw: Draw) -> BodiesSimilarity:
+def _similarity(draw: Draw) -> Similarity:
     """Draw units, a direction and a place: mostly steel and millimetres to metres, sometimes far from the origin."""
     length = 1.0 if draw.chance(0.4) else draw.decades(-6.0, 6.0)
     stress = 1.0 if draw.chance(0.3) else draw.decades(-6.0, 12.0)
     turn = draw.one_of((0.0, 0.0, 0.0, 90.0, draw.between(-180.0, 180.0)))
     far = draw.one_of((0.0, 0.0, 0.0, 1.0, draw.decades(0.0, 5.0)))
     x, y = (length * far * draw.direction()).tolist()
-    return BodiesSimilarity(length, stress, turn, (x, y))
+    return Similarity(length, stress, stress, turn, (x, y))
 
 
 def _solver(draw: Draw) -> ContactSolver:

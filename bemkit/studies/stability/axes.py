@@ -33,8 +33,8 @@ from bemkit.scene.transform import AffineMap, transformed_scene, with_gap_offset
 from bemkit.solvers.alm import AugmentedLagrangian
 from bemkit.solvers.base import ContactSolver
 from bemkit.solvers.ssn import SemismoothNewton
-from bemkit.studies.stability.case import PRECISION, Case, Similarity, precision_elsewhere, with_friction
-from bemkit.studies.stability.similar_bodies import BodiesSimilarity
+from bemkit.studies.stability.case import PRECISION, Case, precision_elsewhere, with_friction
+from bemkit.studies.stability.similarity import Similarity
 
 
 @dataclass(frozen=True)
@@ -110,32 +110,26 @@ def changed(baseline: Solution, change: Callable[[Any], Any]) -> Scene:
     )
 
 
-def _similar_case(
-    baseline: Solution, value: float, similarity: Similarity | BodiesSimilarity, precision: float = PRECISION
-) -> Case:
+def _similar_case(baseline: Solution, value: float, similarity: Similarity, precision: float = PRECISION) -> Case:
     keeps_steps = not baseline.scene.bodies and precision == PRECISION
     scene = changed(baseline, similarity.apply)
     return Case(value, scene, similarity, precision=precision, deviation_limit=precision, keeps_steps=keeps_steps)
 
 
-def _similar(factor: str) -> Callable[[Solution, float], Case]:
-    """Return what makes a case in which one factor is the value."""
+def _similar(*factors: str) -> Callable[[Solution, float], Case]:
+    """Return what makes a case in which some factors are the value."""
 
     def make(baseline: Solution, value: float) -> Case:
-        number: dict[str, Any] = {factor: value}
-        return _similar_case(baseline, value, _kind_of(baseline)(**number))
+        numbers: dict[str, Any] = dict.fromkeys(factors, value)
+        return _similar_case(baseline, value, Similarity(**numbers))
 
     return make
-
-
-def _kind_of(baseline: Solution) -> type[Similarity | BodiesSimilarity]:
-    return BodiesSimilarity if baseline.scene.bodies else Similarity
 
 
 def _moved(baseline: Solution, value: float) -> Case:
     """Return the case as far from the origin as the value says, in diameters."""
     distance = value * max(body.mesh.diameter for body in baseline.bodies.values())
-    similarity = _kind_of(baseline)(shift=(0.8 * distance, -0.6 * distance))
+    similarity = Similarity(shift=(0.8 * distance, -0.6 * distance))
     return _similar_case(baseline, value, similarity, precision_elsewhere(baseline, distance))
 
 
@@ -300,7 +294,7 @@ def _of_one_body(reason: Callable[[Scene], str] = lambda scene: "") -> Callable[
     return lambda scene: "it is about one body" if scene.bodies else reason(scene)
 
 
-def _of_bodies(similarity: BodiesSimilarity, *, is_of_one: bool = False) -> Callable[[Scene], str]:
+def _of_bodies(similarity: Similarity, *, is_of_one: bool = False) -> Callable[[Scene], str]:
     """Return what gives a reason against a scene of bodies without a similar one, and against single bodies."""
 
     def reason(scene: Scene) -> str:
@@ -343,7 +337,7 @@ AXES: tuple[Axis, ...] = _read_axes(
         "youngs-modulus": (_similar("modulus"), _of_one_body()),
         "load": (_similar("stress"), _of_one_body()),
         "size": (_similar("length"), _always),
-        "position": (_moved, _of_bodies(BodiesSimilarity(shift=(1.0, 0.0)), is_of_one=True)),
+        "position": (_moved, _of_bodies(Similarity(shift=(1.0, 0.0)), is_of_one=True)),
         "degenerate-size": (
             _degenerate,
             _of_one_body(
@@ -366,9 +360,9 @@ AXES: tuple[Axis, ...] = _read_axes(
             _graded,
             _of_one_body(_of_half_planes("the elements of a periodic half-plane are equal", only_periodic=True)),
         ),
-        "stress": (_similar("stress"), _of_bodies(BodiesSimilarity())),
-        "turn": (_similar("turn"), _of_bodies(BodiesSimilarity(turn=30.0))),
-        "stiffness": (_stiffened, _of_bodies(BodiesSimilarity())),
+        "stress": (_similar("modulus", "stress"), _of_bodies(Similarity())),
+        "turn": (_similar("turn"), _of_bodies(Similarity(turn=30.0))),
+        "stiffness": (_stiffened, _of_bodies(Similarity())),
     }
 )
 """Every axis, in the order of the report; those that are not about a scene give a reason against it."""

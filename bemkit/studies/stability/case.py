@@ -1,9 +1,9 @@
-"""One case of a stability sweep, and the similarity that leads it back to the baseline."""
+"""One case of a stability sweep."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -13,8 +13,7 @@ from bemkit.geometry.neighbours import break_nodes
 from bemkit.results.solution import Solution
 from bemkit.scene.conditions import Contact, Part
 from bemkit.scene.scene import Scene
-from bemkit.scene.transform import AffineMap, transformed_scene
-from bemkit.studies.stability.similar_bodies import BodiesSimilarity
+from bemkit.studies.stability.similarity import Similarity
 
 PRECISION = 1e-9
 """Agreement, relative to the largest entry, that similar problems owe each other after scaling."""
@@ -49,36 +48,6 @@ def with_friction(scene: Scene, coefficient: float) -> Scene:
 
 
 @dataclass(frozen=True)
-class Similarity:
-    """The same problem in other units and elsewhere: every result follows from that of the original.
-
-    Parameters
-    ----------
-    length, modulus, stress : float
-        Factors of all lengths of the body, of Young's modulus, and of all loads.
-    shift : (float, float) [m]
-        Where the origin goes.
-    """
-
-    length: float = 1.0
-    modulus: float = 1.0
-    stress: float = 1.0
-    shift: tuple[float, float] = (0.0, 0.0)
-
-    @property
-    def displacement(self) -> float:
-        """Factor of displacements, and so of gaps and prescribed displacements."""
-        return self.stress / self.modulus * self.length
-
-    def apply(self, scene: Scene) -> Scene:
-        """Return the similar scene."""
-        affine = AffineMap((self.length, self.length), self.shift)
-        return transformed_scene(
-            scene, affine, stress=self.stress, displacement=self.displacement, modulus=self.modulus
-        )
-
-
-@dataclass(frozen=True)
 class Case:
     """One row to compute.
 
@@ -87,7 +56,7 @@ class Case:
     value : float
         Place on the axis.
     scene : Scene
-    similarity : Similarity or BodiesSimilarity
+    similarity : Similarity
         Factors that lead from the reference of the axis to this scene, by which results are scaled back.
     levels : int
         How often the elements at corners and ends of parts are halved, after the scene's own mesh is made.
@@ -103,7 +72,7 @@ class Case:
 
     value: float
     scene: Scene
-    similarity: Similarity | BodiesSimilarity = Similarity()
+    similarity: Similarity = field(default_factory=Similarity)
     levels: int = 0
     precision: float = PRECISION
     deviation_limit: float = float("inf")

@@ -18,15 +18,15 @@ from bemkit.runs.run import run
 from bemkit.scene.scene import Scene
 from bemkit.studies.engine import REFUSED, Attempt, Task, attempt, compute
 from bemkit.studies.stability.axes import Axis
-from bemkit.studies.stability.case import Case, Similarity
+from bemkit.studies.stability.case import Case
 from bemkit.studies.stability.records import StabilityRecord, Verdict
-from bemkit.studies.stability.similar_bodies import BodiesSimilarity
+from bemkit.studies.stability.similarity import Similarity
 from bemkit.testing.independent_check import violations_of
 from bemkit.testing.independent_check.verdict import Violations
 
 TWIN = Similarity(length=3.7e-3, modulus=7.3e5, stress=1.9e-2)
 """Every case is solved a second time in these units. No factor is a power of two, so all round-off differs."""
-TWIN_OF_BODIES = BodiesSimilarity(length=3.7e-3, stress=7.3e5)
+TWIN_OF_BODIES = Similarity(length=3.7e-3, modulus=7.3e5, stress=7.3e5)
 """The same for several bodies."""
 
 
@@ -85,7 +85,8 @@ def solve_and_judge(
 
     The deviation is measured against the reference, which is None if it has no solution itself.
     """
-    factors, copied_scene = _scaled_copy(case.scene)
+    factors = TWIN_OF_BODIES if case.scene.bodies else TWIN
+    copied_scene = factors.apply(case.scene)
     first, second = _attempt(case.scene, case, solve), _attempt(copied_scene, case, solve)
     solution = first.solution
     deviation = scaled_copy = math.nan
@@ -114,13 +115,6 @@ def solve_and_judge(
     )
 
 
-def _scaled_copy(scene: Scene) -> tuple[Similarity | BodiesSimilarity, Scene]:
-    """Return the similar scene, and how it is similar."""
-    if scene.bodies:
-        return TWIN_OF_BODIES, TWIN_OF_BODIES.apply(scene)
-    return TWIN, TWIN.apply(scene)
-
-
 def _checked(solution: Solution) -> Violations:
     n_steps = 0 if solution.loading is None else len(solution.loading.steps)
     return violations_of(solution, solution.at_step(n_steps - 1) if n_steps > 1 else None)
@@ -133,19 +127,13 @@ def _attempt(scene: Scene, case: Case, solve: Callable[..., Any] = run) -> Attem
     return attempt(lambda: solve(scene, mesh=case.mesh(scene)))
 
 
-def difference(
-    reference: Solution,
-    solution: Solution,
-    similarity: Similarity | BodiesSimilarity,
-    *,
-    in_mean: bool = False,
-) -> float:
+def difference(reference: Solution, solution: Solution, similarity: Similarity, *, in_mean: bool = False) -> float:
     """Return the largest difference of two contact tables after scaling the second back.
 
     Parameters
     ----------
     reference, solution : Solution
-    similarity : Similarity or BodiesSimilarity
+    similarity : Similarity
         Leads from the reference to the solution.
     in_mean : bool
         Take the mean along each contact part instead of the largest entry; always on other meshes, because single nodes

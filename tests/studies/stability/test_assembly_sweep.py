@@ -81,9 +81,10 @@ def test_curved_bodies_far_away_are_what_they_are_at_home():
 
 
 def test_a_copy_that_is_not_similar_is_seen(pin):
-    one, other = run(pin), run(dataclasses.replace(TWIN_OF_BODIES, stress=1.0).apply(pin))
+    softer = dataclasses.replace(TWIN_OF_BODIES, modulus=1.0, stress=1.0)
+    one, other = run(pin), run(softer.apply(pin))
     assert difference(one, other, TWIN_OF_BODIES) > 0.1
-    assert difference(one, other, dataclasses.replace(TWIN_OF_BODIES, stress=1.0)) < 1e-9
+    assert difference(one, other, softer) < 1e-9
 
 
 @pytest.fixture(scope="module")

@@ -11,7 +11,8 @@ import bemkit as bk
 from bemkit.geometry.meshing.discretise import discretise
 from bemkit.scene.transform import AffineMap, transformed_scene, with_gap_offset, with_turned_loads
 from bemkit.studies.stability.axes import degenerate_diameters
-from bemkit.studies.stability.case import Case, Similarity
+from bemkit.studies.stability.case import Case
+from bemkit.studies.stability.similarity import Similarity
 from bemkit.studies.stability.sweep import difference
 from tests.scenes import FLOOR, block, small_paper_scene
 

@@ -10,7 +10,7 @@ import pytest
 
 import bemkit as bk
 from bemkit.results.solution import Solution
-from bemkit.studies.stability.similar_bodies import BodiesSimilarity
+from bemkit.studies.stability.similarity import Similarity
 from tests.slow import slow_except
 
 FRICTION = 0.25
@@ -64,13 +64,13 @@ def plain() -> Solution:
 
 
 CHANGES = {
-    "millimetres, MPa": BodiesSimilarity(length=1e3, stress=1e-6),
-    "nanometres": BodiesSimilarity(length=1e-9),
-    "stresses 1e12": BodiesSimilarity(stress=1e12),
-    "shifted": BodiesSimilarity(shift=(3.0, -7.0)),
-    "turned by 90 degrees": BodiesSimilarity(turn=90.0),
-    "turned by 37 degrees": BodiesSimilarity(turn=37.0),
-    "everything": BodiesSimilarity(length=1e-3, stress=1e6, turn=-130.0, shift=(0.02, 0.001)),
+    "millimetres, MPa": Similarity(length=1e3, modulus=1e-6, stress=1e-6),
+    "nanometres": Similarity(length=1e-9),
+    "stresses 1e12": Similarity(modulus=1e12, stress=1e12),
+    "shifted": Similarity(shift=(3.0, -7.0)),
+    "turned by 90 degrees": Similarity(turn=90.0),
+    "turned by 37 degrees": Similarity(turn=37.0),
+    "everything": Similarity(length=1e-3, modulus=1e6, stress=1e6, turn=-130.0, shift=(0.02, 0.001)),
 }
 
 
@@ -170,3 +170,10 @@ def test_copies_are_bodies_that_are_listed() -> None:
     assert copied.linear_solves == listed.linear_solves
     np.testing.assert_allclose(copied.contact.sigma_n, listed.contact.sigma_n, atol=1e-13)
     assert copied.work.single_layer.computed < listed.work.single_layer.computed
+
+
+def test_bodies_that_cannot_be_similar_are_refused() -> None:
+    with pytest.raises(bk.InputError, match=r"modulus is 2\.0 and stress 1\.0: give equal factors for several bodies"):
+        Similarity(modulus=2.0).apply(assembly())
+    with pytest.raises(bk.InputError, match=r"turn is 90\.0: a scene is turned if it lists its bodies"):
+        Similarity(turn=90.0).apply(bk.load_scene("paper-1"))

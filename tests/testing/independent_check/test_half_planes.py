@@ -13,7 +13,7 @@ from bemkit.geometry.meshing.discretise import Geometric
 from bemkit.operators.half_plane.flexibility import mean_logarithms
 from bemkit.scene.transform import with_turned_loads
 from bemkit.studies.stability.axes import AXES, find_axes
-from bemkit.studies.stability.case import Similarity
+from bemkit.studies.stability.similarity import Similarity
 from bemkit.studies.stability.sweep import TWIN, StabilityError, difference, solve_and_judge, sweep
 from bemkit.testing.independent_check import IndependentCheck, violations_of_bodies, violations_of_body
 from bemkit.testing.independent_check.half_plane import Surface

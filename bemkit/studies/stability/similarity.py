@@ -23,36 +23,34 @@ from bemkit.scene.copies import CircleCopies, Copies, GridCopies, ListedCopies
 from bemkit.scene.load_history import with_changed_steps
 from bemkit.scene.plane_motion import RigidBody
 from bemkit.scene.scene import Scene
-from bemkit.scene.transform import AffineMap, TransformedRegion
+from bemkit.scene.transform import AffineMap, TransformedRegion, transformed_scene
 
 
 @dataclass(frozen=True)
-class BodiesSimilarity:
-    """The map x -> length * (turned x) + shift, with stresses and moduli times the same factor.
-
-    Scenes are changed number by number, so that the result can be written to a file (but for several load steps,
-    and parts chosen by a region, if the length changes): fields have to be numbers, and copies in a grid stay as they
-    are turned only by way of a list of places.
+class Similarity:
+    """The map x -> length * (turned x) + shift, with moduli and loads multiplied: every result follows from it.
 
     Parameters
     ----------
-    length, stress : float
-        Factors of all lengths, displacements among them, and of all stresses, moduli among them.
+    length, modulus, stress : float
+        Factors of all lengths of the bodies, of Young's moduli, and of all loads. Several bodies are similar only if
+        displacements are multiplied like lengths: modulus and stress have to be equal.
     turn : float [degree]
-        Anticlockwise, about the origin.
+        Anticlockwise, about the origin; several bodies only.
     shift : (float, float) [m]
         Where the origin goes.
     """
 
     length: float = 1.0
+    modulus: float = 1.0
     stress: float = 1.0
     turn: float = 0.0
     shift: tuple[float, float] = (0.0, 0.0)
 
     @property
     def displacement(self) -> float:
-        """Factor of displacements, and so of gaps."""
-        return self.length
+        """Factor of displacements, and so of gaps and prescribed displacements."""
+        return self.stress / self.modulus * self.length
 
     @property
     def _motion(self) -> Placement:
@@ -73,11 +71,26 @@ class BodiesSimilarity:
     def apply(self, scene: Scene) -> Scene:
         """Return the similar scene.
 
+        One body gets fields, regions and obstacles that are functions. Scenes of several bodies are changed number by
+        number, so that the result can be written to a file (but for several load steps, and parts chosen by a region,
+        if the length changes): their fields have to be numbers, and copies in a grid stay as they are turned only by
+        way of a list of places.
+
         Raises
         ------
         InputError
             If something of it has no similar one; the message names it.
         """
+        if not scene.bodies:
+            if self.turn != 0.0:
+                raise InputError(f"turn is {self.turn}: a scene is turned if it lists its bodies")
+            affine, factor = replace(self._scaling, shift=self.shift), self.displacement
+            return transformed_scene(scene, affine, stress=self.stress, displacement=factor, modulus=self.modulus)
+        if self.modulus != self.stress:
+            raise InputError(
+                f"modulus is {self.modulus} and stress {self.stress}: give equal factors for several bodies, whose "
+                "distances change like displacements"
+            )
         if scene.symmetry is not None and not (self.turn == 0.0 and self.shift == (0.0, 0.0)):
             raise InputError("the scene has a symmetry, so its bodies cannot be moved: remove the symmetry")
         return with_changed_steps(scene, self._applied)
