@@ -45,7 +45,7 @@ from bemkit.scene.conditions import (
 )
 
 if TYPE_CHECKING:
-    from bemkit.operators.half_plane.far_drive import FarMotion
+    from bemkit.operators.half_plane.far_motion import FarMotion
     from bemkit.operators.steklov_poincare.forces_inside import ForcesInside
 
 
@@ -131,30 +131,30 @@ def dimensionless_load(load: Load, units: Units) -> TractionField:
     return field
 
 
-def far_drive(scene: BodyScene, units: Units) -> FarMotion | None:
+def far_motion_of(scene: BodyScene, units: Units) -> FarMotion | None:
     """Return how a half-plane moves far away, in the units given; None if it is at rest there, or ends somewhere."""
     far = scene.far
     if far is None:
         return None
-    from bemkit.operators.half_plane.far_drive import FarMotion
+    from bemkit.operators.half_plane.far_motion import FarMotion
 
     motion = far.motion / (units.displacement, units.displacement, units.displacement / units.length)
     load = far.load / (units.stress * units.length * np.array([1.0, 1.0, units.length]))
     centre = ((np.array(far.centre) - units.centre) / units.length).tolist()
-    driven = tuple(np.flatnonzero(far.is_load_controlled).tolist())
+    load_controlled = tuple(np.flatnonzero(far.is_load_controlled).tolist())
     strain = far.strain * units.length / units.displacement
     (x, y, turn), (force_x, force_y, moment) = motion.tolist(), load.tolist()
-    return FarMotion(driven, (x, y, turn), (force_x, force_y, moment), (centre[0], centre[1]), strain)
+    return FarMotion(load_controlled, (x, y, turn), (force_x, force_y, moment), (centre[0], centre[1]), strain)
 
 
-def driven_by(elastic: SteklovPoincare, drive: FarMotion | None) -> SteklovPoincare:
+def with_far_motion(elastic: SteklovPoincare, far_motion: FarMotion | None) -> SteklovPoincare:
     """Return a half-plane that moves otherwise far away, by None not at all; any other body as it is."""
     if elastic.traction_space.mesh.surface is None:
         return elastic
-    from bemkit.operators.half_plane.far_drive import FarMotion
+    from bemkit.operators.half_plane.far_motion import FarMotion
     from bemkit.operators.half_plane.surface import SurfaceElasticity
 
-    return elastic.driven_by(drive or FarMotion()) if isinstance(elastic, SurfaceElasticity) else elastic
+    return elastic.with_far_motion(far_motion or FarMotion()) if isinstance(elastic, SurfaceElasticity) else elastic
 
 
 def loaded_map(elastic: SteklovPoincare, inside: ForcesInside | None) -> SteklovPoincare:

@@ -83,7 +83,7 @@ def _condensed_under(
     condensed: CondensedMap, elastic: SteklovPoincare, before: PreparedBody, body: PreparedBody
 ) -> CondensedMap:
     """Return a condensed map under the loads and the motion far away of a body in another step."""
-    if before.drive == body.drive:
+    if before.far_motion == body.far_motion:
         return loaded_alone(condensed, body)
     again = elastic.condense(body.conditions, body.force)  # its stiffness is the same
     return replace(again, stiffness=condensed.stiffness)
@@ -97,7 +97,7 @@ def loaded_alone(condensed: CondensedMap, body: PreparedBody) -> CondensedMap:
 def _is_loaded_alike(one: PreparedBody, two: PreparedBody) -> bool:
     """Whether loads, body forces, prescribed displacements and motions far away are the same objects in two steps."""
     data, other = ((body.force, body.inside, body.conditions.displacement) for body in (one, two))
-    return one.drive == two.drive and all(a is b for a, b in zip(data, other, strict=True))
+    return one.far_motion == two.far_motion and all(a is b for a, b in zip(data, other, strict=True))
 
 
 def _motions(body: PreparedBody) -> FloatArray:

@@ -18,7 +18,7 @@ from bemkit.contact.body import ContactState
 from bemkit.contact.problem import ContactProblem
 from bemkit.errors import InputError
 from bemkit.model.fields import elastic_energy, insert_loads
-from bemkit.model.given import driven_by, loaded_map, without_body_forces
+from bemkit.model.given import loaded_map, with_far_motion, without_body_forces
 from bemkit.model.placed import groups, shape_numbers
 from bemkit.model.prepared import Prepared, PreparedBody
 from bemkit.model.single_body import SingleBody, is_direct, is_single, single_body
@@ -100,7 +100,7 @@ class Model:
 
     def _single_under(self, prepared: Prepared, elastic: SteklovPoincare) -> SingleBody:
         before, body = self.prepared, prepared.only
-        if body.drive == before.only.drive and before.is_coupled_like(prepared):
+        if body.far_motion == before.only.far_motion and before.is_coupled_like(prepared):
             return self._single_body.under(body.force, body.conditions.displacement, body.inside)
         return single_body(prepared, elastic)
 
@@ -138,14 +138,14 @@ class Model:
         displacement = blended(one.conditions.displacement, two.conditions.displacement, share)
         force = blended(one.force, two.force, share)
         inside = two.inside if one.inside is None or two.inside is None else one.inside.blended(two.inside, share)
-        if one.drive == two.drive:
+        if one.far_motion == two.far_motion:
             return self._single_body.under(force, displacement, inside)
-        from bemkit.operators.half_plane.far_drive import FarMotion
+        from bemkit.operators.half_plane.far_motion import FarMotion
 
-        drive = (one.drive or FarMotion()).blended(two.drive or FarMotion(), share)
+        far_motion = (one.far_motion or FarMotion()).blended(two.far_motion or FarMotion(), share)
         conditions = replace(two.conditions, displacement=displacement)
-        body = replace(two, drive=drive, conditions=conditions, force=force)
-        return single_body(replace(self.prepared, bodies=(body,)), driven_by(self.elastic[0], drive))
+        body = replace(two, far_motion=far_motion, conditions=conditions, force=force)
+        return single_body(replace(self.prepared, bodies=(body,)), with_far_motion(self.elastic[0], far_motion))
 
     def acting(self, state: ContactState) -> tuple[FloatArray, FloatArray]:
         """Return the forces of loads and supports on all bodies, and the displacements on which they work.
@@ -337,7 +337,9 @@ def _maps_under(prepared: Prepared, model: Model) -> tuple[SteklovPoincare, ...]
     loaded = zip(model.elastic, model.prepared.bodies, strict=True)
     maps = [without_body_forces(map_, body.inside) for map_, body in loaded]
     pairs = zip(maps, model.prepared.bodies, prepared.bodies, strict=True)
-    moved = [map_ if one.drive == two.drive else driven_by(map_, two.drive) for map_, one, two in pairs]
+    moved = [
+        map_ if one.far_motion == two.far_motion else with_far_motion(map_, two.far_motion) for map_, one, two in pairs
+    ]
     return _loaded(moved, prepared.bodies)
 
 

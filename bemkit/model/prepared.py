@@ -20,12 +20,12 @@ from bemkit.geometry.spaces import dof_points
 from bemkit.model.contact_data import ContactData
 from bemkit.model.contacts import ContactRows, candidates_of, law_of_rows, obstacle_rows, retained_for
 from bemkit.model.given import (
-    driven_by,
-    far_drive,
+    far_motion_of,
     given_data,
     held_nodes,
     linear_solver_of,
     nodal_forces,
+    with_far_motion,
 )
 from bemkit.model.placed import Meshes, PlacedBody, place
 from bemkit.model.same_bodies import bodies_under, check_step, find_units, listed_contacts, with_found_contacts
@@ -49,7 +49,7 @@ from bemkit.scene.mesh_options import thinness_warnings
 from bemkit.scene.scene import Scene
 
 if TYPE_CHECKING:
-    from bemkit.operators.half_plane.far_drive import FarMotion
+    from bemkit.operators.half_plane.far_motion import FarMotion
     from bemkit.operators.steklov_poincare.forces_inside import ForcesInside
 
 
@@ -65,7 +65,7 @@ class PreparedBody(PlacedBody):
         Given nodal forces.
     inside : ForcesInside or None
         Body forces; None without any.
-    drive : FarMotion or None
+    far_motion : FarMotion or None
         How a half-plane moves far away; None at rest.
     candidates : ContactData
         The nodes that may touch an obstacle or a rigid body, held by supports or not.
@@ -74,7 +74,7 @@ class PreparedBody(PlacedBody):
     conditions: NodalConditions
     force: FloatArray
     inside: ForcesInside | None
-    drive: FarMotion | None
+    far_motion: FarMotion | None
     candidates: ContactData
 
     @property
@@ -160,7 +160,7 @@ class Prepared:
     def elastic_map(self, body: PreparedBody) -> SteklovPoincare:
         """Return the map of a body without forces inside, by its linear solver; nothing is assembled yet."""
         chosen = self.linear_solver(body)
-        elastic = driven_by(self._map_of(body, chosen.solver), body.drive)
+        elastic = with_far_motion(self._map_of(body, chosen.solver), body.far_motion)
         if body.conditions.connected:
             return RigidlyConnected.of(elastic, body.scene.discretisation.method)
         if chosen.hierarchical is None:
@@ -264,7 +264,7 @@ class Prepared:
                 conditions=replace(body.conditions, displacement=loaded.conditions.displacement),
                 force=loaded.force,
                 inside=loaded.inside,
-                drive=loaded.drive,
+                far_motion=loaded.far_motion,
             )
             for body, loaded in pairs
         )
@@ -359,8 +359,8 @@ def _prepared(scene: Scene, bodies: Sequence[PlacedBody], units: Units, before: 
             continue
         own_units = body.units(units.modulus, force_unit)
         held = held_nodes(body.scene, body.own_mesh, own_units, body.own_space)
-        drive = far_drive(body.scene, own_units)
-        supports.append(held if drive is None else replace(held, driven=drive.driven))
+        far_motion = far_motion_of(body.scene, own_units)
+        supports.append(held if far_motion is None else replace(held, load_controlled=far_motion.load_controlled))
         in_place = body.units(units.modulus, force_unit, body.mesh)
         forces.append(body.turn.turned_back(nodal_forces(body.scene, body.mesh, body.space_in_place, in_place)))
     candidates = [candidates_of(scene, body) for body in bodies]
@@ -376,8 +376,8 @@ def _prepared(scene: Scene, bodies: Sequence[PlacedBody], units: Units, before: 
     retained, insides = retained_for(bodies, supports, rows), _insides(bodies, units, before)
     prepared = []
     for number, body in enumerate(bodies):
-        drive = far_drive(body.scene, body.units(units.modulus, force_unit))
-        given = (retained[number], forces[number], insides[number], drive, candidates[number])
+        far_motion = far_motion_of(body.scene, body.units(units.modulus, force_unit))
+        given = (retained[number], forces[number], insides[number], far_motion, candidates[number])
         placed = body.body, body.scene, body.mesh, body.own_mesh, body.space, body.own_space, body.space_in_place
         prepared.append(PreparedBody(*placed, *given))
     return Prepared(scene, tuple(prepared), units, rows)

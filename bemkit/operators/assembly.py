@@ -1,8 +1,8 @@
-"""Scene of bilinear forms: one sweep over the element pairs serves all matrices that are wanted.
+"""Assembly of bilinear forms: one sweep over the element pairs serves several matrices.
 
-A matrix is T_test I T_trial^T: the integrals I of the Legendre polynomials of all pairs of elements between the series
-T of the functions (`bemkit.geometry.series`). The sweep delivers I in chunks of rows, which become rows of the matrix.
-On a mesh with a symmetry the test elements are those of the mesh, the trial elements those of the whole body.
+A matrix is T_test I T_trial^T, with the integrals I of the Legendre polynomials of all pairs of elements and the series
+T of the functions (`bemkit.geometry.series`). The sweep returns I in chunks of rows. On a mesh with symmetry the test
+elements are those of the mesh, and the trial elements are those of the whole body.
 """
 
 from __future__ import annotations
@@ -48,21 +48,21 @@ def assemble_together(forms: Sequence[PairForm]) -> tuple[list[FloatArray], int]
     Raises
     ------
     GeometryError
-        If the forms live on different meshes.
+        If the forms are defined on different meshes.
     """
     mesh = forms[0].test.mesh
     if any(form.test.mesh is not mesh for form in forms):
-        msg = "the operators live on different meshes: assemble those of one mesh at a time"
+        msg = "the operators are defined on different meshes: assemble those of one mesh at a time"
         raise GeometryError(msg)
-    everything = np.arange(mesh.n_elements)
-    targets = [_Target.zeros(form, everything, everything) for form in forms]
-    n_pairs = _fill(targets, everything, everything)
+    elements = np.arange(mesh.n_elements)
+    targets = [_Target.zeros(form, elements, elements) for form in forms]
+    n_pairs = _fill(targets, elements, elements)
     return [target.by_vector_dofs() for target in targets], n_pairs
 
 
 @assembling()
 def assemble_block(form: PairForm, rows: IntArray, columns: IntArray) -> FloatArray:
-    """Return some rows and columns (vector dofs) of the matrix of a form, from the elements that they belong to."""
+    """Return some rows and columns (vector dofs) of the matrix of a form, from the supporting elements only."""
     block = np.zeros((rows.size, columns.size))
     if not block.size:
         return block
@@ -81,7 +81,7 @@ def assemble_block(form: PairForm, rows: IntArray, columns: IntArray) -> FloatAr
 
 @dataclass(frozen=True, eq=False)
 class _Target:
-    """The matrix (n_test, 2, n_trial, 2) of a form, by some of its scalar dofs, in increasing order, and components."""
+    """The matrix (n_test, 2, n_trial, 2) of a form, for some ascending scalar dofs and both components."""
 
     form: PairForm
     test_nodes: IntArray
@@ -90,17 +90,17 @@ class _Target:
 
     @classmethod
     def zeros(cls, form: PairForm, test_elements: IntArray, trial_elements: IntArray) -> _Target:
-        """Return the matrix of the dofs of some elements before anything is added."""
+        """Return the zero matrix for the dofs of some elements."""
         test, trial = _dofs_on(form.test, test_elements), _dofs_on(form.trial, trial_elements)
         return cls(form, test, trial, np.zeros((test.size, 2, trial.size, 2)))
 
     @cached_property
     def terms(self) -> list[Term]:
-        """The parts of the form."""
+        """The terms of the form."""
         return self.form.terms()
 
     def by_vector_dofs(self) -> FloatArray:
-        """Return the matrix by vector dofs; rows and columns of dofs that are zero by symmetry are set to zero."""
+        """Return the matrix for vector dofs; rows and columns of dofs that vanish by symmetry are zero."""
         if self.form.test.mesh.symmetry is not None:
             self.matrix[antisymmetric_dofs(self.form.test).reshape(-1, 2)[self.test_nodes]] = 0.0
             self.matrix[:, :, antisymmetric_dofs(self.form.trial).reshape(-1, 2)[self.trial_nodes]] = 0.0
@@ -108,16 +108,16 @@ class _Target:
 
 
 def _dofs_on(space: BoundarySpace, elements: IntArray) -> IntArray:
-    """Return the scalar dofs of some elements, in increasing order."""
+    """Return the scalar dofs of some elements, ascending."""
     if elements.size == space.mesh.n_elements:
         return np.arange(space.n_dofs // 2)
     return np.unique(space.element_dofs[elements])
 
 
 def _fill(targets: Sequence[_Target], test_elements: IntArray, trial_elements: IntArray) -> int:
-    """Add the pairs of some elements, of any degrees; return how many there are.
+    """Add the integrals of all pairs of some elements; return the number of pairs.
 
-    Each two degrees have a sweep of their own, but few straight elements, whose pairs share more if they are in one.
+    Each combination of degrees has its own sweep; few straight elements share one sweep, which is faster.
     """
     mesh = targets[0].form.test.mesh
     n_images = mesh.whole.n_elements // mesh.n_elements
@@ -125,33 +125,33 @@ def _fill(targets: Sequence[_Target], test_elements: IntArray, trial_elements: I
         return _Sweep(targets, test_elements, trial_elements, {}).add_pairs()
     spaces = list({space: None for target in targets for space in (target.form.test, target.form.trial)})
     groups = [_groups_of_one_degree(spaces, elements) for elements in (test_elements, trial_elements)]
-    known: dict[tuple[Functions, int | None], csc_array] = {}
-    return sum(_Sweep(targets, test, trial, known).add_pairs() for test, trial in itertools.product(*groups))
+    cache: dict[tuple[Functions, int | None], csc_array] = {}
+    return sum(_Sweep(targets, test, trial, cache).add_pairs() for test, trial in itertools.product(*groups))
 
 
 def _groups_of_one_degree(spaces: Sequence[BoundarySpace], elements: IntArray) -> list[IntArray]:
-    """Return the elements in groups of equal degrees in all spaces."""
+    """Group elements by their degrees in all spaces."""
     degrees = np.stack([element_degrees(space)[elements] for space in spaces])
     kinds, group = np.unique(degrees, axis=1, return_inverse=True)
-    return [elements[group.ravel() == number] for number in range(kinds.shape[1])]
+    return [elements[group.ravel() == index] for index in range(kinds.shape[1])]
 
 
 def _n_polynomials(functions: Functions, elements: IntArray) -> int:
-    """Return how many Legendre polynomials functions need on some elements."""
+    """Return the number of Legendre polynomials of functions on some elements."""
     highest = int(element_degrees(functions.space)[elements].max())
     return max(1, highest + 1 - int(functions.derivative))
 
 
 class _Sweep:
-    """One sweep over pairs of elements, whose integrals are added to some matrices.
+    """One sweep over pairs of elements that adds their integrals to several matrices.
 
     Parameters
     ----------
     targets : list of _Target
     test, trial : (n_test,), (n_trial,) int arrays
-        Elements of the mesh; trial elements act with all their images.
-    known : dict
-        Series of functions and components, shared by sweeps: those that are missing are added.
+        Elements of the mesh; trial elements act with their images.
+    cache : dict
+        Series of functions and components, shared by sweeps.
     """
 
     def __init__(
@@ -159,9 +159,9 @@ class _Sweep:
         targets: Sequence[_Target],
         test: IntArray,
         trial: IntArray,
-        known: dict[tuple[Functions, int | None], csc_array],
+        cache: dict[tuple[Functions, int | None], csc_array],
     ) -> None:
-        self.targets, self.test, self.known = targets, test, known
+        self.targets, self.test, self.cache = targets, test, cache
         self.mesh = mesh = targets[0].form.test.mesh
         self.trial = (np.arange(0, mesh.whole.n_elements, mesh.n_elements)[:, None] + trial).ravel()
         self.components = (None,) if mesh.symmetry is None else (0, 1)
@@ -184,17 +184,17 @@ class _Sweep:
     def _acting(self, target: _Target, functions: Functions, component: int | None, n_trial: int) -> csr_array:
         """Return the series of trial functions, (n_nodes, n_trial_elements * n_polynomials)."""
         whole = self._series(functions, component)
-        own = columns_of(whole, self.mesh.whole.n_elements, self.trial, n_trial).tocsr()
-        return own if target.trial_nodes.size == own.shape[0] else own[target.trial_nodes]
+        on_trial = columns_of(whole, self.mesh.whole.n_elements, self.trial, n_trial).tocsr()
+        return on_trial if target.trial_nodes.size == on_trial.shape[0] else on_trial[target.trial_nodes]
 
     def _series(self, functions: Functions, component: int | None) -> csc_array:
         key = functions, component
-        if key not in self.known:
-            self.known[key] = series(functions.space, derivative=functions.derivative, component=component)
-        return self.known[key]
+        if key not in self.cache:
+            self.cache[key] = series(functions.space, derivative=functions.derivative, component=component)
+        return self.cache[key]
 
     def add_pairs(self) -> int:
-        """Add the integrals of all pairs; return how many pairs there are."""
+        """Add the integrals of all pairs; return the number of pairs."""
         sweep = PairSweep(self.mesh.whole, self.degrees, self.test, self.trial)
         lock = Lock()
 
@@ -202,10 +202,10 @@ class _Sweep:
             acted = self._acted(sweep.chunk(rows))
             tested = {functions: _chunk_of(whole, self.test.size, rows) for functions, whole in self.tested.items()}
             for target in self.targets:
-                nodes, own = tested[target.form.tested]
-                folded = self._folded(target, acted, rows).reshape(own.shape[1], -1)
-                values = (own @ folded).reshape(-1, *target.matrix.shape[1:])
-                with lock:  # two chunks share the rows of the node between them
+                nodes, test_series = tested[target.form.tested]
+                folded = self._folded(target, acted, rows).reshape(test_series.shape[1], -1)
+                values = (test_series @ folded).reshape(-1, *target.matrix.shape[1:])
+                with lock:  # neighbouring chunks share the rows of their common node
                     for positions, at in consecutive_runs(np.searchsorted(target.test_nodes, nodes)):
                         target.matrix[at] += values[positions]
 
@@ -214,19 +214,19 @@ class _Sweep:
         return n_pairs
 
     def _acted(self, integrals: PairIntegrals) -> dict[_Key, FloatArray]:
-        """Return I T_trial^T for all kinds of trial functions: (n_nodes, n_kernels, n_polynomials, n_test)."""
+        """Return I T_trial^T for each kind of trial functions, (n_nodes, n_kernels, n_polynomials, n_test)."""
         log = _by_trial(integrals.log, integrals.quotient.real, integrals.quotient.imag)
         double = _by_trial(integrals.double)
         acted = {}
-        for key, own in self.acting.items():
+        for key, trial_series in self.acting.items():
             kernels = double if key[1] else log
-            n_trial = own.shape[1] // self.trial.size
-            flat = kernels[:, :n_trial].reshape(own.shape[1], -1)
-            acted[key] = (own @ flat).reshape(-1, *kernels.shape[2:])
+            n_trial = trial_series.shape[1] // self.trial.size
+            flat = kernels[:, :n_trial].reshape(trial_series.shape[1], -1)
+            acted[key] = (trial_series @ flat).reshape(-1, *kernels.shape[2:])
         return acted
 
     def _folded(self, target: _Target, acted: dict[_Key, FloatArray], rows: slice) -> FloatArray:
-        """Return the kernels of a form acting on its trial functions: (n_test, n_polynomials, 2, n_nodes, 2)."""
+        """Return the form applied to its trial functions, (n_test, n_polynomials, 2, n_nodes, 2)."""
         lengths = self.mesh.lengths[self.test[rows]]
         n_polynomials = self.tested[target.form.tested].shape[1] // self.test.size
         folded = np.zeros((lengths.size, n_polynomials, 2, target.trial_nodes.size, 2))
@@ -234,10 +234,10 @@ class _Sweep:
             entries: FloatArray | None = None
             for term in target.terms:
                 key = term.trial, term.is_double, self.components[d % len(self.components)]
-                for number in np.flatnonzero(term.tensors[:, c, d]).tolist():
-                    part = term.tensors[number, c, d] * acted[key][:, number, :n_polynomials]
+                for kernel in np.flatnonzero(term.tensors[:, c, d]).tolist():
+                    part = term.tensors[kernel, c, d] * acted[key][:, kernel, :n_polynomials]
                     entries = part if entries is None else np.add(entries, part, out=entries)
-                if term.shift and entries is not None:  # a constant sees the means of both functions
+                if term.shift and entries is not None:  # a constant kernel multiplies the integrals of both functions
                     constant = term.tensors[0, c, d] * term.shift
                     entries[:, 0] += (constant * self._integrals(key))[:, None] * lengths
             if entries is not None:
@@ -246,24 +246,24 @@ class _Sweep:
 
     def _integrals(self, key: _Key) -> FloatArray:
         """Return the integrals (n_nodes,) of trial functions over the trial elements."""
-        own = self.acting[key]
-        lengths = np.zeros((self.trial.size, own.shape[1] // self.trial.size))
+        trial_series = self.acting[key]
+        lengths = np.zeros((self.trial.size, trial_series.shape[1] // self.trial.size))
         lengths[:, 0] = self.mesh.whole.lengths[self.trial]
-        return np.asarray(own @ lengths.ravel())
+        return np.asarray(trial_series @ lengths.ravel())
 
 
 def _by_trial(*kernels: FloatArray) -> FloatArray:
-    """Return integrals (n_a, n_b, n_test, n_trial) of some kernels as (n_trial, n_b, n_kernels, n_a, n_test)."""
+    """Transpose integrals (n_a, n_b, n_test, n_trial) of each kernel to (n_trial, n_b, n_kernels, n_a, n_test)."""
     n_a, n_b, n_test, n_trial = kernels[0].shape
     result = np.empty((n_trial, n_b, len(kernels), n_a, n_test))
-    for number, kernel in enumerate(kernels):
-        result[:, :, number] = kernel.transpose(3, 1, 0, 2)
+    for index, kernel in enumerate(kernels):
+        result[:, :, index] = kernel.transpose(3, 1, 0, 2)
     return result
 
 
 def _chunk_of(whole: csc_array, n_elements: int, rows: slice) -> tuple[IntArray, csc_array]:
     """Return the dofs of some elements, ascending, and their series on these elements."""
     n_each = whole.shape[1] // n_elements
-    own = whole[:, rows.start * n_each : rows.stop * n_each]
-    nodes, positions = np.unique(own.indices, return_inverse=True)
-    return nodes.astype(np.intp), type(own)((own.data, positions, own.indptr), shape=(nodes.size, own.shape[1]))
+    part = whole[:, rows.start * n_each : rows.stop * n_each]
+    nodes, positions = np.unique(part.indices, return_inverse=True)
+    return nodes.astype(np.intp), type(part)((part.data, positions, part.indptr), shape=(nodes.size, part.shape[1]))

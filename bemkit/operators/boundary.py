@@ -1,8 +1,8 @@
-"""The boundary operators of plane elasticity as scipy's linear operators: lazy, with separate blocks.
+"""The boundary operators of plane elasticity as scipy linear operators.
 
-``operator @ x``, ``operator.T``, sums and multiples are those of `scipy.sparse.linalg.LinearOperator`; they build the
-matrix on first use. ``operator.block(rows, columns)`` computes no other entries. Bodies are solved without this module,
-from the forms (`bemkit.operators.forms`) themselves.
+``operator @ x``, ``operator.T``, sums and multiples are those of `scipy.sparse.linalg.LinearOperator`. The matrix is
+built on first use. ``operator.block(rows, columns)`` computes only the entries of a block. Scenes are solved without
+this module, directly from the forms (`bemkit.operators.forms`).
 """
 
 from __future__ import annotations
@@ -37,12 +37,12 @@ else:
 
 
 class BoundaryOperator(_LinearOperator, ABC):
-    """A weak form <A trial, test> on two boundary spaces; an operator of your own writes `_build`.
+    """A weak form <A trial, test> on two boundary spaces; subclasses implement `_build`.
 
     Parameters
     ----------
     trial, test : BoundarySpace
-        The space of the argument, and the one that the result is tested with.
+        Spaces of the argument and of the test functions.
     tags : frozenset of Tag
         Properties of the matrix; `bemkit.testing.check_operator` checks them.
     """
@@ -58,22 +58,22 @@ class BoundaryOperator(_LinearOperator, ABC):
 
     @property
     def is_assembled(self) -> bool:
-        """Whether the matrix exists already."""
+        """Whether the matrix has been built."""
         return self._matrix is not None
 
     def matrix(self) -> Any:
-        """Return the (test.n_dofs, trial.n_dofs) matrix, a read-only array, or sparse; built on first use."""
+        """Return the (test.n_dofs, trial.n_dofs) matrix, a read-only or sparse array, built on first use."""
         if self._matrix is None:
             self.keep(self._build())
         return self._matrix
 
     def keep(self, matrix: Matrix) -> None:
-        """Take a finished matrix as that of the operator; it becomes read-only."""
+        """Set the matrix of the operator; it becomes read-only."""
         read_only(matrix if isinstance(matrix, np.ndarray) else matrix.data)
         self._matrix = matrix
 
     def block(self, rows: IntArray, columns: IntArray) -> FloatArray:
-        """Return the entries of some rows and columns, and compute no others unless the matrix exists.
+        """Return the entries of some rows and columns, without building the matrix.
 
         Parameters
         ----------
@@ -85,16 +85,14 @@ class BoundaryOperator(_LinearOperator, ABC):
         Returns
         -------
         (m, n) array
-            As in the matrix, to round-off: the number of Gauss points of far pairs follows from what is asked for.
+            Entries of the matrix up to round-off; the number of Gauss points of far pairs depends on the block.
 
         Raises
         ------
         InputError
-            If there is no such row or column.
+            If a row or column does not exist.
         """
-        rows, columns = (
-            _checked(*each) for each in ((rows, self.shape[0], "rows"), (columns, self.shape[1], "columns"))
-        )
+        rows, columns = _checked(rows, self.shape[0], "rows"), _checked(columns, self.shape[1], "columns")
         if not self.is_assembled:
             return self._build_block(rows, columns)
         matrix = self.matrix()
@@ -103,7 +101,7 @@ class BoundaryOperator(_LinearOperator, ABC):
         )
 
     def _build_block(self, rows: IntArray, columns: IntArray) -> FloatArray:
-        """Compute a block; by default from the whole matrix."""
+        """Return a block; by default from the whole matrix."""
         self.matrix()
         return self.block(rows, columns)
 
@@ -131,7 +129,7 @@ def _checked(numbers: IntArray, n_dofs: int, name: str) -> IntArray:
 
 
 class PairOperator(BoundaryOperator):
-    """An operator whose form is assembled from integrals over pairs of elements."""
+    """An operator assembled from integrals over pairs of elements."""
 
     def __init__(self, form: PairForm) -> None:
         super().__init__(form.trial, form.test, form.tags)
@@ -146,7 +144,7 @@ class PairOperator(BoundaryOperator):
 
 
 class Transposed(BoundaryOperator):
-    """The transpose of another operator, on the same spaces the other way round."""
+    """The transpose of another operator, with trial and test space exchanged."""
 
     def __init__(self, operator: BoundaryOperator) -> None:
         is_symmetric = Tag.SYMMETRIC in operator.tags
@@ -193,8 +191,8 @@ def single_layer(trial: BoundarySpace, test: BoundarySpace, material: Material) 
 
     Notes
     -----
-    The logarithm is log(|r| / r0) with r0 the diameter of the mesh, which makes V positive definite at every size of
-    the body. For tractions in equilibrium r0 changes V t by a translation only.
+    The logarithm is log(|r| / r0) with the diameter r0 of the mesh. V is then positive definite for a body of any size.
+    For tractions in equilibrium, r0 changes V t only by a translation.
     """
     return PairOperator(SingleLayerForm(trial, test, material))
 
@@ -205,9 +203,9 @@ def double_layer(trial: BoundarySpace, test: BoundarySpace, material: Material) 
     Parameters
     ----------
     trial : BoundarySpace
-        Of the displacements u; it must be continuous.
+        Space of the displacements u; it must be continuous.
     test : BoundarySpace
-        Of the tractions q, on the same mesh.
+        Space of the tractions q, on the same mesh.
     material : Material
 
     Returns
@@ -222,7 +220,7 @@ def double_layer(trial: BoundarySpace, test: BoundarySpace, material: Material) 
 
     Notes
     -----
-    On the boundary of a body (1/2 M + K) r = 0 for its rigid motions r, on that of an exterior (1/2 M + K) r = M r.
+    Rigid motions r of a body fulfil (1/2 M + K) r = 0; on the boundary of an exterior, (1/2 M + K) r = M r.
     """
     return PairOperator(DoubleLayerForm(trial, test, material))
 
@@ -233,9 +231,9 @@ def adjoint_double_layer(trial: BoundarySpace, test: BoundarySpace, material: Ma
     Parameters
     ----------
     trial : BoundarySpace
-        Of the tractions t.
+        Space of the tractions t.
     test : BoundarySpace
-        Of the displacements v, on the same mesh; it must be continuous.
+        Space of the displacements v, on the same mesh; it must be continuous.
     material : Material
 
     Returns
@@ -279,18 +277,18 @@ def mass(trial: BoundarySpace, test: BoundarySpace) -> Mass:
     Parameters
     ----------
     trial, test : BoundarySpace
-        On one mesh.
+        Spaces on one mesh.
     """
     return Mass(trial, test)
 
 
 def assemble(*operators: PairOperator) -> int:
-    """Build the matrices of several operators in one sweep, so that shared integrals are computed once.
+    """Build the matrices of several operators in one sweep, which computes common integrals once.
 
     Parameters
     ----------
     *operators : PairOperator
-        On the same mesh; those that are assembled already are skipped.
+        Operators on one mesh; operators that are already assembled are skipped.
 
     Returns
     -------

@@ -1,6 +1,6 @@
-"""Operation counts, which are the same on every computer.
+"""Operation counts, which do not depend on the computer.
 
-The code that does the work counts it and returns the count with its result; nothing is collected behind the scenes.
+The code that does the work returns the count with its result; there are no global counters.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from typing import Any
 
 
 class FactorKind(enum.Enum):
-    """How a matrix is factored."""
+    """Kind of a matrix factorisation."""
 
     CHOLESKY = "Cholesky"
     LU = "LU"
@@ -25,7 +25,7 @@ class Factorisation:
     ----------
     kind : FactorKind
     order : int
-        Rows of the matrix.
+        Number of rows of the matrix.
     """
 
     kind: FactorKind
@@ -34,14 +34,14 @@ class Factorisation:
 
 @dataclass(frozen=True)
 class Entries:
-    """Entries of the matrix of one boundary operator.
+    """Number of entries of the matrix of one boundary operator.
 
     Parameters
     ----------
     computed : int
-        Real numbers that were evaluated, or assembled, from integrals of the kernel.
+        Entries that were evaluated or assembled.
     stored : int
-        Real numbers that were kept of it, in a matrix of its own or as columns of a larger one.
+        Entries that were stored, in their own matrix or as columns of a larger one.
     """
 
     computed: int = 0
@@ -49,30 +49,30 @@ class Entries:
 
     @classmethod
     def full(cls, n_rows: int, n_columns: int) -> Entries:
-        """Return the count of a matrix that is computed and stored as a whole."""
+        """Return the count of a matrix that is completely computed and stored."""
         return cls(n_rows * n_columns, n_rows * n_columns)
 
     def __add__(self, other: Entries) -> Entries:
-        """Return both counts together."""
+        """Return the sum of both counts."""
         return Entries(self.computed + other.computed, self.stored + other.stored)
 
 
 @dataclass(frozen=True)
 class OperationCounts:
-    """Counts of what a body took to compute.
+    """Operation counts of the computation of a body.
 
     Parameters
     ----------
     element_pairs : int
         Pairs of a test element (a collocation point) and a trial element whose integrals were evaluated.
     single_layer, double_layer, hypersingular : Entries
-        Of V, K and W.
+        Entries of V, K and W.
     factorisations : tuple of Factorisation
-        Of the body, in their order; those of the contact system are counted by ``Solution.linear_solves``.
+        Factorisations of the body, in order; ``Solution.linear_solves`` counts those of the contact system.
     right_hand_sides : int
-        Columns for which these factorisations were solved, fields recovered from a solution aside.
+        Right-hand sides of these factorisations, without recovered fields.
     contact_unknowns : int
-        Order of the system that every contact step solves.
+        Order of the system of a contact step.
     """
 
     element_pairs: int = 0
@@ -84,7 +84,7 @@ class OperationCounts:
     contact_unknowns: int = 0
 
     def __add__(self, other: OperationCounts) -> OperationCounts:
-        """Return the work of both, one after the other."""
+        """Return the sum of both counts."""
         return OperationCounts(
             self.element_pairs + other.element_pairs,
             self.single_layer + other.single_layer,
@@ -96,7 +96,7 @@ class OperationCounts:
         )
 
     def as_dict(self) -> dict[str, Any]:
-        """Return the counts as JSON can hold them."""
-        factorisations = [{"kind": one.kind.value, "order": one.order} for one in self.factorisations]
+        """Return the counts as a JSON object."""
+        factorisations = [{"kind": factor.kind.value, "order": factor.order} for factor in self.factorisations]
         operators = {name: dict(vars(value)) for name, value in vars(self).items() if isinstance(value, Entries)}
         return {**vars(self), **operators, "factorisations": factorisations}

@@ -7,8 +7,8 @@ the tangential derivative and k the Laplace double layer kernel, for continuous 
     <K u, q> = int int k q^T u + 1 / (4 pi (1 - nu)) int int q^T ((1 - 2 nu) J log|r| + J Q) du/ds
     <W u, v> = mu / (2 pi (1 - nu)) int int dv/ds^T (-log|r| I + Q) du/ds
 
-so that all of them are combinations of the scalar integrals of `integrals`. The forms are those of [Steinbach2008] and
-[SauterSchwab2011], K and W integrated by parts after [Han1994].
+so that all are combinations of the scalar integrals of `integrals`. The forms are those of [Steinbach2008] and
+[SauterSchwab2011]; K and W are integrated by parts after [Han1994].
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ _IDENTITY = np.eye(2)
 _TURN = np.array([[0.0, 1.0], [-1.0, 0.0]])
 """J."""
 _HALF_QUOTIENT = 0.5 * np.array([[[1.0, 0.0], [0.0, -1.0]], [[0.0, 1.0], [1.0, 0.0]]])
-"""Q without its constant half of the identity, by the real and the imaginary part of r / conj(r)."""
+"""Tensors of the real and imaginary part of r / conj(r) in Q - I/2."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,12 +41,12 @@ class SingleLayerForm(PairForm):
 
     @property
     def tags(self) -> frozenset[Tag]:
-        """Symmetric and definite on one space; a uniform pressure does not deform an incompressible body: V n = 0."""
+        """Symmetric and definite if both spaces are one; semidefinite for incompressible bodies, where V n = 0."""
         is_one = self.trial is self.test
         return definite(self.trial, self.material.effective_poisson_ratio < 0.5) if is_one else frozenset()
 
     def terms(self) -> list[Term]:
-        """Return the one term of V; the constant half of Q is part of the shift."""
+        """Return the only term of V; the constant part of Q is in the shift."""
         nu = self.material.effective_poisson_ratio
         factor = 1.0 / (8.0 * np.pi * self.material.shear_modulus * (1.0 - nu))
         tensors = factor * np.stack([-(3.0 - 4.0 * nu) * _IDENTITY, *_HALF_QUOTIENT])
@@ -65,7 +65,7 @@ class DoubleLayerForm(PairForm):
     def terms(self) -> list[Term]:
         """Return the kernels that act on du/ds, and the scalar double layer of u.
 
-        The constant half of Q is left away: du/ds has no mean on a closed curve.
+        The constant part of Q is omitted, because the mean of du/ds on a closed curve is zero.
         """
         nu = self.material.effective_poisson_ratio
         factor = 1.0 / (4.0 * np.pi * (1.0 - nu))
@@ -87,7 +87,7 @@ class HypersingularForm(PairForm):
 
     @property
     def tags(self) -> frozenset[Tag]:
-        """Symmetric on one space; the rotation of a curved element is not a polynomial, hence not in the space."""
+        """Symmetric and semidefinite if both spaces are one; a space on curved elements does not contain rotations."""
         is_straight = bool(self.trial.mesh.is_straight.all())
         kernel = Tag.KILLS_RIGID_MOTIONS if is_straight else Tag.KILLS_TRANSLATIONS
         symmetric = {Tag.SYMMETRIC, Tag.POSITIVE_SEMIDEFINITE} if self.trial is self.test else set[Tag]()
@@ -99,14 +99,14 @@ class HypersingularForm(PairForm):
         return Functions(self.test, derivative=True)
 
     def terms(self) -> list[Term]:
-        """Return the one term of W; du/ds and dv/ds have no mean, so that the constant half of Q is left away."""
+        """Return the only term of W; the constant part of Q is omitted, because the means of du/ds and dv/ds vanish."""
         factor = self.material.shear_modulus / (2.0 * np.pi * (1.0 - self.material.effective_poisson_ratio))
         tensors = factor * np.stack([-_IDENTITY, *_HALF_QUOTIENT])
         return [Term(Functions(self.trial, derivative=True), tensors)]
 
 
 def definite(space: BoundarySpace, is_positive: bool = True) -> frozenset[Tag]:
-    """Return the tags of a symmetric operator that is positive but on dofs that are zero by symmetry."""
+    """Return the tags of a symmetric operator that is positive except on dofs that vanish by symmetry."""
     is_definite = is_positive and not antisymmetric_dofs(space).any()
     return frozenset({Tag.SYMMETRIC, Tag.POSITIVE_DEFINITE if is_definite else Tag.POSITIVE_SEMIDEFINITE})
 
@@ -123,11 +123,12 @@ def _require_continuous(space: BoundarySpace, operator: str, role: str) -> None:
 def mass_matrix(trial: BoundarySpace, test: BoundarySpace) -> csr_array:
     """Return the identity <u, q>, a sparse (test.n_dofs, trial.n_dofs) array [m].
 
-    Rows and columns of dofs that are zero by symmetry are zero.
+    Rows and columns of dofs that vanish by symmetry are zero.
 
     Notes
     -----
-    T_test D T_trial^T with the Legendre coefficients T of the functions and the squared norms D of the polynomials.
+    The matrix is T_test D T_trial^T, with the Legendre coefficients T of the functions and the squared norms D of the
+    polynomials.
     """
     from scipy.sparse import coo_array
 

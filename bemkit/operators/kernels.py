@@ -1,24 +1,24 @@
-r"""Formulas only: polynomial densities on one straight element, seen from a point.
+r"""Integrals of polynomial densities on one straight element for a point.
 
-Complex notation. The element runs from a to b with unit tangent tau, half length l and centre c; a point x has the
-local coordinate zeta = (x - c) / (l tau), so that the element is the interval [-1, 1]. With the Legendre polynomials
-P_k and their Cauchy integrals
+Complex notation: the element runs from a to b with unit tangent tau, half length l and centre c. A point x has the
+local coordinate zeta = (x - c) / (l tau), so that the element is the interval [-1, 1]. Let P_k be the Legendre
+polynomials, with their Cauchy integrals
 
     C_k = int_{-1}^{1} P_k(t) / (zeta - t) dt = 2 Q_k(zeta),    C_0 = log((zeta + 1) / (zeta - 1)),
 
-(Q_k is the Legendre function of the second kind; [DLMF, 14.12.13]) every integral that elasticity needs is a short
-combination, for rho = x - y and m_k = int P_k dt, which is 2 for k = 0 and 0 otherwise:
+where Q_k is the Legendre function of the second kind [DLMF, 14.12.13]. For rho = x - y and m_k = int P_k dt, which is 2
+for k = 0 and 0 otherwise, the integrals of elasticity are
 
     int P_k log|rho| ds        = l (m_k log l + Re (C_{k+1} - C_{k-1}) / (2 k + 1)),   k > 0
                                = l (m_k log l + log|zeta^2 - 1| + Re C_1),             k = 0
     int P_k rho / conj(rho) ds = l tau^2 (m_k + 2 i eta conj(C_k)),   eta = Im zeta
     int P_k k(x, y) ds         = Im C_k / (2 pi),   k = -(1/2 pi) d log|rho| / dn_y the Laplace double layer
 
-The C_k satisfy the recurrence of the P_k, (k + 1) C_{k+1} = (2 k + 1) zeta C_k - k C_{k-1}, of which they are the
-smallest solution: upward it loses digits like r^(2 k), with r = |zeta + sqrt(zeta^2 - 1)| the sum of the half axes of
-the ellipse through zeta with foci -1 and 1, and downward it gains them. So points close to the element take it upward
-from the logarithm, the others downward from any values far above ([DLMF, 3.6]), and points far away from the power
-series of the two highest.
+The C_k are the minimal solution of the recurrence of the P_k, (k + 1) C_{k+1} = (2 k + 1) zeta C_k - k C_{k-1}. The
+upward recurrence loses digits like r^(2 k), where r = |zeta + sqrt(zeta^2 - 1)| is the sum of the half axes of the
+ellipse through zeta with foci -1 and 1; the downward recurrence gains them. So near points use the upward recurrence
+from the logarithm, other points the downward recurrence from arbitrary values at a high k ([DLMF, 3.6]), and far points
+the downward recurrence from the power series of the two highest C_k.
 """
 
 from __future__ import annotations
@@ -32,12 +32,13 @@ from bemkit.arrays import ComplexArray, FloatArray, read_only
 from bemkit.geometry.quadrature import gauss_legendre
 
 LOST = 30.0
-"""Factor of round-off that the upward recurrence may lose before the downward one takes over."""
+"""Largest amplification of round-off by the upward recurrence."""
 FAR = 12.0
-"""Size r of the ellipse from which the power series takes fewer operations than the downward recurrence."""
+"""Smallest r for which the power series takes fewer operations than the downward recurrence."""
 BANDS = (1.6, 3.0, FAR, 1.0e2, math.inf)
-"""Upper ends of the bands of r whose points go downward together, in as many steps as the lower end needs."""
+"""Upper ends of bands of r; points of a band use the number of downward steps of its lower end."""
 DIGITS = 17.0
+"""Digits of the downward recurrence."""
 
 
 def interval_moment(k: int) -> float:
@@ -46,7 +47,7 @@ def interval_moment(k: int) -> float:
 
 
 def terms_needed(distance: float) -> int:
-    """Return how many terms of the series in 1 / zeta**2 reach round-off at |zeta| >= distance > 1."""
+    """Return the number of terms of the series in 1 / zeta**2 for round-off at |zeta| >= distance > 1."""
     return max(1, math.ceil(16.5 / (2.0 * math.log10(distance))))
 
 
@@ -56,11 +57,11 @@ def far_integrals(zeta: ComplexArray, highest: int, n_terms: int) -> ComplexArra
     Parameters
     ----------
     zeta : complex array
-        Local coordinates; `n_terms` must fit the smallest modulus (`terms_needed`).
+        Local coordinates.
     highest : int
         At least 1.
     n_terms : int
-        Terms of the power series in 1 / zeta**2.
+        Terms of the power series in 1 / zeta**2; see `terms_needed` for the smallest modulus of `zeta`.
 
     Returns
     -------
@@ -70,7 +71,7 @@ def far_integrals(zeta: ComplexArray, highest: int, n_terms: int) -> ComplexArra
     integrals = np.empty((highest + 1, *zeta.shape), complex)
     inverse = 1.0 / zeta
     w = inverse * inverse
-    # the two highest as power series, the others by the recurrence downward, the last one from C_1 = zeta C_0 - 2
+    # power series of the two highest, downward recurrence for the others, C_0 from C_1 = zeta C_0 - 2
     np.multiply(_series(highest, w, n_terms), w, out=integrals[highest])
     if highest > 1:
         power = inverse.copy()
@@ -102,7 +103,7 @@ def _series(k: int, w: ComplexArray, n_terms: int) -> ComplexArray:
 
 
 def far_log_product(zeta: ComplexArray) -> FloatArray:
-    """Return log|zeta**2 - 1| where |zeta| is well above 1."""
+    """Return log|zeta**2 - 1| for |zeta| well above 1."""
     product = zeta * zeta
     product -= 1.0
     squared: FloatArray = np.square(product.real)
@@ -113,19 +114,19 @@ def far_log_product(zeta: ComplexArray) -> FloatArray:
 
 
 def near_integrals(plus: ComplexArray, minus: ComplexArray, highest: int) -> tuple[ComplexArray, FloatArray]:
-    """Return the Cauchy integrals at points at any distance from the element, exact to round-off.
+    """Return the Cauchy integrals for points at any distance from the element, exact to round-off.
 
     Parameters
     ----------
     plus, minus : (n,) complex arrays
-        zeta + 1 and zeta - 1, each formed from the distance to its own end point so that it is exact near that end.
+        zeta + 1 and zeta - 1, each computed from the position relative to its end and accurate near it.
     highest : int
         Highest degree.
 
     Returns
     -------
     integrals : (highest + 1, n) complex array
-        C_0 ... C_highest. The angle -Im C_0 is the one under which the element is seen, in (-pi, pi].
+        C_0 ... C_highest; -Im C_0 is the angle between the lines from the point to both ends, in (-pi, pi].
     log_product : (n,) array
         log|zeta^2 - 1|.
     """
@@ -144,7 +145,7 @@ def near_integrals(plus: ComplexArray, minus: ComplexArray, highest: int) -> tup
 
 
 def local_coordinate(plus: ComplexArray, minus: ComplexArray) -> ComplexArray:
-    """Return zeta from zeta + 1 or zeta - 1, whichever is smaller: xi and eta are exact near either end."""
+    """Return zeta from the smaller of zeta + 1 and zeta - 1, accurate near both ends."""
     zeta: ComplexArray = np.where(np.abs(plus) < np.abs(minus), plus - 1.0, minus + 1.0)
     return zeta
 
@@ -153,9 +154,9 @@ def _logarithm(plus: ComplexArray, minus: ComplexArray, zeta: ComplexArray) -> t
     """Return log((zeta + 1) / (zeta - 1)) and log|zeta**2 - 1|."""
     abs_plus, abs_minus, xi, eta = np.abs(plus), np.abs(minus), zeta.real, zeta.imag
     result = np.empty(plus.shape, complex)
-    # the angle under which the element is seen
+    # angle between the lines from the point to both ends
     np.negative(np.arctan2(2.0 * eta, plus.real * minus.real + eta * eta), out=result.imag)
-    # |zeta + 1|^2 - |zeta - 1|^2 = 4 xi: log1p keeps the digits of the difference of two nearly equal logarithms
+    # |zeta + 1|^2 - |zeta - 1|^2 = 4 xi: log1p avoids the difference of two nearly equal logarithms
     squared = abs_minus * abs_minus
     ratio = np.divide(4.0 * xi, squared, out=np.zeros_like(xi), where=np.abs(xi) < squared / 8.0)
     log_plus, log_minus = np.log(abs_plus, out=abs_plus), np.log(abs_minus, out=abs_minus)
@@ -164,7 +165,7 @@ def _logarithm(plus: ComplexArray, minus: ComplexArray, zeta: ComplexArray) -> t
 
 
 def _sum_of_half_axes(plus: ComplexArray, minus: ComplexArray) -> FloatArray:
-    """Return r; half the sum of the distances to the foci is one half axis."""
+    """Return r from the distances to the foci, whose mean is one half axis."""
     axis = np.abs(plus)
     axis += np.abs(minus)
     axis *= 0.5
@@ -174,7 +175,7 @@ def _sum_of_half_axes(plus: ComplexArray, minus: ComplexArray) -> FloatArray:
 
 
 def _replace_far(integrals: ComplexArray, zeta: ComplexArray, size: FloatArray) -> None:
-    """Put in what loses no digits where the upward recurrence does; `size` is r."""
+    """Replace the integrals where the upward recurrence loses digits; `size` is r."""
     highest = len(integrals) - 1
     lower = LOST ** (0.5 / highest)
     for upper in BANDS:
@@ -183,16 +184,16 @@ def _replace_far(integrals: ComplexArray, zeta: ComplexArray, size: FloatArray) 
             steps = math.ceil(DIGITS / (2.0 * math.log10(lower)))
             integrals[1:, chosen] = _downward(zeta[chosen], integrals[0, chosen], highest, steps)
         elif chosen.size:
-            # |zeta| is at least half the difference of r and 1 / r
+            # |zeta| >= (r - 1 / r) / 2
             n_terms = terms_needed(0.5 * (lower - 1.0 / lower))
             integrals[:, chosen] = far_integrals(zeta[chosen], highest, n_terms)
         lower = max(lower, upper)
 
 
 def _downward(zeta: ComplexArray, first: ComplexArray, highest: int, steps: int) -> ComplexArray:
-    """Return C_1 ... C_highest from C_0 by the downward recurrence, begun so many steps above with 0 and 1.
+    """Return C_1 ... C_highest from C_0 by the downward recurrence, which begins `steps` above with 0 and 1.
 
-    With the factors f_k = f_{k-1} k / (2 k + 1) the C_k / f_k take one product and one difference a step.
+    For C_k / f_k with the factors f_k = f_{k-1} k / (2 k + 1), a step is one product and one difference.
     """
     above, value = np.zeros_like(zeta), np.ones_like(zeta)
     integrals = np.empty((highest, zeta.size), complex)
@@ -210,7 +211,7 @@ def _downward(zeta: ComplexArray, first: ComplexArray, highest: int, steps: int)
 
 
 def log_integrals(integrals: ComplexArray, log_product: FloatArray) -> FloatArray:
-    """Return Re int P_k log(zeta - t) dt, that is the log integrals for an element of half length 1.
+    """Return Re int P_k log(zeta - t) dt: the log integrals of an element of half length 1.
 
     Parameters
     ----------
@@ -234,7 +235,7 @@ def log_integrals(integrals: ComplexArray, log_product: FloatArray) -> FloatArra
 
 
 def quotient_integrals(integrals: ComplexArray, eta: FloatArray) -> ComplexArray:
-    """Return int P_k rho / conj(rho) dt for an element of half length 1 along the real axis, as many as `integrals`."""
+    """Return int P_k rho / conj(rho) dt for an element of half length 1 along the real axis."""
     twice = 2.0 * eta
     result = np.empty(integrals.shape, complex)
     np.multiply(integrals.imag, twice, out=result.real)
@@ -250,14 +251,14 @@ def log_on_itself(a: int, b: int) -> float:
     if (a + b) % 2:
         return 0.0
     low, high = sorted((a, b))
-    # int P_a Q_c = 2 / ((a - c) (a + c + 1)) for odd a - c; the inner integral is (2 Q_{b+1} - 2 Q_{b-1}) / (2 b + 1)
+    # int P_a Q_c = 2 / ((a - c) (a + c + 1)) for odd a - c; the inner integral is 2 (Q_{b+1} - Q_{b-1}) / (2 b + 1)
     products = [2.0 / ((low - c) * (c + low + 1)) for c in (high + 1, high - 1)]
     return 2.0 * (products[0] - products[1]) / (2 * high + 1)
 
 
 @lru_cache(maxsize=16)
 def legendre_of_monomials(highest: int) -> FloatArray:
-    """Return the square matrix, read-only, whose row m holds the Legendre coefficients of t**m."""
+    """Return the read-only square matrix whose row m contains the Legendre coefficients of t**m."""
     matrix = np.zeros((highest + 1, highest + 1))
     for m, unit in enumerate(np.eye(highest + 1)):
         matrix[m, : m + 1] = np.polynomial.legendre.poly2leg(unit[: m + 1])
@@ -267,12 +268,12 @@ def legendre_of_monomials(highest: int) -> FloatArray:
 
 @lru_cache(maxsize=64)
 def legendre_weights(n_polynomials: int, n_points: int) -> FloatArray:
-    """Return the (n_polynomials, n_points) products, read-only, of P_0, P_1, ... at Gauss points and their weights."""
+    """Return the read-only products of P_0, P_1, ... at Gauss points and weights, (n_polynomials, n_points)."""
     points, weights = gauss_legendre(n_points)
     return read_only(weights * legendre_values(max(n_polynomials - 1, 0), points)[:n_polynomials])
 
 
 def legendre_values(highest: int, t: FloatArray | float) -> FloatArray:
-    """Return P_0 ... P_highest at points of [-1, 1], of shape (highest + 1, ...) before that of t."""
+    """Return P_0 ... P_highest at points t of [-1, 1], (highest + 1, *shape of t)."""
     values = np.polynomial.legendre.legvander(np.asarray(t, float), highest)
     return np.moveaxis(values, -1, 0).reshape(highest + 1, *np.shape(t))

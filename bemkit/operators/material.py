@@ -25,19 +25,19 @@ class Material:
     youngs_modulus : float [Pa]
         Positive and finite.
     poisson_ratio : float [-]
-        Larger than -1 and at most 1/2; 1/2 is incompressible, which boundary integrals allow.
+        Larger than -1 and at most 1/2; 1/2 is incompressible.
     plane : Plane
-        Plane strain unless said otherwise.
+        Plane strain by default.
 
     Raises
     ------
     ValueError
-        If a modulus is not positive and finite, Poisson's ratio lies outside (-1, 1/2], or the plane state is a word.
+        If the modulus is not positive and finite, Poisson's ratio is outside of (-1, 1/2], or `plane` is no `Plane`.
 
     Notes
     -----
-    Plane stress is plane strain with nu -> nu / (1 + nu) at the same shear modulus, so every
-    operator reads only `shear_modulus` and `effective_poisson_ratio`.
+    Plane stress is plane strain with nu / (1 + nu) in place of nu and the same shear modulus. So operators depend only
+    on `shear_modulus` and `effective_poisson_ratio`.
     """
 
     youngs_modulus: float
@@ -68,7 +68,7 @@ class Material:
 
     @property
     def is_incompressible(self) -> bool:
-        """Whether the volume cannot change at all: plane strain with Poisson's ratio 1/2 to the last digits."""
+        """Whether the volume cannot change: plane strain with Poisson's ratio 1/2 to round-off."""
         return self.effective_poisson_ratio > 0.5 - 1e-12
 
     @property
@@ -87,5 +87,5 @@ class Material:
         return 2.0 * self.shear_modulus / (1.0 - self.effective_poisson_ratio)
 
     def scaled(self, stress: float) -> Material:
-        """Return the same material when stresses are measured in units of `stress` [Pa]."""
+        """Return the same material with `stress` [Pa] as unit of stress."""
         return Material(self.youngs_modulus / stress, self.poisson_ratio, self.plane)

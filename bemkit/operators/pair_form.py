@@ -1,4 +1,4 @@
-"""Bilinear forms made of integrals over pairs of elements, and what is promised of their matrices."""
+"""Bilinear forms as integrals over pairs of elements, and the properties of their matrices."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from bemkit.operators.material import Material
 
 
 class Functions(NamedTuple):
-    """The functions of a boundary space, or their derivatives by the arc length."""
+    """The functions of a boundary space, or their derivatives with respect to arc length."""
 
     space: BoundarySpace
     derivative: bool = False
@@ -22,20 +22,21 @@ class Functions(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Term:
-    """A part of a bilinear form: the integral of v^T G w over pairs of elements, with a 2 x 2 kernel G(x, y).
+    """A term of a bilinear form: the integral of v^T G w over pairs of elements, with a 2 x 2 kernel G(x, y).
 
-    With r = x - y, the kernel is a sum of scalar ones (see `bemkit.operators.integrals.sweep`) times constant tensors,
+    With r = x - y, the kernel is a sum of scalar kernels (see `bemkit.operators.integrals.sweep`) times constant
+    tensors,
 
         G = tensors[0] (log|r| + shift) + tensors[1] Re(r / conj(r)) + tensors[2] Im(r / conj(r)),
 
-    or the double layer k of the Laplace equation times one, G = tensors[0] k.
+    or the double layer k of the Laplace equation times a tensor, G = tensors[0] k.
 
     Parameters
     ----------
     trial : Functions
         w, at the points y.
     tensors : (3, 2, 2) or (1, 2, 2) array
-        By the scalar kernels and the components of v and w.
+        Axes scalar kernel, component of v, component of w.
     shift : float
     """
 
@@ -45,12 +46,12 @@ class Term:
 
     @property
     def is_double(self) -> bool:
-        """Whether it is the double layer of the Laplace equation."""
+        """Whether the kernel is the double layer of the Laplace equation."""
         return len(self.tensors) == 1
 
 
 class Tag(enum.Enum):
-    """Promises about an operator; `bemkit.testing.check_operator` proves each one."""
+    """Properties of an operator; `bemkit.testing.check_operator` verifies each one."""
 
     SYMMETRIC = "symmetric"
     POSITIVE_DEFINITE = "positive definite"
@@ -61,18 +62,18 @@ class Tag(enum.Enum):
 
 @dataclass(frozen=True, eq=False)
 class PairForm(ABC):
-    """A bilinear form <A trial, test> made of integrals over pairs of elements.
+    """A bilinear form <A trial, test> of integrals over pairs of elements.
 
     Parameters
     ----------
     trial, test : BoundarySpace
-        The space of the argument, and the one that the result is tested with.
+        Spaces of the argument and of the test functions.
     material : Material
 
     Raises
     ------
     GeometryError
-        If the spaces live on different meshes.
+        If the spaces are defined on different meshes.
     """
 
     trial: BoundarySpace
@@ -84,21 +85,21 @@ class PairForm(ABC):
 
     @property
     def tags(self) -> frozenset[Tag]:
-        """Promised properties of its matrix."""
+        """Properties of the matrix."""
         return frozenset()
 
     @property
     def tested(self) -> Functions:
-        """v, at the points x: those of the test space."""
+        """v, at the points x: functions of the test space."""
         return Functions(self.test)
 
     @abstractmethod
     def terms(self) -> list[Term]:
-        """Return the parts of the form; their sum is the form."""
+        """Return the terms, whose sum is the form."""
 
 
 def require_one_mesh(trial: BoundarySpace, test: BoundarySpace) -> None:
-    """Raise GeometryError unless two spaces live on one mesh."""
+    """Raise GeometryError unless two spaces are defined on one mesh."""
     if trial.mesh is not test.mesh:
-        msg = "trial and test space live on different meshes: build both on the same BoundaryMesh object"
+        msg = "trial and test space are defined on different meshes: build both on the same BoundaryMesh object"
         raise GeometryError(msg)

@@ -1,16 +1,16 @@
-r"""Particular solutions of elasticity under forces and temperatures inside a body, in closed form.
+r"""Particular solutions of elasticity under body forces and temperatures, in closed form.
 
-With z = x + i y, complex displacements u = u_x + i u_y, forces b = b_x + i b_y, and beta the plane compressibility:
+With z = x + i y, displacements u = u_x + i u_y, forces b = b_x + i b_y and the plane compressibility beta:
 
     uniform force b              u = -beta conj(b) z^2 / 2,       sigma = -Re(conj(b) z) I
     centrifugal force q z        u = C |z|^2 z,                   C = -q beta / (8 (1 - nu))
     expansion Re f(z)            u = int f dz,                    sigma = 0
     expansion s log |z|          u = m z (log |z| - 1/2) / 2 + beta p z + c / conj(z),    m = s / (1 - nu)
 
-Nothing is divided by 1 - 2 nu, so that they hold for incompressible bodies, too. The first is a state of hydrostatic
-pressure, the third says that a harmonic temperature leaves a body without holes and supports free of stress, the last
-is the gradient of a thermoelastic potential [TimoshenkoGoodier1970]. There p and c take the tractions off two circles:
-without them the energy of a thin ring would be a small difference of large ones.
+No solution divides by 1 - 2 nu, so all hold for incompressible bodies. The first is a state of hydrostatic pressure. By
+the third, a harmonic temperature causes no stress in a body without holes and supports. The last is the gradient of a
+thermoelastic potential [TimoshenkoGoodier1970]; p and c make two circles free of traction, because otherwise the energy
+of a thin ring would be a small difference of large terms.
 """
 
 from __future__ import annotations
@@ -28,19 +28,19 @@ from bemkit.geometry.vectors import norms
 from bemkit.operators.material import Material
 from bemkit.operators.somigliana.stress import gradient_of, stress_of
 
-_POINTS_ON_RAYS = 24
-_POINTS_ON_ELEMENTS = 12
+_POINTS_ON_RAYS, _POINTS_ON_ELEMENTS = 24, 12
+"""Gauss points of integrals of the energy."""
 
 
 class ComplexState(NamedTuple):
-    """A state at n points: (n,) arrays.
+    """An elastic state at n points; all arrays are (n,).
 
     Parameters
     ----------
     displacement, along, across : complex arrays [m], [-], [-]
         u, du/dz and du/dzbar.
     mean_stress : array [Pa]
-        (sigma_xx + sigma_yy) / 2; the deviator is 2 mu du/dzbar.
+        (sigma_xx + sigma_yy) / 2; the deviatoric stress is 2 mu du/dzbar.
     expansion : array [-]
         Free thermal strain along x and y.
     """
@@ -53,11 +53,11 @@ class ComplexState(NamedTuple):
 
 
 class Source(Protocol):
-    """A force or an expansion inside a body, with one elastic state that balances it."""
+    """A body force or a thermal expansion, with one elastic state that balances it."""
 
     @property
     def is_expansion(self) -> bool:
-        """Whether it is a thermal strain, and no force."""
+        """Whether the source is a thermal strain instead of a force."""
 
     def state(self, z: ComplexArray, material: Material) -> ComplexState:
         """Return a state with div sigma + b = 0 at points z = x + i y [m]."""
@@ -65,7 +65,7 @@ class Source(Protocol):
 
 @dataclass(frozen=True)
 class UniformForce:
-    """A force b [N/m^3], complex, the same everywhere."""
+    """A uniform complex force b [N/m^3]."""
 
     density: complex
     is_expansion = False
@@ -73,8 +73,8 @@ class UniformForce:
     def state(self, z: ComplexArray, material: Material) -> ComplexState:
         """Return the hydrostatic state; see `Source.state`."""
         potential = -np.conj(self.density) * z
-        along, nothing = material.plane_compressibility * potential, np.zeros_like(z)
-        return ComplexState(0.5 * along * z, along, nothing, potential.real, nothing.real)
+        along, zero = material.plane_compressibility * potential, np.zeros_like(z)
+        return ComplexState(0.5 * along * z, along, zero, potential.real, zero.real)
 
 
 @dataclass(frozen=True)
@@ -86,9 +86,9 @@ class CentrifugalForce:
 
     def state(self, z: ComplexArray, material: Material) -> ComplexState:
         """Return the radial state; see `Source.state`."""
-        freedom, square = 1.0 - material.effective_poisson_ratio, np.abs(z) ** 2
-        c = -0.125 * self.factor * material.plane_compressibility / freedom
-        mean = -0.25 * self.factor / freedom * square
+        divisor, square = 1.0 - material.effective_poisson_ratio, np.abs(z) ** 2
+        c = -0.125 * self.factor * material.plane_compressibility / divisor
+        mean = -0.25 * self.factor / divisor * square
         along = (2.0 * c * square).astype(complex)
         return ComplexState(c * square * z, along, c * z**2, mean, np.zeros_like(square))
 
@@ -103,20 +103,20 @@ class HarmonicExpansion:
     def state(self, z: ComplexArray, material: Material) -> ComplexState:
         """Return the state without stress; see `Source.state`."""
         polynomial = np.polynomial.Polynomial(self.coefficients)
-        along, nothing = polynomial(z), np.zeros_like(z)
-        return ComplexState(polynomial.integ()(z), along, nothing, nothing.real, along.real)
+        along, zero = polynomial(z), np.zeros_like(z)
+        return ComplexState(polynomial.integ()(z), along, zero, zero.real, along.real)
 
 
 @dataclass(frozen=True)
 class LogarithmicExpansion:
-    """The thermal strain s log |z - centre| around a centre that lies in a hole of the body.
+    """The thermal strain s log |z - centre|, with a centre in a hole of the body.
 
     Parameters
     ----------
     strength : float [-]
     centre : complex [m]
     radii : two floats [m]
-        Of the circles around the centre, the inner first, that its state leaves free of traction.
+        Inner and outer radius of the circles around the centre that are free of traction.
     """
 
     strength: float
@@ -142,7 +142,7 @@ class LogarithmicExpansion:
 
 @dataclass(frozen=True)
 class ParticularSolution:
-    """The sum of the states that balance the forces and expansions inside a body.
+    """The sum of the states of several body forces and expansions.
 
     Parameters
     ----------
@@ -155,12 +155,12 @@ class ParticularSolution:
 
     @property
     def forces(self) -> ParticularSolution:
-        """Particular solution of the forces."""
+        """The part that belongs to forces."""
         return replace(self, sources=tuple(source for source in self.sources if not source.is_expansion))
 
     @property
     def expansions(self) -> ParticularSolution:
-        """Particular solution of the thermal strains."""
+        """The part that belongs to thermal strains."""
         return replace(self, sources=tuple(source for source in self.sources if source.is_expansion))
 
     def displacement(self, points: FloatArray) -> FloatArray:
@@ -187,7 +187,7 @@ class ParticularSolution:
         return self._state(points).expansion
 
     def energy(self, mesh: BoundaryMesh) -> float:
-        """Return the elastic energy [J/m] in a body, by integrals along rays from the centre of the expansions."""
+        """Return the elastic energy [J/m] in a body, integrated along rays from the centre of the expansions."""
         log = next((source for source in self.sources if isinstance(source, LogarithmicExpansion)), None)
         origin = np.zeros(2) if log is None else np.array([log.centre.real, log.centre.imag])
         xi, weights = gauss_legendre(_POINTS_ON_ELEMENTS)
@@ -195,11 +195,11 @@ class ParticularSolution:
         arms, normals = mesh.points(elements, xi) - origin, mesh.normals_at(elements, xi)
         swept = np.sum(arms * normals, axis=2) * mesh.jacobian(elements, xi) * weights
         total = 0.0
-        for place, weight in zip(*gauss_legendre(_POINTS_ON_RAYS), strict=True):
-            share = measure = np.full(swept.shape, 0.5 * (1.0 + float(place)))
+        for xi_on_ray, weight in zip(*gauss_legendre(_POINTS_ON_RAYS), strict=True):
+            share = measure = np.full(swept.shape, 0.5 * (1.0 + float(xi_on_ray)))
             if log is not None:
-                # rays begin on a circle around the centre, where a state may have no end: its parts on all of them
-                # cancel. Powers of the distance and of its logarithm are smooth along the logarithm.
+                # rays begin on a circle around the centre, because the state is singular there; the parts inside
+                # cancel. In the logarithm of the distance, powers and logarithms are smooth.
                 depth = np.log(norms(arms) / log.radii[0])
                 share = np.exp((share - 1.0) * depth)
                 measure = share**2 * depth
@@ -214,9 +214,9 @@ class ParticularSolution:
 
     def _state(self, points: FloatArray) -> ComplexState:
         z = points[:, 0] + 1j * points[:, 1]
-        none = np.zeros_like(z)
-        nothing = ComplexState(none, none, none, none.real, none.real)
-        return reduce(_sum, (source.state(z, self.material) for source in self.sources), nothing)
+        zero = np.zeros_like(z)
+        zero_state = ComplexState(zero, zero, zero, zero.real, zero.real)
+        return reduce(_sum, (source.state(z, self.material) for source in self.sources), zero_state)
 
 
 def _sum(first: ComplexState, second: ComplexState) -> ComplexState:

@@ -16,7 +16,7 @@ def rigid_motions(points: FloatArray, centre: FloatArray, length: float) -> Floa
     points : (n, 2) array [m]
     centre : (2,) array [m]
     length : float [m]
-        The rotation is 1/length [rad], which makes all three motions comparable.
+        The rotation is 1/length [rad], so that all three motions have comparable size.
 
     Returns
     -------
@@ -32,10 +32,10 @@ def rigid_motions(points: FloatArray, centre: FloatArray, length: float) -> Floa
 
 
 def admissible_modes(mesh: BoundaryMesh) -> tuple[int, ...]:
-    """Return which of the two translations and the rotation a body can make.
+    """Return which of the two translations and the rotation a body admits.
 
-    All of them, or those that its symmetry allows; none of an exterior, which is at rest at infinity. The forces on the
-    body do no work on them.
+    A body admits all three, or those that its symmetry allows. An exterior, which is at rest at infinity, admits none.
+    The forces on the body do no work on admissible motions.
     """
     if mesh.is_exterior:
         return ()
@@ -43,7 +43,7 @@ def admissible_modes(mesh: BoundaryMesh) -> tuple[int, ...]:
 
 
 def traction_free_modes(mesh: BoundaryMesh, points: FloatArray) -> FloatArray:
-    """Return the motions of a body that cause no tractions at all.
+    """Return the motions of a body that cause no tractions.
 
     Parameters
     ----------
@@ -61,7 +61,7 @@ def traction_free_modes(mesh: BoundaryMesh, points: FloatArray) -> FloatArray:
 
 
 def without_motion(mesh: BoundaryMesh, points: FloatArray, displacement: FloatArray) -> FloatArray:
-    """Return a displacement without the rigid motion that fits it best, which causes no strain.
+    """Return a displacement minus its best-fitting rigid motion, which causes no strain.
 
     Parameters
     ----------
@@ -71,7 +71,7 @@ def without_motion(mesh: BoundaryMesh, points: FloatArray, displacement: FloatAr
     Returns
     -------
     (n, 2) array [m]
-        For an exterior the displacement itself, since any motion of its boundary causes strain; see `admissible_modes`.
+        For an exterior the displacement itself, since every motion of its boundary causes strain.
     """
     motions = traction_free_modes(mesh, points)
     if not motions.shape[1]:

@@ -36,7 +36,7 @@ def check_operator(
         Naming the operator, the promise broken, and by how much.
     """
     name = type(operator).__name__
-    demand(operator.trial.mesh is operator.test.mesh, f"{name}: trial and test space live on different meshes")
+    demand(operator.trial.mesh is operator.test.mesh, f"{name}: trial and test space are defined on different meshes")
     demand(
         isinstance(operator.tags, frozenset) and all(isinstance(tag, Tag) for tag in operator.tags),
         f"{name}.tags is {operator.tags!r}, not a frozenset of Tag",

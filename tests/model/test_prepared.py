@@ -48,5 +48,5 @@ def test_supports_that_contradict_each_other_are_named_in_the_coordinates_of_the
         ),
         mesh=bk.MeshOptions(elements=40),
     )
-    with pytest.raises(bk.BemkitError, match=r"common point \(0.3, 1\): make them agree there"):
+    with pytest.raises(bk.BemkitError, match=r"common point \(0.3, 1\): give the same displacement there"):
         bk.run(scene)

@@ -8,7 +8,7 @@ from bemkit.arrays import ComplexArray, FloatArray
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.operators.collocation.curved_elements import CollocationPoints
 from bemkit.operators.collocation.gradient_reconstruction import GradientReconstruction
-from bemkit.operators.integrals.panels import Panels
+from bemkit.operators.integrals.element_geometry import ElementGeometry
 from bemkit.operators.material import Material
 
 
@@ -33,12 +33,12 @@ def collocation_matrices(
         free term 1/2.
     """
     n, whole = mesh.n_elements, mesh.whole
-    panels = Panels(whole)
+    geometry = ElementGeometry(whole)
     row, column = np.divmod(np.arange(n * whole.n_elements), whole.n_elements)
-    exact = CollocationPoints(panels, material, mesh.diameter).at(panels.centre[row], column, row == column)
+    exact = CollocationPoints(geometry, material, mesh.diameter).at(geometry.centre[row], column, row == column)
     p, conj_p, v, conj_v, s, conj_s = exact.reshape(6, n, whole.n_elements)
     if takes_slopes:
-        reconstruction = GradientReconstruction.of(whole, panels)
+        reconstruction = GradientReconstruction.of(whole, geometry)
         reconstruction.add_to(v, s, is_conjugate=False)
         reconstruction.add_to(conj_v, conj_s, is_conjugate=True)
     return _real(mesh, p, conj_p), _real(mesh, v, conj_v)

@@ -171,7 +171,7 @@ def test_mass_integrates_products() -> None:
 def test_spaces_that_do_not_fit_are_refused() -> None:
     mesh, other = l_shape(), l_shape()
     tractions, displacements = ConstantSpace(mesh), LinearSpace(mesh)
-    with pytest.raises(GeometryError, match="live on different meshes: build both on the same BoundaryMesh"):
+    with pytest.raises(GeometryError, match="are defined on different meshes: build both on the same BoundaryMesh"):
         single_layer(tractions, ConstantSpace(other), MATERIAL)
     with pytest.raises(GeometryError, match="hypersingular needs a continuous trial space, but ConstantSpace may jump"):
         hypersingular(tractions, displacements, MATERIAL)

@@ -31,9 +31,9 @@ from bemkit.geometry import (
 )
 from bemkit.geometry.neighbours import corner_nodes
 from bemkit.geometry.placement import Placement
+from bemkit.operators.integrals.element_geometry import ElementGeometry
 from bemkit.operators.integrals.inner import inner_integrals, inner_on_element
 from bemkit.operators.integrals.pairs import Degrees, PairIntegrals
-from bemkit.operators.integrals.panels import Panels
 from bemkit.operators.integrals.sweep import PairSweep
 from bemkit.operators.material import Material
 from bemkit.operators.rigid_modes import rigid_motions
@@ -99,7 +99,7 @@ INTEGRANDS = (  # of the vector d from the arc to the point, and the direction o
 
 @pytest.mark.parametrize("n_elements", slow_except((4, 64), 64))
 def test_inner_integrals_against_extended_precision(n_elements: int) -> None:
-    panels = Panels(discretise(Disk(1.3).outline(), n_elements=n_elements))
+    geometry = ElementGeometry(discretise(Disk(1.3).outline(), n_elements=n_elements))
     with mpmath.workdps(25):
         bend = mpmath.pi / n_elements
         scale = mpmath.mpc(0, 1) * bend * mpmath.mpf(1.3) * mpmath.expj(bend)
@@ -111,7 +111,7 @@ def test_inner_integrals_against_extended_precision(n_elements: int) -> None:
         for real, imaginary in POINTS:
             x = place(mpmath.mpc(real, imaginary))
             from_ends = [np.array([complex((x - place(end)) * scale)]) for end in (-1, 1)]
-            inner = inner_integrals(panels, Degrees(log=(0, 12), double=(0, 12)), np.array([0]), *from_ends)
+            inner = inner_integrals(geometry, Degrees(log=(0, 12), double=(0, 12)), np.array([0]), *from_ends)
             ends = [-1, real, 1] if -1 < real < 1 else [-1, 1]
             integrands = [cache(lambda t, f=f, x=x: f(x - place(t), direction(t))) for f in INTEGRANDS]
             for b in (1, 12):
@@ -128,10 +128,10 @@ def test_inner_integrals_against_extended_precision(n_elements: int) -> None:
 
 def test_principal_values_on_the_element_itself() -> None:
     # on a circle k is the constant -1 / (4 pi R), and log|x - y| = log(2 R |sin|)
-    panels = Panels(discretise(Disk(1.3).outline(), n_elements=8))
+    geometry = ElementGeometry(discretise(Disk(1.3).outline(), n_elements=8))
     bend = np.pi / 8
     for xi in (0.0, 0.6, -0.9):
-        inner = inner_on_element(panels, Degrees(log=(0, 1), double=(0, 2)), np.array([2]), xi)
+        inner = inner_on_element(geometry, Degrees(log=(0, 1), double=(0, 2)), np.array([2]), xi)
         assert inner.double[0][0] == pytest.approx(-bend, abs=1e-14)  # 2 pi k times the length 2 R bend / half
         assert inner.double[1][0] == pytest.approx(0.0, abs=1e-14)
         distance, weight = graded(60)
@@ -317,10 +317,10 @@ def test_curves_are_known_to_the_round_off_of_where_they_were_evaluated(centre: 
     drawn, placed = Disk(0.5, centre), Placement(centre, 30.0).mesh(at_home)
     moved = BoundaryMesh.transformed(at_home, shift=(-centre[0], -centre[1]))
     for far in (discretise(drawn.outline(), n_elements=96), placed, moved):
-        panels = Panels(far.unit)
-        assert panels.curved is not None
-        np.testing.assert_allclose(panels.half, Panels(at_home.unit).half, rtol=1e-13 * distance)
-        np.testing.assert_allclose(np.abs(panels.point(np.arange(96), 0.3)), 0.125**0.5, atol=1e-15 * distance)
+        geometry = ElementGeometry(far.unit)
+        assert geometry.curved is not None
+        np.testing.assert_allclose(geometry.half, ElementGeometry(at_home.unit).half, rtol=1e-13 * distance)
+        np.testing.assert_allclose(np.abs(geometry.point(np.arange(96), 0.3)), 0.125**0.5, atol=1e-15 * distance)
 
 
 @pytest.mark.parametrize("make", MESHES.values(), ids=MESHES)

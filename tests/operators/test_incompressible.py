@@ -140,7 +140,7 @@ def test_a_body_without_room_to_yield_is_named() -> None:
     # all sides but the bottom are clamped, and the bottom is the contact boundary
     clamped = np.setdiff1d(np.arange(mesh.n_elements), mesh.part("bottom"))
     with pytest.raises(
-        SingularMatrixError, match="no free boundary to make room, as supports and contact take all of it: leave"
+        SingularMatrixError, match="no free boundary, because supports and contact take all of it: leave"
     ):
         condense(
             elastic,

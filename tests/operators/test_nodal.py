@@ -77,7 +77,9 @@ def test_frames_are_orthonormal_and_hold_the_prescribed_value() -> None:
 def test_supports_that_contradict_each_other_name_part_and_point() -> None:
     mesh = square()
     supports = [clamp(mesh, "right", np.array([0.1, 0.0])), clamp(mesh, "top")]
-    with pytest.raises(ConflictingSupportsError, match=r"part 'right' and a neighbour .* \(1, 1\): make them agree"):
+    with pytest.raises(
+        ConflictingSupportsError, match=r"part 'right' and a neighbour .* \(1, 1\): give the same displacement"
+    ):
         supported(LinearSpace(mesh), supports)
     # element centres are shared by no one
     assert supported(ConstantSpace(mesh), supports).is_fixed.sum() == 16

@@ -17,7 +17,7 @@ from bemkit.geometry.errors import GeometryError
 from bemkit.geometry.neighbours import corner_nodes
 from bemkit.geometry.outline import Outline, Side
 from bemkit.geometry.spaces import BoundarySpace, ConstantSpace, LinearSpace, QuadraticSpace, dof_points
-from bemkit.operators.integrals.panels import Panels
+from bemkit.operators.integrals.element_geometry import ElementGeometry
 from bemkit.operators.material import Material, Plane
 from bemkit.operators.somigliana.fields import InteriorFields
 from bemkit.operators.somigliana.locate import PointNotInsideError
@@ -256,13 +256,13 @@ def test_derived_moments_hold_at_every_distance(distance: float, angle: float, h
 
 
 def test_powers_about_an_end_are_those_about_the_centre_shifted() -> None:
-    panels = Panels(straight_mesh())
+    geometry = ElementGeometry(straight_mesh())
     element = np.array([3, 3, 3])
     zeta = np.array([-0.9 + 0.2j, 1.1 + 0.3j, 0.2 + 0.3j])
-    x = panels.centre[element] + zeta * (panels.half * panels.tangent)[element]
-    about_ends = straight_gradient_moments(panels, x, element, 2)
+    x = geometry.centre[element] + zeta * (geometry.half * geometry.tangent)[element]
+    about_ends = straight_gradient_moments(geometry, x, element, 2)
     np.testing.assert_array_equal(about_ends.origin, [1, 2, 0])
-    about_centre = straight_gradient_moments(panels, x, element, 2, at_end=0.0)
+    about_centre = straight_gradient_moments(geometry, x, element, 2, at_end=0.0)
     e = np.array([-1.0, 1.0, 0.0])
     for name in ("reciprocal", "spread", "hyper", "twist"):
         m, expected = getattr(about_ends, name), getattr(about_centre, name)
@@ -300,7 +300,7 @@ def test_points_on_and_beside_arcs_are_told_apart() -> None:
 def test_data_that_do_not_fit_are_refused() -> None:
     mesh, other = straight_mesh(), straight_mesh()
     material, zeros = Material(1.0, 0.3), np.zeros((48, 2))
-    with pytest.raises(GeometryError, match="traction_space lives on another mesh"):
+    with pytest.raises(GeometryError, match="traction_space is defined on another mesh"):
         InteriorFields(mesh, material, LinearSpace(mesh), zeros, ConstantSpace(other), zeros)
     with pytest.raises(ValueError, match=r"displacement_dofs has the shape \(47, 2\): give \(48, 2\)"):
         InteriorFields(mesh, material, LinearSpace(mesh), zeros[1:], ConstantSpace(mesh), zeros)

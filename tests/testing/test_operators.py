@@ -142,7 +142,7 @@ def other_linear(matvec: Callable[[Any], Any], rmatvec: Callable[[Any], Any], n:
 @pytest.mark.parametrize(
     ("operator", "complaint"),
     [
-        (Handmade(np.eye(N), trial=ConstantSpace(OUTSIDE)), "trial and test space live on different meshes"),
+        (Handmade(np.eye(N), trial=ConstantSpace(OUTSIDE)), "trial and test space are defined on different meshes"),
         (Handmade(np.eye(N), tags={Tag.SYMMETRIC}), "not a frozenset of Tag"),
         (Handmade(np.eye(N), tags=frozenset({"symmetric"})), "not a frozenset of Tag"),
         (Handmade(np.eye(N), is_assembled=True), "is assembled before its matrix is asked for"),

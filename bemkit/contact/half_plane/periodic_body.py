@@ -52,7 +52,7 @@ class PeriodicBody(SurfaceBody):
 
     def stiffened(self, displacement: ComplexArray) -> ComplexArray:
         """Return the tractions (n_contact,) that hold displacements (n_contact,), those of other elements zero."""
-        return self.at_acting(self.elastic.held(self.on_surface(displacement)))
+        return self.at_acting(self.elastic.tractions_of(self.on_surface(displacement)))
 
     def solve(
         self, reduced: ReducedConditions, right: FloatArray, motions: ComplexArray, load: FloatArray

@@ -115,13 +115,15 @@ class SurfaceBody(LinearBody):
     @cached_property
     def _unit_motions(self) -> ComplexArray:
         """(3, n_elements) array: unit motions along x and y and a unit turn, all over the surface."""
-        at_elements = self.elastic.drive.motions_at(dof_points(self.elastic.displacement_space))
+        at_elements = self.elastic.far_motion.motions_at(dof_points(self.elastic.displacement_space))
         return np.asarray(np.einsum("c,ncm->mn", self.elastic.axes, at_elements))
 
     @cached_property
     def motions(self) -> ComplexArray:
         """(n_driven, n_acting) array: the motions that forces far away drive."""
-        return np.asarray(self._unit_motions[list(self.elastic.drive.driven)][:, self.acting] * self.turn.conj())
+        return np.asarray(
+            self._unit_motions[list(self.elastic.far_motion.load_controlled)][:, self.acting] * self.turn.conj()
+        )
 
     @cached_property
     def works(self) -> ComplexArray:
@@ -131,17 +133,17 @@ class SurfaceBody(LinearBody):
     @cached_property
     def load(self) -> FloatArray:
         """(n_driven,) array: the work of all given forces on the driven motions."""
-        drive = self.elastic.drive
+        far_motion = self.elastic.far_motion
         of_force = (self._unit_motions.conj() @ self.elastic.to_complex(self.force)).real
-        return np.asarray((np.array(drive.load) + of_force)[list(drive.driven)])
+        return np.asarray((np.array(far_motion.load) + of_force)[list(far_motion.load_controlled)])
 
     @cached_property
     def _displacement_at_rest(self) -> ComplexArray:
         """(n_elements,) array [m]: displacements under the given forces and motions."""
-        elastic, drive = self.elastic, self.elastic.drive
+        elastic, far_motion = self.elastic, self.elastic.far_motion
         of_force = elastic.to_complex(elastic.strain_displacement(self.force))
-        along = elastic.to_complex(dof_points(elastic.displacement_space) - np.array(drive.centre)).real
-        return np.asarray(of_force + np.array(drive.motion) @ self._unit_motions + drive.strain * along)
+        along = elastic.to_complex(dof_points(elastic.displacement_space) - np.array(far_motion.centre)).real
+        return np.asarray(of_force + np.array(far_motion.motion) @ self._unit_motions + far_motion.strain * along)
 
     @cached_property
     def rest(self) -> ComplexArray:
@@ -259,7 +261,7 @@ class SurfaceBody(LinearBody):
         elastic, n = self.elastic, self.n_contact
         of_traction = self.on_surface(traction)
         displacement = self._displacement_at_rest + elastic.displaced(of_traction)
-        displacement = displacement + amounts @ self._unit_motions[list(elastic.drive.driven)]
+        displacement = displacement + amounts @ self._unit_motions[list(elastic.far_motion.load_controlled)]
         displacement[self.nodes.nodes] = as_complex(state.displacement) * self.turn[:n]
         force = self.force + elastic.mesh.lengths[:, None] * elastic.to_vectors(of_traction)
         return elastic.to_vectors(displacement), force
@@ -325,8 +327,8 @@ def _fitted(columns: Sequence[FloatArray], values: FloatArray) -> tuple[FloatArr
 
 def _check_resisted(body: SurfaceBody) -> None:
     """Refuse loads far away that drive a motion which no direction resists, and a turn about one node."""
-    conditions, driven = body.conditions, body.elastic.drive.driven
-    along = conditions.frame @ body.elastic.drive.motions_at(dof_points(body.elastic.displacement_space))
+    conditions, driven = body.conditions, body.elastic.far_motion.load_controlled
+    along = conditions.frame @ body.elastic.far_motion.motions_at(dof_points(body.elastic.displacement_space))
     motions = along[~conditions.is_free][:, list(driven)]
     least = _ROUND_OFF * max(float(np.abs(motions).max(initial=0.0)), 1.0)
     if np.linalg.matrix_rank(motions, least) < len(driven):

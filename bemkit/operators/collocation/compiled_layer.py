@@ -1,7 +1,7 @@
-"""The layers of straight elements as loops for numba; import it through `compiled`.
+"""The layers of straight elements as loops for numba; import them through `compiled`.
 
-The formulas are those of `layers`. A loop without branches, which the compiler runs several points at a time, takes the
-series as if all points were far from the element; a second loop replaces the points that are near.
+The formulas are those of `layers`. A vectorised loop without branches evaluates the far series at all points; a second
+loop replaces the values at near points.
 """
 
 from __future__ import annotations
@@ -18,14 +18,14 @@ from bemkit.operators.collocation.layers import FAR, REST, SERIES, Constants, El
 _FAST: dict[str, Any] = {"error_model": "numpy", "fastmath": {"contract", "nsz", "nnan", "ninf", "arcp"}}
 Ends: TypeAlias = tuple[complex, complex]
 BLOCK = 32
-"""Points whose factors are at hand together, in the cache."""
+"""Points whose factors are in the cache together."""
 _S7, _S6, _S5, _S4, _S3, _S2, _S1 = SERIES
 _R7, _R6, _R5, _R4, _R3, _R2, _R1 = REST
 
 
 @numba.njit(inline="always", error_model="numpy")
 def _shape(start: complex, end: complex) -> tuple[float, complex, complex, complex]:
-    """Return the half length, the tangent, the middle, and the factor to local coordinates."""
+    """Return the half length, the tangent, the midpoint, and the factor to local coordinates."""
     span = end - start
     half = 0.5 * math.sqrt(span.real * span.real + span.imag * span.imag)
     tangent = span * (0.5 / half)
@@ -34,7 +34,7 @@ def _shape(start: complex, end: complex) -> tuple[float, complex, complex, compl
 
 @numba.njit(inline="always", error_model="numpy")
 def _far(zeta: complex) -> tuple[complex, complex, complex, complex]:
-    """Return 1 / zeta, its square and both series; anything finite where zeta is near."""
+    """Return 1 / zeta, its square and both series; at near points any finite values."""
     scale = 1.0 / max(zeta.real * zeta.real + zeta.imag * zeta.imag, FAR * FAR)
     inverse = complex(zeta.real * scale, -zeta.imag * scale)
     q = inverse * inverse
@@ -44,15 +44,15 @@ def _far(zeta: complex) -> tuple[complex, complex, complex, complex]:
 
 
 @numba.njit(inline="always", error_model="numpy")
-def _near(x: complex, ends: Ends, to_local: complex, is_own: bool) -> tuple[complex, complex, float, complex]:
-    """Return zeta, L, half the logarithms of both squared distances, and zeta^2 - 1."""
+def _near(x: complex, ends: Ends, to_local: complex, is_midpoint: bool) -> tuple[complex, complex, float, complex]:
+    """Return zeta, L, the sum of the logarithms of both distances, and zeta^2 - 1."""
     arm, other = x - ends[0], x - ends[1]
     plus, minus = arm * to_local, other * to_local
     squared, other_squared = arm.real**2 + arm.imag**2, other.real**2 + other.imag**2
     log, other_log = 0.5 * math.log(squared), 0.5 * math.log(other_squared)
-    if is_own:
+    if is_midpoint:
         return 0j, complex(log - other_log, 0.0), log + other_log, -1.0 + 0j
-    # near an end the coordinate across the element is known only from there
+    # eta is accurate only if measured from the nearer end node
     zeta = complex(0.5 * (plus.real + minus.real), plus.imag if squared < other_squared else minus.imag)
     turn = arm.conjugate() * other
     return zeta, complex(log - other_log, -math.atan2(turn.imag, turn.real)), log + other_log, plus * minus
@@ -70,7 +70,13 @@ def _is_near(x: FloatArray, y: FloatArray, ends: Ends) -> bool:
 
 @numba.njit(**_FAST)
 def _single(
-    constants: Constants, x: FloatArray, y: FloatArray, own: IntArray, element: int, ends: Ends, table: FloatArray
+    constants: Constants,
+    x: FloatArray,
+    y: FloatArray,
+    centred_on: IntArray,
+    element: int,
+    ends: Ends,
+    table: FloatArray,
 ) -> None:
     """Write the factors of p and conj(p), real and imaginary parts, at a block of points into a table (4 BLOCK,)."""
     single, _, nu, log_length = constants
@@ -92,7 +98,7 @@ def _single(
     for i in range(BLOCK if _is_near(x, y, ends) else 0):
         away = complex(x[i] - centre.real, y[i] - centre.imag) * to_local
         if away.real * away.real + away.imag * away.imag <= FAR * FAR:
-            zeta, log, logs, _ = _near(complex(x[i], y[i]), ends, to_local, own[i] == element)
+            zeta, log, logs, _ = _near(complex(x[i], y[i]), ends, to_local, centred_on[i] == element)
             logs += (zeta * log).real - 2.0 * math.log(half)
             value = turn * complex(1.0 + zeta.imag * log.imag, zeta.imag * log.real)
             table[i] = a * (constant - kappa * logs)
@@ -101,7 +107,13 @@ def _single(
 
 @numba.njit(**_FAST)
 def _double(
-    constants: Constants, x: FloatArray, y: FloatArray, own: IntArray, element: int, ends: Ends, table: FloatArray
+    constants: Constants,
+    x: FloatArray,
+    y: FloatArray,
+    centred_on: IntArray,
+    element: int,
+    ends: Ends,
+    table: FloatArray,
 ) -> None:
     """Write the factors of v, s, conj(v) and conj(s) at a block of points into a table (8 BLOCK,)."""
     _, double, nu, _ = constants
@@ -119,7 +131,7 @@ def _double(
     for i in range(BLOCK if _is_near(x, y, ends) else 0):
         away = complex(x[i] - centre.real, y[i] - centre.imag) * to_local
         if away.real * away.real + away.imag * away.imag <= FAR * FAR:
-            zeta, log, _, product = _near(complex(x[i], y[i]), ends, to_local, own[i] == element)
+            zeta, log, _, product = _near(complex(x[i], y[i]), ends, to_local, centred_on[i] == element)
             scale = 2.0 / (product.real * product.real + product.imag * product.imag)
             quotient, moment = scale * product.conjugate(), zeta * log - 2.0
             on_v = turn * zeta.imag * quotient.conjugate()
@@ -132,7 +144,7 @@ def _double(
 
 @numba.njit(**_FAST)
 def _add(weights: ComplexArray, table: FloatArray, total: FloatArray) -> None:
-    """Add the factors of the densities at a block of points, times weights, to those of an unknown (4 BLOCK,)."""
+    """Add weights times the factors of the densities at a block of points to the sums of an unknown (4 BLOCK,)."""
     a, b = weights[0].real, weights[0].imag
     if weights.size == 1:
         for i in range(BLOCK):
@@ -154,7 +166,7 @@ def _add(weights: ComplexArray, table: FloatArray, total: FloatArray) -> None:
 
 @numba.njit(**_FAST)
 def _store(total: FloatArray, is_y: int, out: ComplexArray) -> None:
-    """Store what a unit along x, 1, or along y, i, causes."""
+    """Store the displacement of a unit unknown: 1 along x, or i along y."""
     for i in range(out.size):
         on, conjugate = complex(total[i], total[i + BLOCK]), complex(total[i + 2 * BLOCK], total[i + 3 * BLOCK])
         if is_y:
@@ -164,24 +176,24 @@ def _store(total: FloatArray, is_y: int, out: ComplexArray) -> None:
 
 @numba.njit(cache=True, nogil=True, **_FAST)
 def compiled_layer(
-    constants: Constants, is_double: bool, x: ComplexArray, own: IntArray, elements: Elements, unknowns: Unknowns
+    constants: Constants, is_double: bool, x: ComplexArray, centred_on: IntArray, elements: Elements, unknowns: Unknowns
 ) -> ComplexArray:
-    """Return what `layers.straight_layer` returns."""
+    """Return the same as `layers.straight_layer`."""
     start, end = elements
     n_densities = 2 if is_double else 1
     out = np.empty((unknowns.columns.size, x.size), np.complex128)
     tables, total = np.empty((start.size, 4 * n_densities * BLOCK)), np.empty(4 * BLOCK)
-    block_x, block_y, block_own = np.empty(BLOCK), np.empty(BLOCK), np.empty(BLOCK, np.int64)
+    block_x, block_y, block_centred_on = np.empty(BLOCK), np.empty(BLOCK), np.empty(BLOCK, np.int64)
     for begin in range(0, x.size, BLOCK):
-        # loops over whole blocks have no rest; the last point is repeated
+        # the last point is repeated to fill a block
         for i in range(BLOCK):
             at = min(begin + i, x.size - 1)
-            block_x[i], block_y[i], block_own[i] = x[at].real, x[at].imag, own[at]
+            block_x[i], block_y[i], block_centred_on[i] = x[at].real, x[at].imag, centred_on[at]
         for e in range(start.size):
             if is_double:
-                _double(constants, block_x, block_y, block_own, e, (start[e], end[e]), tables[e])
+                _double(constants, block_x, block_y, block_centred_on, e, (start[e], end[e]), tables[e])
             else:
-                _single(constants, block_x, block_y, block_own, e, (start[e], end[e]), tables[e])
+                _single(constants, block_x, block_y, block_centred_on, e, (start[e], end[e]), tables[e])
         ready = -1
         for c in range(unknowns.columns.size):
             unknown = unknowns.columns[c] // 2

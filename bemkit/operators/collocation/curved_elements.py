@@ -1,13 +1,13 @@
-"""Displacements that constant and linear densities on elements of any shape cause anywhere, by quadrature.
+"""Displacements of constant and linear densities on elements of any shape, by quadrature.
 
-Far from an element a Gauss rule on its arc serves, with few points many half lengths away; near it the integrals are
-closed forms (`CollocationPoints`). With y on the arc, rho = x - y, f the density and dy = tangent ds:
+Far from an element a Gauss rule on its arc is used, with fewer points at a large distance; near it the integrals are
+closed forms (`CollocationPoints`). With y on the arc, rho = x - y, the density f and dy = tangent ds:
 
     U f p = A sum f [(1/2 - kappa log|rho / r0|) p + (rho / conj(rho)) conj(p) / 2] ds,      A = 1 / (8 pi mu (1 - nu))
     T f v = B sum [(2 - 2 nu) Im - i (1 - 2 nu) Re](f dy / rho) v + B sum (rho / conj(rho)) Im(dy / rho) conj(f v),
 
-where f is real in the first and B = 1 / (4 pi (1 - nu)); the slope s means the density s p(t), p the polynomial of
-the element (`bemkit.operators.integrals.curved_panels`).
+where B = 1 / (4 pi (1 - nu)), and f is real in the first equation. A slope s is the density s p(t) with the polynomial
+p of the element (`bemkit.operators.integrals.curved_geometry`).
 """
 
 from __future__ import annotations
@@ -21,22 +21,22 @@ from bemkit.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from bemkit.geometry.quadrature import gauss_legendre
 from bemkit.operators import kernels
 from bemkit.operators.collocation.layers import Constants
-from bemkit.operators.integrals import curved_panels
+from bemkit.operators.integrals import curved_geometry
+from bemkit.operators.integrals.element_geometry import ElementGeometry
 from bemkit.operators.integrals.inner import inner_integrals, inner_on_element, store
 from bemkit.operators.integrals.pairs import Degrees, Inner
-from bemkit.operators.integrals.panels import Panels
 from bemkit.operators.material import Material
 
 CURVED_DISTANCE = 4.5
-"""Curved elements farther than this take a Gauss rule; the distance is measured in the parameter (`Panels.reach`)."""
+"""Distance in the parameter (`ElementGeometry.distance_at`) from which on curved elements take a Gauss rule."""
 CURVED_POINTS = 8
-"""Points of that rule: its error is about (4.5 + sqrt(4.5^2 - 1))^-16, below 1e-15."""
+"""Points of that rule, with an error of about (4.5 + sqrt(4.5^2 - 1))^-16, below 1e-15."""
 _FAR, _FEW_POINTS = 30.0, 4
-"""From so many half lengths on so few points do: their error is about (2 * 30)^-8, below 1e-14."""
+"""Distance from which on a smaller rule is used, with an error of about (2 * 30)^-8, below 1e-14."""
 
 
 class _Rule(NamedTuple):
-    """Points y, steps dy and places p on all elements, (n_elements, n_points) complex arrays."""
+    """Points y, steps dy and values of p on all elements, (n_elements, n_points) complex arrays."""
 
     y: ComplexArray
     dy: ComplexArray
@@ -45,19 +45,19 @@ class _Rule(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class CurvedElements:
-    """Elements in the order of a tree.
+    """Straight and curved elements in the order of a tree.
 
     Parameters
     ----------
     constants : Constants
     points : CollocationPoints
-        Of the mesh.
+        Closed forms on the elements of the mesh.
     order : (n_elements,) array
-        The element of the mesh at each place.
+        The element of the mesh at each position.
     near, far : (n_elements,) arrays [m]
-        Distances from the middle within which no Gauss rule serves, and from which on the smaller one does.
+        Distance from the midpoint below which closed forms are used, and above which the smaller rule is used.
     rule, small_rule : _Rule
-        By place.
+        Gauss rules on all elements.
     """
 
     constants: Constants
@@ -69,55 +69,54 @@ class CurvedElements:
     small_rule: _Rule
 
     @classmethod
-    def of(cls, panels: Panels, material: Material, order: IntArray, log_length: float) -> CurvedElements:
+    def of(cls, geometry: ElementGeometry, material: Material, order: IntArray, log_length: float) -> CurvedElements:
         """Return the elements of a mesh."""
-        constants, points = Constants.of(material, log_length), CollocationPoints(panels, material, log_length)
-        near, far = ((panels.half * panels.reach(distance))[order] for distance in (CURVED_DISTANCE, _FAR))
-        rules = (_rule(panels, order, n_points) for n_points in (CURVED_POINTS, _FEW_POINTS))
+        constants, points = Constants.of(material, log_length), CollocationPoints(geometry, material, log_length)
+        near, far = ((geometry.half * geometry.distance_at(distance))[order] for distance in (CURVED_DISTANCE, _FAR))
+        rules = (_rule(geometry, order, n_points) for n_points in (CURVED_POINTS, _FEW_POINTS))
         return cls(constants, points, order, near, far, *rules)
 
-    def factors(self, is_double: bool, x: ComplexArray, places: IntArray, elements: IntArray) -> ComplexArray:
-        """Return the factors (n, 2 or 4, n_points) of the densities on some elements; see `layers.straight_factors`.
+    def factors(self, is_double: bool, x: ComplexArray, centred_on: IntArray, elements: IntArray) -> ComplexArray:
+        """Return the factors (n, 2 or 4, n_points) of densities on some elements; see `layers.straight_factors`.
 
         Parameters
         ----------
         is_double : bool
         x : (n_points,) complex array
-        places : (n_points,) array
-            The element in whose middle the point is, or another number; there T is a principal value.
+        centred_on : (n_points,) array
+            The element whose midpoint is x, where T is a principal value; otherwise any other number.
         elements : (n,) array
-            By place.
         """
-        panels, numbers = self.points.panels, self.order[elements]
-        distance = np.abs(x - panels.centre[numbers][:, None])
+        geometry, mesh_elements = self.points.geometry, self.order[elements]
+        distance = np.abs(x - geometry.centre[mesh_elements][:, None])
         is_far = distance.min(axis=1, initial=np.inf) > self.far[elements]
         result = np.empty((elements.size, 4 if is_double else 2, x.size), complex)
-        for some, rule in ((np.flatnonzero(~is_far), self.rule), (np.flatnonzero(is_far), self.small_rule)):
-            with np.errstate(all="ignore"):  # close pairs may overflow here; they are replaced
-                arcs = _Rule(*(of[elements[some]] for of in rule))
-                result[some] = _gauss_layer(self.constants, is_double, x, arcs)
+        for chosen, rule in ((np.flatnonzero(~is_far), self.rule), (np.flatnonzero(is_far), self.small_rule)):
+            with np.errstate(all="ignore"):  # near pairs may overflow here; they are replaced
+                arcs = _Rule(*(values[elements[chosen]] for values in rule))
+                result[chosen] = _gauss_layer(self.constants, is_double, x, arcs)
         element, point = np.nonzero(distance < self.near[elements][:, None])
         if element.size:
-            exact = self.points.at(x[point], numbers[element], places[point] == elements[element])
+            exact = self.points.at(x[point], mesh_elements[element], centred_on[point] == elements[element])
             result[element, :, point] = (exact[[2, 4, 3, 5]] if is_double else exact[:2]).T
         return result
 
 
-def _rule(panels: Panels, order: IntArray, n_points: int) -> _Rule:
-    """Return the Gauss rule on arcs."""
-    polynomials, scale = panels.polynomials(order), (panels.half * panels.tangent)[order]
-    slopes = curved_panels.derivative(polynomials)
+def _rule(geometry: ElementGeometry, order: IntArray, n_points: int) -> _Rule:
+    """Return the Gauss rule on the arcs of all elements."""
+    polynomials, scale = geometry.polynomials(order), (geometry.half * geometry.tangent)[order]
+    slopes = curved_geometry.derivative(polynomials)
     y, dy, p = np.empty((3, order.size, n_points), complex)
     for k, (t, weight) in enumerate(zip(*gauss_legendre(n_points), strict=True)):
-        place = np.full(order.size, t + 0j)
-        p[:, k] = curved_panels.evaluate(polynomials, place)
-        y[:, k] = panels.centre[order] + scale * p[:, k]
-        dy[:, k] = weight * scale * curved_panels.evaluate(slopes, place)
+        parameter = np.full(order.size, t + 0j)
+        p[:, k] = curved_geometry.evaluate(polynomials, parameter)
+        y[:, k] = geometry.centre[order] + scale * p[:, k]
+        dy[:, k] = weight * scale * curved_geometry.evaluate(slopes, parameter)
     return _Rule(y, dy, p)
 
 
 def _gauss_layer(constants: Constants, is_double: bool, x: ComplexArray, rule: _Rule) -> ComplexArray:
-    """Return the factors of the densities by a Gauss rule."""
+    """Return the factors of densities from a Gauss rule."""
     nu = constants.poisson_ratio
     result = np.zeros((len(rule.y), 4 if is_double else 2, x.size), complex)
     for y, dy, p in zip(rule.y.T[:, :, None], rule.dy.T[:, :, None], rule.p.T[:, :, None], strict=True):
@@ -141,59 +140,59 @@ def _gauss_layer(constants: Constants, is_double: bool, x: ComplexArray, rule: _
 
 @dataclass(frozen=True, eq=False)
 class CollocationPoints:
-    """Evaluates listed pairs of points and elements, exactly at any distance.
+    """Closed forms for listed pairs of points and elements, exact at any distance.
 
     Parameters
     ----------
-    panels : Panels
+    geometry : ElementGeometry
     material : Material
     r0 : float [m]
-        Unit of length of the logarithm.
+        Unit of length in the logarithm.
     """
 
-    panels: Panels
+    geometry: ElementGeometry
     material: Material
     r0: float
 
-    def at(self, x: ComplexArray, elements: IntArray, is_own: BoolArray) -> ComplexArray:
+    def at(self, x: ComplexArray, elements: IntArray, is_midpoint: BoolArray) -> ComplexArray:
         """Return the factors (6, n) of p, conj(p), v, conj(v), s and conj(s) for pairs of points and elements.
 
         Parameters
         ----------
         x : (n,) complex array
         elements : (n,) array
-        is_own : (n,) bool array
-            Whether the point is the middle of the element.
+        is_midpoint : (n,) bool array
+            Whether the point is the midpoint of the element.
         """
         result = np.zeros((6, elements.size), complex)
-        is_straight = self.panels.is_straight[elements]
+        is_straight = self.geometry.is_straight[elements]
         for chosen in (np.flatnonzero(is_straight), np.flatnonzero(~is_straight)):
             if chosen.size:
-                result[:, chosen] = self._factors(x[chosen], elements[chosen], is_own[chosen])
+                result[:, chosen] = self._factors(x[chosen], elements[chosen], is_midpoint[chosen])
         return result
 
-    def _factors(self, x: ComplexArray, elements: IntArray, is_own: BoolArray) -> ComplexArray:
+    def _factors(self, x: ComplexArray, elements: IntArray, is_midpoint: BoolArray) -> ComplexArray:
         """Return the factors of pairs whose elements are all straight or all curved."""
-        panels, nu, kappa = self.panels, self.material.effective_poisson_ratio, self.material.kappa
-        from_start, from_end = x - panels.start[elements], x - panels.end[elements]
-        plus, minus = from_start * panels.to_local[elements], from_end * panels.to_local[elements]
-        is_straight = bool(panels.is_straight[elements[0]])
-        polynomials = panels.polynomials(elements)[: 2 if is_straight else None]
+        geometry, nu, kappa = self.geometry, self.material.effective_poisson_ratio, self.material.kappa
+        from_start, from_end = x - geometry.start[elements], x - geometry.end[elements]
+        plus, minus = from_start * geometry.to_local[elements], from_end * geometry.to_local[elements]
+        is_straight = bool(geometry.is_straight[elements[0]])
+        polynomials = geometry.polynomials(elements)[: 2 if is_straight else None]
         highest = len(polynomials) - 1
         degrees = Degrees(log=(0, highest - 1), double=(0, highest))
-        inner = inner_integrals(panels, degrees, elements, from_start, from_end)
-        if is_own.any():
-            store(inner, is_own, inner_on_element(panels, degrees, elements[is_own], 0.0))
+        inner = inner_integrals(geometry, degrees, elements, from_start, from_end)
+        if is_midpoint.any():
+            store(inner, is_midpoint, inner_on_element(geometry, degrees, elements[is_midpoint], 0.0))
             if is_straight:
-                plus[is_own], minus[is_own] = 1.0, -1.0
-        # the shorter arm knows the coordinate across the element better
+                plus[is_midpoint], minus[is_midpoint] = 1.0, -1.0
+        # eta is more accurate if measured from the nearer end
         eta = np.where(np.abs(plus) < np.abs(minus), plus.imag, minus.imag)
         log_ratio = np.log(np.abs(plus)) - np.log(np.abs(minus))
-        # the difference of rho / conj(rho) between the ends, without cancellation
+        # difference of rho / conj(rho) between the ends, without cancellation
         quotient_change = (plus - minus).real * eta / (plus * minus).conj()
-        half, b = panels.half[elements], -1.0 / (4.0 * np.pi * (1.0 - nu))
+        half, b = geometry.half[elements], -1.0 / (4.0 * np.pi * (1.0 - nu))
         a = half / (8.0 * np.pi * self.material.shear_modulus * (1.0 - nu))
-        turn, angle, ratio = panels.tangent[elements] ** 2, 0.5 / np.pi, b * (1.0 - 2.0 * nu)
+        turn, angle, ratio = geometry.tangent[elements] ** 2, 0.5 / np.pi, b * (1.0 - 2.0 * nu)
         double, log_moment, quotient_moment = _moments_by_parts(inner, polynomials, plus, minus)
         return np.array(
             [
@@ -210,7 +209,10 @@ class CollocationPoints:
 def _moments_by_parts(
     inner: Inner, polynomials: ComplexArray, plus: ComplexArray, minus: ComplexArray
 ) -> tuple[FloatArray | ComplexArray, FloatArray | ComplexArray, ComplexArray]:
-    """Return the moments from inner integrals and what the end points `plus` and `minus` away give."""
+    """Return the moments of the linear density by partial integration.
+
+    `plus` and `minus` are the local coordinates of the point relative to start and end of the element.
+    """
     coefficients = kernels.legendre_of_monomials(len(polynomials) - 1).T @ polynomials
     slopes = np.polynomial.legendre.legder(coefficients)
     signs = (-1.0) ** np.arange(len(coefficients))  # P_k at the start; it is one at the end

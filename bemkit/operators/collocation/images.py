@@ -1,4 +1,4 @@
-"""Boundary equations of a symmetric body: those of the whole body with each unknown joined to its images."""
+"""Boundary equations of a symmetric body on one half, folded from those of the whole body."""
 
 from __future__ import annotations
 
@@ -16,19 +16,19 @@ from bemkit.operators.material import Material
 
 @dataclass(frozen=True, eq=False)
 class FoldedEquations:
-    """Equations of the half of a body, by symmetry those of the whole; see `BoundaryEquations`.
+    """Equations of one half of a symmetric body; see `BoundaryEquations`.
 
-    Far from a cluster its unknowns are seen without their images: what these cause beyond a line is the image of what
-    the unknowns cause, and lies as far from the cluster at least.
+    Far fields of a cluster omit its images: the field of an image is the image of the field, and is at least as far
+    from the cluster.
 
     Parameters
     ----------
     whole : BoundaryEquations
-        Of the body and its images, the nodes of the half first, then those of each image in the same order.
+        Equations of the whole body: the nodes of the half first, then those of each image in the same order.
     border : Border
-        Of the half.
+        Border of the half.
     images : (n_images, 2) array
-        The signs of the components in each image, the body itself first.
+        Signs of the components in each image; the first image is the body itself.
     """
 
     whole: BoundaryEquations
@@ -56,18 +56,18 @@ class FoldedEquations:
         return self.whole.lengths[: self.n]
 
     def block(self, rows: IntArray, columns: IntArray) -> FloatArray:
-        """Return entries (n_rows, n_columns): what the unknowns cause together with their images."""
+        """Return entries (n_rows, n_columns) of unknowns together with their images."""
         result = self.whole.block(rows, columns)
-        for number, signs in enumerate(self.images[1:], 1):
-            result = result + self.whole.block(rows, columns + 4 * number * self.n) * signs[columns % 2]
+        for image, signs in enumerate(self.images[1:], 1):
+            result = result + self.whole.block(rows, columns + 4 * image * self.n) * signs[columns % 2]
         return result
 
     def fields(self, x: ComplexArray, columns: IntArray) -> FloatArray:
-        """Return displacements (2 n_points, n_columns) that columns cause without their images."""
+        """Return the displacements (2 n_points, n_columns) of columns without their images."""
         return self.whole.fields(x, columns)
 
     def under_forces(self, x: ComplexArray, rows: IntArray) -> FloatArray:
-        """Return what rows feel of unit forces, (2 n_points, n_rows)."""
+        """Return the displacements (2 n_points, n_rows) at rows under unit forces."""
         return self.whole.under_forces(x, rows)
 
     def residual(self, nodes: IntArray, traction: FloatArray, displacement: FloatArray) -> FloatArray:
@@ -77,10 +77,10 @@ class FoldedEquations:
 
 
 def displacement_rows(equations: BoundaryEquations, nodes: IntArray, value_of_one: float) -> FloatArray:
-    """Return all displacement columns (2 n_rows, 2 n) at some nodes, such that translations keep their values exactly.
+    """Return all displacement columns (2 n_rows, 2 n) at some nodes, with exact values for translations.
 
-    An element of length h at coordinates of size one has its midpoint to eps / h only, and the tractions there feel
-    that divided by h again unless a translation causes none. So the own block of a node sets the sums of its rows.
+    The midpoint of an element of length h has a relative round-off of eps / h, which the tractions there divide by h
+    again. So the diagonal block of a node is chosen such that a translation has its exact value.
 
     Parameters
     ----------
@@ -88,11 +88,11 @@ def displacement_rows(equations: BoundaryEquations, nodes: IntArray, value_of_on
     nodes : (n_rows,) array
         Ascending.
     value_of_one : float
-        What a displacement of one everywhere gives: 0 for a body, 1 for an exterior.
+        Value of a unit translation: 0 for a body, 1 for an exterior.
     """
     n, rows = equations.points.size, (2 * nodes[:, None] + np.arange(2)).ravel()
     columns = (4 * np.arange(n)[:, None] + np.array([2, 3])).ravel()
-    # by columns, as blocks are stored: (2 n, 2 n_rows)
+    # transposed, as blocks are stored: (2 n, 2 n_rows)
     if isinstance(equations, FoldedEquations):
         parts = [equations.whole.block(rows, columns + 4 * k * n).T for k in range(len(equations.images))]
         by_column = np.sum(
@@ -102,8 +102,8 @@ def displacement_rows(equations: BoundaryEquations, nodes: IntArray, value_of_on
         parts = [equations.block(rows, columns).T]
         by_column = parts[0]
     sums = np.sum([part.reshape(n, 2, -1).sum(axis=0) for part in parts], axis=0).reshape(2, -1, 2)
-    own = by_column.reshape(n, 2, nodes.size, 2)
-    own[nodes, :, np.arange(nodes.size)] += value_of_one * np.eye(2) - sums.transpose(1, 0, 2)
+    blocks = by_column.reshape(n, 2, nodes.size, 2)
+    blocks[nodes, :, np.arange(nodes.size)] += value_of_one * np.eye(2) - sums.transpose(1, 0, 2)
     return np.asarray(by_column.T)
 
 
@@ -120,7 +120,7 @@ def collocation_equations(
         The element at each position of a tree.
     takes_slopes : bool
     layer : Layer, optional
-        What evaluates the layers of straight elements; by default the compiled one for many elements.
+        Evaluates the layers of straight elements; by default the compiled layer if there are many elements.
     """
     border = collocation_border(mesh, material, order, takes_slopes=takes_slopes)
     if mesh.symmetry is None:

@@ -1,16 +1,17 @@
-"""Displacements that constant and linear densities on straight elements cause anywhere, in closed form.
+"""Displacements of constant and linear densities on straight elements at any point, in closed form.
 
-In complex notation, with the element from a to b, its tangent tau and half length l, zeta = (x - c) / (l tau) = xi + i
-eta, lambda = log(|x - a| / |x - b|), theta the angle from x - a to x - b and L = lambda - i theta:
+Complex notation: the element runs from a to b with centre c, tangent tau and half length l. A point x has the local
+coordinate zeta = (x - c) / (l tau) = xi + i eta. With lambda = log(|x - a| / |x - b|), the angle theta from x - a to
+x - b, and L = lambda - i theta, the displacements are
 
     U p = A l ([1 - kappa (2 log(l / r0) + J)] p + tau^2 [1 + i eta conj(L)] conj(p)),     A = 1 / (8 pi mu (1 - nu))
     T v = -B ([(2 - 2 nu) theta + i (1 - 2 nu) lambda] v + tau^2 eta conj(G) conj(v)),     B = 1 / (4 pi (1 - nu))
 
 with J = log|zeta^2 - 1| - 2 + xi lambda + eta theta and G = 2 / (zeta^2 - 1). For a density s times the local
-coordinate, zeta L - 2 takes the place of L, and -L + 2 zeta / (zeta^2 - 1) that of G.
+coordinate, zeta L - 2 replaces L, and -L + 2 zeta / (zeta^2 - 1) replaces G.
 
-Far from the element differences of logarithms would lose their digits, which tight skeletons mistake for structure:
-there L = 2 sum zeta^-(2k+1) / (2k+1), and the others follow from the same sum.
+Far from the element the difference of logarithms would lose digits, and skeletons of small tolerance would resolve the
+round-off. There L = 2 sum zeta^-(2k+1) / (2k+1), and the other functions follow from the same sum.
 """
 
 from __future__ import annotations
@@ -25,14 +26,14 @@ from bemkit.operators.material import Material
 
 Values = TypeVar("Values", FloatArray, ComplexArray)
 _PAIRS = 8192
-"""Pairs of points and elements that are evaluated at a time, so that they stay in the cache."""
+"""Pairs of points and elements that are evaluated at a time, to stay in the cache."""
 FAR = 16.0
-"""Half lengths of the element from which on the series is taken."""
+"""Distance in half lengths of the element from which on the series is used."""
 _ORDERS = range(7, 0, -1)
 SERIES = tuple(1.0 / (2 * k + 1) for k in _ORDERS)
-"""Factors of the series of L, the last one first: what follows is below 10^-20."""
+"""Factors of the series of L, highest order first; the remainder is below 10^-20."""
 REST = tuple(2.0 * k / (2 * k + 1) for k in _ORDERS)
-"""Differences of a geometric series from it, for the moments."""
+"""Factors of a geometric series minus those of L, for the moments."""
 
 
 class Constants(NamedTuple):
@@ -45,9 +46,9 @@ class Constants(NamedTuple):
     double : float [-]
         B = 1 / (4 pi (1 - nu)).
     poisson_ratio : float [-]
-        Of plane strain.
+        Poisson's ratio in plane strain.
     log_length : float [m]
-        r0, the unit of length of the logarithm.
+        r0, the unit of length in the logarithm.
     """
 
     single: float
@@ -64,14 +65,14 @@ class Constants(NamedTuple):
 
 
 class Unknowns(NamedTuple):
-    """Complex unknowns, each a density on k elements, and the components of them that are columns.
+    """Complex unknowns, each a density on k elements, and the columns that are their components.
 
     Parameters
     ----------
     elements : (n, k) array
-        The elements on which each unknown acts.
+        Elements of each unknown.
     weights : (n, k, 1 or 2) complex array
-        The density that a unit of the unknown is there: a constant and, in the double layer, a slope.
+        Density of a unit unknown on each of them: a constant and, for the double layer, a slope.
     columns : (n_columns,) array
         2 * unknown + component.
     """
@@ -88,30 +89,30 @@ Layer: TypeAlias = Callable[[Constants, bool, ComplexArray, IntArray, Elements, 
 
 
 def straight_layer(
-    constants: Constants, is_double: bool, x: ComplexArray, own: IntArray, elements: Elements, unknowns: Unknowns
+    constants: Constants, is_double: bool, x: ComplexArray, centred_on: IntArray, elements: Elements, unknowns: Unknowns
 ) -> ComplexArray:
-    """Return the displacements (n_columns, n_points), complex, that unit unknowns on straight elements cause at points.
+    """Return the complex displacements (n_columns, n_points) of unit unknowns on straight elements.
 
     Parameters
     ----------
-    constants, is_double, x, own, elements
-        As of `straight_factors`.
+    constants, is_double, x, centred_on, elements
+        See `straight_factors`.
     unknowns : Unknowns
     """
     return combined(
-        lambda some: straight_factors(constants, is_double, x[some], own[some], *elements),
+        lambda points: straight_factors(constants, is_double, x[points], centred_on[points], *elements),
         (elements[0].size, x.size),
         unknowns,
     )
 
 
 def combined(factors: Callable[[slice], ComplexArray], shape: tuple[int, int], unknowns: Unknowns) -> ComplexArray:
-    """Return the displacements (n_columns, n_points) that unknowns cause, from the factors of elements.
+    """Return the displacements (n_columns, n_points) of unit unknowns from the factors of elements.
 
     Parameters
     ----------
     factors : callable
-        Some of the points to the factors (n_elements, 2 or 4, n_some) of `straight_factors`.
+        Slice of the points -> factors (n_elements, 2 or 4, n_points_of_slice), see `straight_factors`.
     shape : (n_elements, n_points)
     unknowns : Unknowns
     """
@@ -125,69 +126,68 @@ def combined(factors: Callable[[slice], ComplexArray], shape: tuple[int, int], u
     result = np.empty((of_column.size, n_points), complex)
     step = max(1, _PAIRS // max(n_elements, 1))
     runs = [consecutive_runs(elements) for elements in unknowns.elements.T] if k <= n else []
-    for some in (slice(begin, begin + step) for begin in range(0, n_points, step)):
-        one, conjugate = _summed(factors(some), unknowns, runs)
-        result[x_columns, some] = one[x_unknowns] + conjugate[x_unknowns]
+    for points in (slice(begin, begin + step) for begin in range(0, n_points, step)):
+        direct, conjugate = _summed(factors(points), unknowns, runs)
+        result[x_columns, points] = direct[x_unknowns] + conjugate[x_unknowns]
         # a unit along y is the number i
-        turned = one[y_unknowns] - conjugate[y_unknowns]
-        result.real[y_columns, some], result.imag[y_columns, some] = -turned.imag, turned.real
+        difference = direct[y_unknowns] - conjugate[y_unknowns]
+        result.real[y_columns, points], result.imag[y_columns, points] = -difference.imag, difference.real
     return result
 
 
 def _summed(values: ComplexArray, unknowns: Unknowns, runs: list[list[Run]]) -> tuple[ComplexArray, ComplexArray]:
-    """Return the factors of unknowns and of their conjugates, (n, n_points) each, from those of the elements.
+    """Return the factors of unknowns and of their conjugates, (n, n_points) each.
 
     Parameters
     ----------
     values : (n_elements, 2 or 4, n_points) complex array
     unknowns : Unknowns
     runs : list
-        For each of the elements on which the unknowns act: which unknowns, and which elements. Empty if unknowns are
-        few that act on many elements.
+        For each of the k elements of an unknown: consecutive unknowns with consecutive elements. Empty if few
+        unknowns act on many elements.
     """
     weights, n_densities = unknowns.weights, unknowns.weights.shape[2]
-    one, conjugate = np.zeros((2, len(weights), values.shape[2]), complex)
+    direct, conjugate = np.zeros((2, len(weights), values.shape[2]), complex)
     if not runs:
-        for number, elements in enumerate(unknowns.elements):
-            own, factors = weights[number].ravel(), values[elements]
-            one[number] = own @ factors[:, :n_densities].reshape(own.size, -1)
-            conjugate[number] = own.conj() @ factors[:, n_densities:].reshape(own.size, -1)
-    for number, pairs in enumerate(runs):
-        for own, elements in pairs:
+        for unknown, elements in enumerate(unknowns.elements):
+            weight, factors = weights[unknown].ravel(), values[elements]
+            direct[unknown] = weight @ factors[:, :n_densities].reshape(weight.size, -1)
+            conjugate[unknown] = weight.conj() @ factors[:, n_densities:].reshape(weight.size, -1)
+    for position, pairs in enumerate(runs):
+        for chosen, elements in pairs:
             for density in range(n_densities):
-                weight = weights[own, number, density, None]
-                one[own] += weight * values[elements, density]
-                conjugate[own] += weight.conj() * values[elements, n_densities + density]
-    return one, conjugate
+                weight = weights[chosen, position, density, None]
+                direct[chosen] += weight * values[elements, density]
+                conjugate[chosen] += weight.conj() * values[elements, n_densities + density]
+    return direct, conjugate
 
 
 def straight_factors(
-    constants: Constants, is_double: bool, x: ComplexArray, own: IntArray, start: ComplexArray, end: ComplexArray
+    constants: Constants, is_double: bool, x: ComplexArray, centred_on: IntArray, start: ComplexArray, end: ComplexArray
 ) -> ComplexArray:
-    """Return the factors of the densities on straight elements in the displacements at points.
+    """Return the factors of densities on straight elements in the displacements at points.
 
     Parameters
     ----------
     constants : Constants
     is_double : bool
-        The double layer T (v + s t), else the single layer U p.
+        Whether the layer is the double layer T (v + s t) instead of the single layer U p.
     x : (n_points,) complex array
-    own : (n_points,) array
-        Index of the element in whose middle the point is, where the integral T is a principal value; any other number
-        elsewhere.
+    centred_on : (n_points,) array
+        Index of the element whose midpoint is x, where T is a principal value; otherwise any other number.
     start, end : (n_elements,) complex arrays
 
     Returns
     -------
     (n_elements, 2 or 4, n_points) complex array
-        Factors of p, conj(p); or of v, s, conj(v), conj(s): p is a constant traction, v a constant displacement and s
-        its slope by the coordinate t, from -1 to 1.
+        Factors of p and conj(p) with the constant traction p; or of v, s, conj(v) and conj(s) with the displacement
+        v + s t in the local coordinate t from -1 to 1.
     """
-    near = _Near(x, start, end, own)
+    near = _Near(x, start, end, centred_on)
     half = 0.5 * np.abs(end - start)[:, None]
     tangent = (end - start)[:, None] / (2.0 * half)
     zeta = (x - 0.5 * (start + end)[:, None]) * (tangent.conj() / half)
-    zeta[near.pairs] = FAR  # anything far: these are replaced
+    zeta[near.pairs] = FAR  # any far value: near pairs are replaced
     inverse = 1.0 / zeta
     square = inverse * inverse
     series: ComplexArray = _power_series(SERIES, square)
@@ -204,7 +204,7 @@ def straight_factors(
         result[:, 1].real, result[:, 1].imag = 1.0 + eta * log.imag, eta * log.real
         result[:, 1] *= a * tangent**2
         return result
-    geometric: ComplexArray = square / (1.0 - square)  # its difference from the series is that of `REST`
+    geometric: ComplexArray = square / (1.0 - square)  # geometric - series is the series of `REST`
     moment = near.put(2.0 * series, near.moment)
     quotient: ComplexArray = near.put(2.0 * geometric, near.quotient)
     of_moment = near.put(2.0 * inverse * (geometric - series), near.of_moment)
@@ -219,7 +219,7 @@ def straight_factors(
 
 
 def _power_series(factors: tuple[float, ...], q: ComplexArray) -> ComplexArray:
-    """Return f1 q + f2 q^2 + ...; the last factor comes first."""
+    """Return f1 q + f2 q^2 + ...; the factor of the highest power comes first."""
     result = factors[0] * q
     for factor in factors[1:]:
         result += factor
@@ -228,40 +228,40 @@ def _power_series(factors: tuple[float, ...], q: ComplexArray) -> ComplexArray:
 
 
 class _Near:
-    """Closed forms of all pairs of elements and points that are not far from each other.
+    """Closed forms for near pairs of elements and points.
 
-    `pairs` are their indices; all other arrays are by pair: zeta, L, zeta L - 2, G, -L + zeta G, and log|zeta^2 - 1|
-    with Re(zeta L).
+    `pairs` are the indices of element and point. The arrays `zeta`, `log` (L), `moment` (zeta L - 2), `quotient` (G),
+    `of_moment` (-L + zeta G) and `logs` (log|zeta^2 - 1| + Re(zeta L)) have one value for each pair.
     """
 
-    def __init__(self, x: ComplexArray, start: ComplexArray, end: ComplexArray, own: IntArray) -> None:
+    def __init__(self, x: ComplexArray, start: ComplexArray, end: ComplexArray, centred_on: IntArray) -> None:
         away, span = x - 0.5 * (start + end)[:, None], end - start
         of_span = np.square(span.real) + np.square(span.imag)
         is_near = np.square(away.real) + np.square(away.imag) <= (0.25 * FAR**2) * of_span[:, None]
         self.pairs = np.nonzero(is_near)
         element, point = self.pairs
-        is_own, span = own[point] == element, span[element]
+        is_midpoint, span = centred_on[point] == element, span[element]
         half = 0.5 * np.abs(span)
         to_start, to_end = x[point] - start[element], x[point] - end[element]
         to_local = (span / (2.0 * half)).conj() / half
-        # near an end node the coordinate across the element is known only from there
+        # eta is accurate only if measured from the nearer end node
         plus, minus = to_start * to_local, to_end * to_local
         self.zeta = 0.5 * (plus + minus)
         squared_start = np.square(to_start.real) + np.square(to_start.imag)
         squared_end = np.square(to_end.real) + np.square(to_end.imag)
         self.zeta.imag = np.where(squared_start < squared_end, plus.imag, minus.imag)
-        self.zeta.imag[is_own] = 0.0
+        self.zeta.imag[is_midpoint] = 0.0
         turn = to_start.conj() * to_end
-        angle = np.where(is_own, 0.0, np.arctan2(turn.imag, turn.real))
+        angle = np.where(is_midpoint, 0.0, np.arctan2(turn.imag, turn.real))
         log_start, log_end = np.log(squared_start), np.log(squared_end)
         self.log: ComplexArray = 0.5 * (log_start - log_end) - 1j * angle
-        turned = self.zeta * self.log
-        self.moment: ComplexArray = turned - 2.0
-        self.quotient = np.asarray(2.0 / np.where(is_own, -1.0, plus * minus), complex)  # on the element eta is zero
+        product = self.zeta * self.log
+        self.moment: ComplexArray = product - 2.0
+        self.quotient = np.asarray(2.0 / np.where(is_midpoint, -1.0, plus * minus), complex)  # there eta is zero
         self.of_moment = self.zeta * self.quotient - self.log
-        self.logs = 0.5 * (log_start + log_end) - 2.0 * np.log(half) + turned.real
+        self.logs = 0.5 * (log_start + log_end) - 2.0 * np.log(half) + product.real
 
     def put(self, values: Values, of_pairs: Values) -> Values:
-        """Replace the values of these pairs in an array (n_elements, n_points)."""
+        """Replace the values of near pairs in an array (n_elements, n_points)."""
         values[self.pairs] = of_pairs
         return values

@@ -1,14 +1,15 @@
-"""One exact elastic field for each closed curve: its reciprocity with the solution determines the pressure there.
+"""Reciprocity with one exact elastic field for each closed curve, which determines the uniform pressure there.
 
-The displacement equation hardly determines a uniform pressure on a closed curve: it displaces nothing but what the
-compressibility allows, so that an error of the equation along the normals comes back as a pressure 1 / (1 - 2 nu) times
-larger, and at nu = 1/2 nothing is left of it within a hole. Betti's theorem [Betti1872] for a field w that carries
-volume through the curve gives it at every ratio. In complex notation, with t(w) the tractions of w on the boundary,
+The displacement equation hardly determines a uniform pressure on a closed curve, which displaces the boundary only by
+its compressibility: an error of the equation along the normals causes an error of the pressure 1 / (1 - 2 nu) times
+larger, and at nu = 1/2 the pressure in a hole does not appear in the equation. Betti's theorem [Betti1872] for a field
+w that transports volume through the curve determines the pressure at every Poisson's ratio. In complex notation, with
+the tractions t(w) of w on the boundary,
 
     around a hole     w = a / conj(z - c),        t(w) ds = 2 mu i dw,     c in the hole, a its distance from the curve
     the outer curve   w = (1 - 2 nu) (z - c),     t(w) ds = -2 mu i dz
 
-A source of volume and a uniform dilatation; both are elastic fields at every Poisson ratio, nu = 1/2 included.
+The first field is a source of volume, the second a uniform dilatation; both are elastic for every nu up to 1/2.
 """
 
 from __future__ import annotations
@@ -22,28 +23,28 @@ from bemkit.arrays import ComplexArray, FloatArray, IntArray
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.quadrature import gauss_legendre
 from bemkit.operators.collocation.gradient_reconstruction import GradientReconstruction
-from bemkit.operators.integrals.panels import Panels
+from bemkit.operators.integrals.element_geometry import ElementGeometry
 from bemkit.operators.material import Material
 
 _POINTS = 16
-"""Points of the Gauss rule on an element; exact to round-off if the element is not longer than the hole is wide."""
+"""Gauss points of an element; exact to round-off if the element is not longer than the width of the hole."""
 _POINTS_OF_LINES = 2
-"""Enough for a dilatation along straight elements; the points of a million of them take memory."""
+"""Gauss points for a dilatation on straight elements, for which two are exact."""
 _CANDIDATES = 64
-"""Places along a hole from which the middle of it is sought."""
+"""Elements of a hole from which its largest circle is sought."""
 
 
 @dataclass(frozen=True, eq=False)
 class Reciprocity:
-    """``on_traction @ traction == on_displacement @ displacement`` for elements, by 2 * element + component.
+    """Equations ``on_traction @ traction == on_displacement @ displacement``, indices 2 * element + component.
 
     Parameters
     ----------
     on_traction : (n_loops, 2 n_elements) array [m/Pa]
     on_displacement : (n_loops, 2 n_elements) array [-]
     fields : (2 n_elements, n_loops) array [-]
-        The fields at the midpoints: errors of the displacement equation that make room for these equations. They are
-        as smooth as the fields, so that elements at corners, however short, are not torn apart.
+        The fields at the midpoints: errors of the displacement equations that belong to these equations. They are
+        smooth, so that they cause no jumps between short elements at corners.
     """
 
     on_traction: FloatArray
@@ -57,22 +58,22 @@ class Reciprocity:
         Parameters
         ----------
         mesh : BoundaryMesh
-            Of loops that are images of each other there is one equation.
+            Loops that are images of each other share one equation.
         material : Material
         takes_slopes : bool
             Whether displacements have slopes; see `bemkit.operators.collocation.gradient_reconstruction`.
         """
         whole = mesh.whole
-        panels, centres = Panels(whole), _plane(whole.centres)
-        reconstruction = GradientReconstruction.of(whole, panels) if takes_slopes else None
+        geometry, centres = ElementGeometry(whole), _plane(whole.centres)
+        reconstruction = GradientReconstruction.of(whole, geometry) if takes_slopes else None
         on_tractions, on_displacements, fields = [], [], []
         for loop, area in zip(mesh.loops, mesh.loop_areas, strict=True):
             images = reciprocal_fields(mesh, loop, area)
             arcs = Arcs.of(whole, _POINTS_OF_LINES if area > 0.0 and whole.is_straight.all() else _POINTS)
             works = zip(*(field.work(arcs, material) for field in images), strict=True)
-            on_traction, on_displacement, on_gradient = (np.sum(each, axis=0) for each in works)
+            on_traction, on_displacement, on_gradient = (np.sum(work, axis=0) for work in works)
             if reconstruction is not None:
-                on_slope = on_gradient / (panels.half * panels.tangent)
+                on_slope = on_gradient / (geometry.half * geometry.tangent)
                 reconstruction.add_to(on_displacement[None, :], on_slope[None, :], is_conjugate=False)
             on_tractions.append(_folded(mesh, on_traction))
             on_displacements.append(_folded(mesh, on_displacement))
@@ -89,19 +90,19 @@ class ReciprocalField(Protocol):
     """An elastic field w whose work with the solution is known."""
 
     def value(self, z: ComplexArray) -> ComplexArray:
-        """Return the field at points, or a multiple of it."""
+        """Return the field at points, up to a constant factor."""
 
     def work(self, arcs: Arcs, material: Material) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
-        """Return the work, (n_elements,) each, of densities on w and t(w) / (2 mu).
+        """Return the factors of tractions t, displacements u and gradients g in the work, (n_elements,) each.
 
-        Re sum of (traction t) and of (displacement u + gradient g); the displacement on an element is u + g (y - x), x
-        its middle.
+        The real part of the sum over elements is the work of t on w, and of u + g (y - x) on t(w) / (2 mu), with the
+        midpoint x of an element.
         """
 
 
 @dataclass(frozen=True, eq=False)
 class Dilatation:
-    """The field w = (1 - 2 nu) (z - c) by the diameter of the body; its value without the factor.
+    """The field w = (1 - 2 nu) (z - c) divided by the diameter of the body; `value` omits the factor 1 - 2 nu.
 
     Parameters
     ----------
@@ -114,7 +115,7 @@ class Dilatation:
 
     @classmethod
     def of(cls, mesh: BoundaryMesh) -> Dilatation:
-        """Return the dilatation about the middle of a body."""
+        """Return the dilatation about the centre of a body."""
         return cls(complex(*mesh.centre), mesh.diameter)
 
     def value(self, z: ComplexArray) -> ComplexArray:
@@ -122,7 +123,7 @@ class Dilatation:
         return np.asarray((z - self.centre) / self.diameter)
 
     def work(self, arcs: Arcs, material: Material) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
-        """Return the work of tractions, displacements and gradients; see `ReciprocalField.work`."""
+        """Return the factors of tractions, displacements and gradients; see `ReciprocalField.work`."""
         factor = (1.0 - 2.0 * material.effective_poisson_ratio) / (2.0 * material.shear_modulus * self.diameter)
         return (
             np.sum((arcs.z - self.centre).conj() * np.abs(arcs.dz), axis=1) * factor,
@@ -147,7 +148,7 @@ class HoleSource:
 
     @classmethod
     def of(cls, mesh: BoundaryMesh, loop: IntArray) -> HoleSource:
-        """Return the source in the middle of the largest circle within a hole."""
+        """Return the source in the centre of the largest circle within a hole."""
         (x, y), radius = _largest_circle(mesh, loop)
         return cls(complex(x, y), radius)
 
@@ -156,7 +157,7 @@ class HoleSource:
         return np.asarray(self.radius / (z - self.centre).conj())
 
     def work(self, arcs: Arcs, material: Material) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
-        """Return the work of tractions, displacements and gradients; see `ReciprocalField.work`."""
+        """Return the factors of tractions, displacements and gradients; see `ReciprocalField.work`."""
         c, a = self.centre, self.radius
         return (
             np.sum(np.abs(arcs.dz) / (arcs.z - c), axis=1) * (a / (2.0 * material.shear_modulus)),
@@ -166,19 +167,19 @@ class HoleSource:
 
 
 def reciprocal_fields(mesh: BoundaryMesh, loop: IntArray, area: float) -> list[ReciprocalField]:
-    """Return the field of a closed curve: a dilatation, or a source in a hole, and those in its images."""
+    """Return the fields of a closed curve: a dilatation, or sources in a hole and its images."""
     if area > 0.0:
         return [Dilatation.of(mesh)]
     source = HoleSource.of(mesh, loop)
     if mesh.symmetry is None:
         return [source]
-    place = np.array([source.centre.real, source.centre.imag])
-    images = (mesh.symmetry.reflected(place, signs) for signs in mesh.symmetry.images)
+    centre = np.array([source.centre.real, source.centre.imag])
+    images = (mesh.symmetry.reflected(centre, signs) for signs in mesh.symmetry.images)
     return [HoleSource(complex(*image), source.radius) for image in images]
 
 
 def _largest_circle(mesh: BoundaryMesh, loop: IntArray) -> tuple[FloatArray, float]:
-    """Return centre and radius of the largest circle in a hole that touches it in the middle of one of its elements.
+    """Return centre and radius of the largest circle in a hole that touches the midpoint of one of its elements.
 
     A circle that touches x with the inward normal n and passes through y has the radius |y - x|^2 / (2 n (y - x)).
     """
@@ -199,13 +200,13 @@ def _largest_circle(mesh: BoundaryMesh, loop: IntArray) -> tuple[FloatArray, flo
 
 @dataclass(frozen=True, eq=False)
 class Arcs:
-    """Elements with Gauss points on them.
+    """Gauss points on elements.
 
     Parameters
     ----------
     start, end : (n_elements,) complex arrays [m]
     z, arm, dz : (n_elements, n_points) complex arrays [m]
-        The points, how far they are from the middle of the element, and the weighted steps.
+        Points, their distances from the midpoint of the element, and weighted steps.
     """
 
     start: ComplexArray
@@ -216,7 +217,7 @@ class Arcs:
 
     @classmethod
     def of(cls, mesh: BoundaryMesh, n_points: int = _POINTS) -> Arcs:
-        """Return all elements of a mesh, images not counted."""
+        """Return the points on all elements of a mesh, without images."""
         elements = np.arange(mesh.n_elements)
         xi, weights = gauss_legendre(n_points)
         z, dz = _plane(mesh.points(elements, xi)), _plane(mesh.derivatives(elements, xi)) * weights
@@ -229,7 +230,7 @@ def _plane(vectors: FloatArray) -> ComplexArray:
 
 
 def _folded(mesh: BoundaryMesh, on: ComplexArray) -> FloatArray:
-    """Return the row (2 n_elements,) of Re sum (on v), v a symmetric density on the whole body."""
+    """Return the row (2 n_elements,) of Re sum (on v) for symmetric densities v on the whole body."""
     images = np.ones((1, 2)) if mesh.symmetry is None else mesh.symmetry.images
     rows = np.stack([on.real, -on.imag], axis=1).reshape(len(images), mesh.n_elements, 2)
     folded: FloatArray = np.einsum("gnc,gc->nc", rows, images).ravel()

@@ -1,8 +1,9 @@
-"""A half-plane as one of several bodies: its flexibility inverted, its motion far away solved for.
+"""A half-plane as one of several bodies: the inverse of its flexibility, with the far motion eliminated.
 
-With the flexibility F, the motions R far away and their amounts a, the displacement is ``u = F f + R a``. Motions that
-loads drive are unknown: ``R_d^T f + load = 0``. With ``S = F^-1`` on the directions retained or fixed, they leave the
-stiffness ``P = S - S R_d (R_d^T S R_d)^-1 R_d^T S``, which does not resist them.
+With the flexibility F, the far rigid motions R and their amplitudes a, the displacement is ``u = F f + R a``. The
+amplitudes of load-controlled motions R_d are unknown: ``R_d^T f + load = 0``. With ``S = F^-1`` on the retained and
+fixed directions, their elimination leaves the stiffness ``P = S - S R_d (R_d^T S R_d)^-1 R_d^T S``, which does not
+resist them.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bemkit.arrays import FloatArray, IntArray
-from bemkit.operators.half_plane.far_drive import FarMotion
+from bemkit.operators.half_plane.far_motion import FarMotion
 from bemkit.operators.linear.dense import Cholesky
 from bemkit.operators.steklov_poincare.nodal_conditions import GivenData, NodalConditions, rotated
 from bemkit.operators.steklov_poincare.protocol import CondensedMap
@@ -20,89 +21,100 @@ from bemkit.operators.steklov_poincare.protocol import CondensedMap
 
 @dataclass(frozen=True, eq=False)
 class CondensedHalfPlane:
-    """A half-plane whose forces on some directions are unknown.
+    """A half-plane with unknown forces on its retained and fixed directions.
 
     Parameters
     ----------
     conditions : NodalConditions
-    drive : FarMotion
+    far_motion : FarMotion
     flexibility : (n_dofs, n_dofs) array [1/Pa]
         In the frames of the nodes.
     motions : (n_dofs, 3) array
-        The unit motions far away, in the frames.
+        Unit far motions, in the frames.
     strained : (n_dofs,) array [m]
-        Displacements by the strain far away.
+        Displacements of the far strain.
     acting, retained : int arrays
-        Indices of the directions retained or fixed, and which of these are retained.
+        Indices of the retained and fixed directions, and positions of the retained ones among them.
     stiffness : (n_acting, n_acting) array [Pa]
         P above.
-    spread : (n_acting, n_driven) array
-        ``S R_d (R_d^T S R_d)^-1``: forces on acting directions for loads that drive motions; its transpose says how
-        displacements of these directions move the half-plane far away.
-    resistance : (n_driven, n_driven) array
+    far_response : (n_acting, n_load_controlled) array
+        ``S R_d (R_d^T S R_d)^-1``: forces on acting directions under unit far loads. Its transpose maps displacements
+        of these directions to the far motion.
+    resistance : (n_load_controlled, n_load_controlled) array
         ``R_d^T S R_d``.
     """
 
     conditions: NodalConditions
-    drive: FarMotion
+    far_motion: FarMotion
     flexibility: FloatArray
     motions: FloatArray
     strained: FloatArray
     acting: IntArray
     retained: IntArray
     stiffness: FloatArray
-    spread: FloatArray
+    far_response: FloatArray
     resistance: FloatArray
 
     @classmethod
     def of(
         cls,
         conditions: NodalConditions,
-        drive: FarMotion,
+        far_motion: FarMotion,
         flexibility: FloatArray,
         points: FloatArray,
         along: FloatArray,
     ) -> CondensedHalfPlane:
         """Invert the flexibility (n_dofs, n_dofs) in x and y of nodes at points (n, 2), with the tangent (2,)."""
         acting = np.flatnonzero(~conditions.is_free)
-        turned, frame = rotated(flexibility, conditions.frame), conditions.frame
-        motions = np.einsum("nkc,ncm->nkm", frame, drive.motions_at(points)).reshape(-1, 3)
-        strain = drive.strain * ((points - np.array(drive.centre)) @ along)[:, None] * along
+        in_frames, frame = rotated(flexibility, conditions.frame), conditions.frame
+        motions = np.einsum("nkc,ncm->nkm", frame, far_motion.motions_at(points)).reshape(-1, 3)
+        strain = far_motion.strain * ((points - np.array(far_motion.centre)) @ along)[:, None] * along
         stiffness = np.zeros((0, 0))
         if acting.size:
-            factor = Cholesky(turned[np.ix_(acting, acting)], "the flexibility of the half-plane")
+            factor = Cholesky(in_frames[np.ix_(acting, acting)], "the flexibility of the half-plane")
             stiffness = factor.solve(np.eye(acting.size))
             stiffness = 0.5 * (stiffness + stiffness.T)
-        driven = motions[acting][:, list(drive.driven)]
-        held = stiffness @ driven
-        # a half-plane that nothing touches is not driven against anything
-        resistance = driven.T @ held if acting.size else np.eye(len(drive.driven))
-        spread = np.linalg.solve(resistance, held.T).T
-        stiffness = stiffness - spread @ held.T
+        load_controlled = motions[acting][:, list(far_motion.load_controlled)]
+        forces = stiffness @ load_controlled  # S R_d
+        # without acting directions nothing resists the far motion: any resistance will do
+        resistance = load_controlled.T @ forces if acting.size else np.eye(len(far_motion.load_controlled))
+        far_response = np.linalg.solve(resistance, forces.T).T
+        stiffness = stiffness - far_response @ forces.T
         stiffness = 0.5 * (stiffness + stiffness.T)
         retained = np.flatnonzero(conditions.is_retained.ravel()[acting])
         strained = np.einsum("nkc,nc->nk", frame, strain).ravel()
-        return cls(conditions, drive, turned, motions, strained, acting, retained, stiffness, spread, resistance)
+        return cls(
+            conditions=conditions,
+            far_motion=far_motion,
+            flexibility=in_frames,
+            motions=motions,
+            strained=strained,
+            acting=acting,
+            retained=retained,
+            stiffness=stiffness,
+            far_response=far_response,
+            resistance=resistance,
+        )
 
     @property
-    def driven(self) -> FloatArray:
-        """(n_dofs, n_driven) array: the motions that loads drive."""
-        return self.motions[:, list(self.drive.driven)]
+    def load_controlled(self) -> FloatArray:
+        """(n_dofs, n_load_controlled) array: the load-controlled unit motions."""
+        return self.motions[:, list(self.far_motion.load_controlled)]
 
     def under(self, force: FloatArray, displacement: FloatArray) -> CondensedMap:
         """Return the map under nodal forces (n_nodes, 2) in x and y and fixed displacements in the frames."""
         data = GivenData.of(self.conditions, force, displacement)
-        given, held = data.force.ravel(), data.displacement.ravel()[self.acting]
-        rest = self.flexibility @ given + self.motions @ np.array(self.drive.motion) + self.strained
-        load = self.driven.T @ given + np.array(self.drive.load)[list(self.drive.driven)]
-        forces = self.stiffness @ (held - rest[self.acting]) - self.spread @ load
+        given, prescribed = data.force.ravel(), data.displacement.ravel()[self.acting]
+        force_free = self.flexibility @ given + self.motions @ np.array(self.far_motion.motion) + self.strained
+        load = self.load_controlled.T @ given + np.array(self.far_motion.load)[list(self.far_motion.load_controlled)]
+        forces = self.stiffness @ (prescribed - force_free[self.acting]) - self.far_response @ load
         return _HalfPlaneMap(
             stiffness=self.stiffness[np.ix_(self.retained, self.retained)],
             load=-forces[self.retained],
             body=self,
             given=given,
-            held=held,
-            rest=rest,
+            prescribed=prescribed,
+            force_free=force_free,
             far_load=load,
         )
 
@@ -116,45 +128,46 @@ class _HalfPlaneMap(CondensedMap):
     body : CondensedHalfPlane
     given : (n_dofs,) array [N/m]
         Given forces in the frames.
-    held : (n_acting,) array [m]
-        Displacements of acting directions, the retained ones at rest.
-    rest : (n_dofs,) array [m]
-        Displacements by the given forces, motions and strains.
-    far_load : (n_driven,) array
-        Of the motions that loads drive, with the given forces.
+    prescribed : (n_acting,) array [m]
+        Displacements of fixed directions; zero on retained directions.
+    force_free : (n_dofs,) array [m]
+        Displacements under the given forces, far motions and far strain, without forces on acting directions.
+    far_load : (n_load_controlled,) array
+        Work of all given forces on the load-controlled unit motions.
     """
 
     body: CondensedHalfPlane
     given: FloatArray
-    held: FloatArray
-    rest: FloatArray
+    prescribed: FloatArray
+    force_free: FloatArray
     far_load: FloatArray
 
     def recover(self, retained_displacement: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return displacement and force of all elements."""
-        displaced = self.held.copy()
-        displaced[self.body.retained] = retained_displacement
-        everywhere, total = map(self.body.conditions.in_plane, self._response(displaced))
-        return everywhere, total
+        acting_displacement = self.prescribed.copy()
+        acting_displacement[self.body.retained] = retained_displacement
+        displacement, force = map(self.body.conditions.in_plane, self._response(acting_displacement))
+        return displacement, force
 
     def under(self, force: FloatArray, displacement: FloatArray) -> CondensedMap:
         """Return the map under other loads."""
         return self.body.under(force, displacement)
 
     def follow(self, directions: IntArray) -> tuple[FloatArray, FloatArray]:
-        """Return what free directions do."""
+        """Return response and displacement at rest of free directions."""
         body = self.body
         responses = body.flexibility[np.ix_(directions, body.acting)] @ body.stiffness
-        responses += body.driven[directions] @ body.spread.T
-        return responses[:, body.retained], self._response(self.held)[0][directions]
+        responses += body.load_controlled[directions] @ body.far_response.T
+        return responses[:, body.retained], self._response(self.prescribed)[0][directions]
 
-    def _response(self, displaced: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return displacements and forces (n_dofs,) in the frames, those of acting directions given."""
+    def _response(self, acting_displacement: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return displacements and forces (n_dofs,) in the frames under displacements (n_acting,)."""
         body = self.body
-        stretch = displaced - self.rest[body.acting]
-        forces = body.stiffness @ stretch - body.spread @ self.far_load
-        moved = body.spread.T @ stretch + np.linalg.solve(body.resistance, self.far_load)
-        everywhere = self.rest + body.flexibility[:, body.acting] @ forces + body.driven @ moved
-        total = self.given.copy()
-        everywhere[body.acting], total[body.acting] = displaced, forces
-        return everywhere, total
+        stretch = acting_displacement - self.force_free[body.acting]
+        acting_force = body.stiffness @ stretch - body.far_response @ self.far_load
+        amplitudes = body.far_response.T @ stretch + np.linalg.solve(body.resistance, self.far_load)
+        strain_displacement = body.flexibility[:, body.acting] @ acting_force
+        displacement = self.force_free + strain_displacement + body.load_controlled @ amplitudes
+        force = self.given.copy()
+        displacement[body.acting], force[body.acting] = acting_displacement, acting_force
+        return displacement, force

@@ -1,4 +1,4 @@
-"""Costs of the elastic maps of half-planes, predicted from sizes."""
+"""Predicted costs of the elastic maps of half-planes."""
 
 from __future__ import annotations
 
@@ -7,17 +7,17 @@ from bemkit.operators.steklov_poincare.cost import CONTACT_STEPS, BodyCase, Body
 
 _BYTES = 8
 _BYTES_OF_TREE = 10_000
-"""Bytes for each element of larger strips."""
+"""Bytes of each element of equations over a tree."""
 _FLOPS_OF_TREE = 6e5
-"""Flops for each element of larger strips, in all responses."""
+"""Flops of each element of equations over a tree, in all responses."""
 _BASIS = 120
-"""Vectors that the iteration for a response keeps, all others included."""
+"""Vectors that the iteration for a response keeps, with all auxiliary vectors."""
 _RESPONSES, _ITERATIONS, _FLOPS_OF_TRANSFORM = 20, 40, 500.0
-"""About, of a rough surface: responses, iterations of each, and work on each node in an iteration."""
+"""Typical numbers for a rough surface: responses, iterations of each, and flops of each node in an iteration."""
 
 
 def strip_cost(case: BodyCase, *, has_tree: bool) -> BodyCost:
-    """Return the costs of a half-plane, with its flexibility as a matrix or, where its motion is free, over a tree."""
+    """Return the costs of a half-plane with its flexibility stored as a matrix or, without supports, over a tree."""
     n, n_acting = case.mesh.n_elements, case.n_retained + case.n_fixed
     items = (
         PlanItem("flexibility of the surface", True, f"closed form: {n} x {n} means of logarithms"),
@@ -26,7 +26,7 @@ def strip_cost(case: BodyCase, *, has_tree: bool) -> BodyCost:
         PlanItem("supports", case.n_fixed > 0, "the half-plane is held or driven far away"),
     )
     square, matrix = _BYTES * n_acting * n_acting, _BYTES * n * n
-    if case.is_condensed:  # both components of the whole strip, and the inverse
+    if case.is_condensed:  # both components of the whole surface, and the inverse
         return BodyCost(
             items=items,
             work=half_plane_work(n, n_acting),
@@ -45,7 +45,7 @@ def strip_cost(case: BodyCase, *, has_tree: bool) -> BodyCost:
             flops=_FLOPS_OF_TREE * n,
             is_matrix_free=True,
         )
-    kept = matrix + 3 * square  # the equations of closed nodes, at most all, and their factor
+    kept = matrix + 3 * square  # at most all nodes are closed: their equations and the factor
     flops = CONTACT_STEPS * 2.0 / 3.0 * float(n_acting) ** 3
     memory = max(4 * matrix, kept)
     return BodyCost(
@@ -76,7 +76,7 @@ def periodic_cost(case: BodyCase) -> BodyCost:
 
 
 def half_plane_work(n_elements: int, n_acting: int = 0) -> OperationCounts:
-    """Return what a flexibility takes, and its inverse on `n_acting` directions that are retained or fixed."""
+    """Return the operation counts of a flexibility and of its inverse on `n_acting` retained or fixed directions."""
     return OperationCounts(
         element_pairs=n_elements**2,
         single_layer=Entries.full(n_elements, n_elements),

@@ -1,4 +1,4 @@
-"""The half-plane as an elastic map: its flexibility in closed form."""
+"""The half-plane as an elastic map with a flexibility in closed form."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ from bemkit.operators.steklov_poincare.cost import BodyCase, BodyCost
 
 @dataclass(frozen=True, eq=False)
 class HalfPlaneElasticity(SurfaceElasticity):
-    """Elasticity of a half-plane seen from a strip of its surface; see `SurfaceElasticity`."""
+    """Elasticity of a half-plane with elements on a strip of its surface; see `SurfaceElasticity`."""
 
     @cached_property
     def flexibility(self) -> FloatArray:
-        """(n_elements, n_elements) array [1/Pa]: displacements along forces; see `bemkit.operators.half_plane`."""
-        return np.asarray(-2.0 / (np.pi * self.material.plane_modulus) * mean_logarithms(self.places))
+        """(n_elements, n_elements) array [1/Pa]: displacements along forces; see `mean_logarithms`."""
+        return np.asarray(-2.0 / (np.pi * self.material.plane_modulus) * mean_logarithms(self.nodes))
 
     @cached_property
-    def places(self) -> FloatArray:
-        """(n_elements + 1,) array: ends of the elements along the surface."""
+    def nodes(self) -> FloatArray:
+        """(n_elements + 1,) array [m]: ends of the elements along the surface."""
         ends = self.mesh.nodes[np.append(self.mesh.elements[:, 0], self.mesh.elements[-1, 1])]
         return np.asarray((ends - ends[0]) @ self.mesh.tangents[0])
 
@@ -42,7 +42,7 @@ class HalfPlaneElasticity(SurfaceElasticity):
     def _displaced(self, traction: ComplexArray) -> ComplexArray:
         force = self.mesh.lengths * traction
         along = self.flexibility @ np.stack([force.real, force.imag], axis=1)
-        # forces before each element less those behind it
+        # forces before each element minus those behind it
         sums = np.cumsum(force)
         across = 2.0 * sums - force - sums[-1]
         return np.asarray(along[:, 0] + 1j * along[:, 1] - 0.5j * self.material.plane_compressibility * across)
@@ -52,5 +52,5 @@ class HalfPlaneElasticity(SurfaceElasticity):
         """(n_dofs, n_dofs) array [1/Pa] from forces to displacements, index ``2 element + component`` in x and y."""
         order = np.arange(self.mesh.n_elements)
         across = 0.5 * self.material.plane_compressibility * np.sign(order[:, None] - order)
-        local = np.array([[self.flexibility, across], [-across, self.flexibility]])  # by components t and n
+        local = np.array([[self.flexibility, across], [-across, self.flexibility]])  # components t and n
         return self.full_from_local(local)

@@ -1,7 +1,7 @@
 """Equations ``u - F t - R q = 0`` of the surface of a half-plane for the direct solver of `bemkit.operators.hierarchy`.
 
-Components are those along the tangent and the normal. The logarithm is symmetric, and the sign is constant outside of
-a cluster: one interpolation of scalars serves both components, rows and columns.
+Components are tangential and normal. The logarithm is symmetric, and the sign function is constant outside of a
+cluster, so that one scalar interpolation serves both components, rows and columns.
 """
 
 from __future__ import annotations
@@ -24,20 +24,22 @@ _MOST_KEPT = 400
 
 @dataclass(frozen=True, eq=False)
 class HalfPlaneEquations:
-    """The surface of a half-plane; fulfils `BoundaryEquations`. Rows, and columns of tractions, come in pairs.
+    """Equations on the surface of a half-plane; fulfils `BoundaryEquations`.
+
+    Rows, and columns of tractions, come in pairs of components.
 
     Parameters
     ----------
-    places : (n + 1,) array [m]
+    nodes : (n + 1,) array [m]
         Ends of the elements along the surface.
     material : Material
     motions : (n_motions, n) array
-        The motions R that forces far away drive.
+        Load-controlled motions R.
     kept : dict
-        Logarithms of leaves, siblings and sampled nodes, which are needed again.
+        Cached logarithms of leaves, siblings and sampled nodes.
     """
 
-    places: FloatArray
+    nodes: FloatArray
     material: Material
     motions: ComplexArray
     kept: dict[tuple[bytes, bytes], FloatArray] = field(default_factory=dict, repr=False)
@@ -45,21 +47,21 @@ class HalfPlaneEquations:
     @cached_property
     def lengths(self) -> FloatArray:
         """(n,) array [m]."""
-        return np.diff(self.places)
+        return np.diff(self.nodes)
 
     @cached_property
     def points(self) -> ComplexArray:
         """(n,) array [m]: centres of the elements."""
-        return np.asarray(0.5 * (self.places[1:] + self.places[:-1]), complex)
+        return np.asarray(0.5 * (self.nodes[1:] + self.nodes[:-1]), complex)
 
     @cached_property
     def supports(self) -> ComplexArray:
         """(3, n) array [m]: centres and ends of the elements."""
-        return np.stack([self.points, self.places[:-1], self.places[1:]])
+        return np.stack([self.points, self.nodes[:-1], self.nodes[1:]])
 
     @cached_property
     def border(self) -> Border:
-        """Driven motions, and the work of tractions on them."""
+        """Load-controlled motions, and the work of tractions on them."""
         n_motions, n = self.motions.shape
         motions = np.stack([self.motions.real, self.motions.imag], axis=2)
         balances = np.zeros((n_motions, n, 4))
@@ -67,55 +69,55 @@ class HalfPlaneEquations:
         errors = -motions.reshape(n_motions, 2 * n).T
         return Border(errors, balances.reshape(n_motions, 4 * n), np.zeros((n_motions, n_motions)))
 
-    def logarithms(self, one: IntArray, two: IntArray) -> FloatArray:
-        """Return the means of logarithms (n_one, n_two) between elements."""
-        first, second = np.broadcast_arrays(one[:, None], two)
+    def logarithms(self, targets: IntArray, sources: IntArray) -> FloatArray:
+        """Return the mean logarithms (n_targets, n_sources) between elements."""
+        first, second = np.broadcast_arrays(targets[:, None], sources)
         first, second = np.minimum(first, second).ravel(), np.maximum(first, second).ravel()
-        return logarithms_between(self.places, first, second).reshape(one.size, two.size)
+        return logarithms_between(self.nodes, first, second).reshape(targets.size, sources.size)
 
-    def kept_logarithms(self, one: IntArray, two: IntArray) -> FloatArray:
-        """Return the same, evaluated once unless many others came between; the oldest are dropped."""
-        key, other = (one.tobytes(), two.tobytes()), (two.tobytes(), one.tobytes())
-        if other in self.kept:
-            return self.kept[other].T
+    def kept_logarithms(self, targets: IntArray, sources: IntArray) -> FloatArray:
+        """Return the mean logarithms between elements from a cache of bounded size; the oldest are dropped."""
+        key, transposed = (targets.tobytes(), sources.tobytes()), (sources.tobytes(), targets.tobytes())
+        if transposed in self.kept:
+            return self.kept[transposed].T
         if key not in self.kept:
             most = _MOST_KEPT * self.lengths.size
-            while self.kept and sum(each.size for each in self.kept.values()) + one.size * two.size > most:
+            while self.kept and sum(block.size for block in self.kept.values()) + targets.size * sources.size > most:
                 del self.kept[next(iter(self.kept))]
-            self.kept[key] = self.logarithms(one, two)
+            self.kept[key] = self.logarithms(targets, sources)
         return self.kept[key]
 
     def block(self, rows: IntArray, columns: IntArray) -> FloatArray:
         """Return entries (n_rows, n_columns) of the equations."""
         is_traction = columns % 4 < 2
-        one, two = rows[::2] // 2, columns[is_traction][::2] // 4
-        forces = np.empty((one.size, 2, two.size, 2))
-        forces[:, 0, :, 0] = self.along * self.kept_logarithms(one, two)
-        forces[:, 1, :, 1] = forces[:, 0, :, 0]
-        forces[:, 0, :, 1] = self.across * np.sign(one[:, None] - two)
-        forces[:, 1, :, 0] = -forces[:, 0, :, 1]
-        forces *= -self.lengths[two, None]
+        targets, sources = rows[::2] // 2, columns[is_traction][::2] // 4
+        of_tractions = np.empty((targets.size, 2, sources.size, 2))
+        of_tractions[:, 0, :, 0] = self.along * self.kept_logarithms(targets, sources)
+        of_tractions[:, 1, :, 1] = of_tractions[:, 0, :, 0]
+        of_tractions[:, 0, :, 1] = self.across * np.sign(targets[:, None] - sources)
+        of_tractions[:, 1, :, 0] = -of_tractions[:, 0, :, 1]
+        of_tractions *= -self.lengths[sources, None]
         if is_traction.all():
-            return forces.reshape(rows.size, columns.size)
+            return of_tractions.reshape(rows.size, columns.size)
         result = np.zeros((rows.size, columns.size))
-        result[:, is_traction] = forces.reshape(rows.size, -1)
-        moved = columns[~is_traction]
-        result[:, ~is_traction] = rows[:, None] == 2 * (moved // 4) + moved % 2
+        result[:, is_traction] = of_tractions.reshape(rows.size, -1)
+        of_displacements = columns[~is_traction]
+        result[:, ~is_traction] = rows[:, None] == 2 * (of_displacements // 4) + of_displacements % 2
         return result
 
     @property
     def along(self) -> float:
-        """Displacement along a force by the mean of logarithms [1/Pa]."""
+        """Displacement along a unit force per mean logarithm [1/Pa]."""
         return -2.0 / (np.pi * self.material.plane_modulus)
 
     @property
     def across(self) -> float:
-        """Displacement across a force [1/Pa]."""
+        """Displacement across a unit force [1/Pa]."""
         return 0.5 * self.material.plane_compressibility
 
     def potentials(self, x: ComplexArray, elements: IntArray) -> FloatArray:
-        """Return the means of log|x - s| (n_points, n) over elements, away from these."""
-        begin, end = (self.places[of][None, :] - x[:, None] for of in (elements, elements + 1))
+        """Return the means of log|x - s| (n_points, n) over elements, for points outside of them."""
+        begin, end = (self.nodes[ends][None, :] - x[:, None] for ends in (elements, elements + 1))
         integral = (end * np.log(end) - begin * np.log(begin)).real
         return np.asarray(integral / self.lengths[elements] - 1.0)
 
@@ -131,46 +133,47 @@ class HalfPlaneEquations:
         return result.reshape(2 * x.size, columns.size)
 
     def under_forces(self, x: ComplexArray, rows: IntArray) -> FloatArray:
-        """Return what rows feel of unit forces at some points, (2 n_points, n_rows)."""
+        """Return the displacements (2 n_points, n_rows) at rows under unit forces at some points."""
         columns = 4 * (rows // 2) + rows % 2
         return self.fields(x, columns) / self.lengths[rows // 2]
 
     def residual(self, nodes: IntArray, traction: FloatArray, displacement: FloatArray) -> FloatArray:
-        """Return u - F t (n, 2) at some elements, without any compression."""
+        """Return the uncompressed u - F t (n, 2) at some elements."""
         force = self.lengths[:, None] * traction
         sums = np.cumsum(force, axis=0)
         across = self.across * (2.0 * sums - force - sums[-1])[nodes]
         along = self.along * (self.kept_logarithms(nodes, np.arange(self.lengths.size)) @ force)
-        caused = along + np.stack([across[:, 1], -across[:, 0]], axis=1)
-        return np.asarray(displacement[nodes] - caused)
+        of_tractions = along + np.stack([across[:, 1], -across[:, 0]], axis=1)
+        return np.asarray(displacement[nodes] - of_tractions)
 
 
 @dataclass(frozen=True, eq=False)
 class StripView(LevelView):
-    """The clusters of one level of a strip; see `LevelView`."""
+    """The clusters of one level on the surface of a half-plane; see `LevelView`."""
 
     equations: HalfPlaneEquations
 
     def skeleton(self, cluster: int) -> Skeleton:
         """Choose the skeleton of one cluster: both components of some elements."""
         near_rows, _ = self.near(cluster)
-        of, elements, near = self.equations, self.rows[cluster][::2] // 2, near_rows[::2] // 2
+        equations, elements, near = self.equations, self.rows[cluster][::2] // 2, near_rows[::2] // 2
         proxies = self.proxies(cluster)
-        proxies = proxies[proxies.imag > 0.0]  # the others see the same
-        blocks = [Block(of.potentials(proxies, elements), np.ones(proxies.size))]
+        proxies = proxies[proxies.imag > 0.0]  # the lower half of the circle gives the same values
+        blocks = [Block(equations.potentials(proxies, elements), np.ones(proxies.size))]
         if near.size:
-            blocks.append(Block(of.logarithms(near, elements), np.sqrt(of.lengths[near])))
-        # all rows: random combinations of them would cost a digit of the tractions
-        found = sketched(blocks, np.sqrt(of.lengths[elements]), self.tolerance_at(cluster, elements), None)
-        by_length = found.scaled(1.0 / of.lengths[elements])
-        chosen = elements[found.skeleton]
+            blocks.append(Block(equations.logarithms(near, elements), np.sqrt(equations.lengths[near])))
+        # no guess of the rank, hence all rows: random combinations would cost a digit of the tractions
+        lengths = equations.lengths[elements]
+        scalar = sketched(blocks, np.sqrt(lengths), self.tolerance_at(cluster, elements), None)
+        by_length = scalar.scaled(1.0 / lengths)
+        chosen = elements[scalar.skeleton]
         rows, columns = ((stride * chosen[:, None] + np.arange(2)).ravel() for stride in (2, 4))
-        return Skeleton(rows, _of_pairs(found, 2), columns, _of_pairs(by_length, 4 if self.is_lowest else 2))
+        return Skeleton(rows, _of_pairs(scalar, 2), columns, _of_pairs(by_length, 4 if self.is_lowest else 2))
 
 
 def _of_pairs(scalar: Interpolation, stride: int) -> Interpolation:
-    """Return an interpolation of the first two of `stride` values of each element; others count for nothing."""
-    skeleton, rest = ((stride * of[:, None] + np.arange(2)).ravel() for of in (scalar.skeleton, scalar.rest))
+    """Return an interpolation of the first two of `stride` values of each element; the others have no weight."""
+    skeleton, rest = ((stride * index[:, None] + np.arange(2)).ravel() for index in (scalar.skeleton, scalar.rest))
     idle = (stride * np.arange(scalar.n)[:, None] + np.arange(2, stride)).ravel()
     weights = np.zeros((skeleton.size, rest.size + idle.size))
     for component in (0, 1):
@@ -179,41 +182,50 @@ def _of_pairs(scalar: Interpolation, stride: int) -> Interpolation:
 
 
 def potential_of(compression: Compression, forces: FloatArray) -> FloatArray:
-    """Return the sums of logarithms (n, 2) of the forces (n, 2) on all elements, by a compression with `StripView`.
+    """Return the sums of logarithms (n, 2) over the forces (n, 2) on all elements, from a compression by `StripView`.
 
-    Forces are gathered at the skeletons of larger and larger clusters; siblings see each other, and what the skeletons
-    of clusters feel is interpolated on smaller and smaller ones.
+    Forces are gathered at the skeletons of larger and larger clusters, siblings interact, and incoming values at the
+    skeletons are interpolated on smaller and smaller clusters.
     """
     tree, equations = compression.tree, compression.equations
     assert isinstance(equations, HalfPlaneEquations)
     leaves = [tree.positions(0, leaf) for leaf in range(tree.n_leaves)]
-    sources = [[forces[places].ravel() for places in leaves]]
+    sources = [forces[positions].ravel() for positions in leaves]
+    outgoing: list[list[FloatArray]] = []
     for skeletons in compression.skeletons:
-        gathered = [each.row_map.gather(source) for each, source in zip(skeletons, sources[-1], strict=True)]
-        sources.append(gathered)
-        if len(gathered) > 2:
-            sources.append([np.concatenate(pair) for pair in zip(gathered[::2], gathered[1::2], strict=True)])
-    felt: list[FloatArray] = []
-    for level in range(tree.n_levels - 1, -1, -1):
-        skeletons, gathered = compression.skeletons[level], sources[2 * level + 1]
-        at_skeletons: list[FloatArray] = []
-        for one in range(0, len(skeletons), 2):
-            between = equations.kept_logarithms(skeletons[one].rows[::2] // 2, skeletons[one + 1].rows[::2] // 2)
-            at_skeletons += [(between @ gathered[one + 1].reshape(-1, 2)), (between.T @ gathered[one].reshape(-1, 2))]
-        below = []
-        for number, skeleton in enumerate(skeletons):
-            seen = at_skeletons[number].ravel()
-            if felt:
-                parent = felt[number // 2]
-                n_first = skeletons[number - number % 2].rows.size
-                seen = seen + (parent[:n_first] if number % 2 == 0 else parent[n_first:])
-            values = np.empty(skeleton.row_map.n)
-            values[skeleton.row_map.skeleton] = seen
-            values[skeleton.row_map.rest] = skeleton.row_map.weights.T @ seen
-            below.append(values)
-        felt = below
+        gathered = [skeleton.row_map.gather(source) for skeleton, source in zip(skeletons, sources, strict=True)]
+        outgoing.append(gathered)
+        sources = [np.concatenate(pair) for pair in zip(gathered[::2], gathered[1::2], strict=True)]
+    incoming: list[FloatArray] = []
+    for skeletons, gathered in zip(compression.skeletons[::-1], outgoing[::-1], strict=True):
+        incoming = _on_clusters(equations, skeletons, gathered, incoming)
     result = np.empty_like(forces)
-    for places, seen in zip(leaves, felt, strict=True):
-        own = np.arange(places.start, places.stop)
-        result[places] = seen.reshape(-1, 2) + equations.kept_logarithms(own, own) @ forces[places]
+    for positions, of_leaf in zip(leaves, incoming, strict=True):
+        elements = np.arange(positions.start, positions.stop)
+        near = equations.kept_logarithms(elements, elements) @ forces[positions]
+        result[positions] = of_leaf.reshape(-1, 2) + near
     return result
+
+
+def _on_clusters(
+    equations: HalfPlaneEquations,
+    skeletons: tuple[Skeleton, ...],
+    outgoing: list[FloatArray],
+    of_parents: list[FloatArray],
+) -> list[FloatArray]:
+    """Return the incoming values on the clusters of a level: from siblings and, unless empty, from the parents."""
+    at_skeletons: list[FloatArray] = []
+    for first in range(0, len(skeletons), 2):
+        between = equations.kept_logarithms(skeletons[first].rows[::2] // 2, skeletons[first + 1].rows[::2] // 2)
+        at_skeletons += [between @ outgoing[first + 1].reshape(-1, 2), between.T @ outgoing[first].reshape(-1, 2)]
+    incoming = []
+    for cluster, skeleton in enumerate(skeletons):
+        values = at_skeletons[cluster].ravel()
+        if of_parents:
+            parent, n_first = of_parents[cluster // 2], skeletons[cluster - cluster % 2].rows.size
+            values = values + (parent[:n_first] if cluster % 2 == 0 else parent[n_first:])
+        on_cluster = np.empty(skeleton.row_map.n)
+        on_cluster[skeleton.row_map.skeleton] = values
+        on_cluster[skeleton.row_map.rest] = skeleton.row_map.weights.T @ values
+        incoming.append(on_cluster)
+    return incoming

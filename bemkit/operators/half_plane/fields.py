@@ -1,16 +1,16 @@
 """Fields below the surface of a half-plane in closed form, from tractions that are constant on elements.
 
-With z = x + i y, the body below the line y = 0, N and T the tractions along y and x, the potential
+Let z = x + i y, let the body lie below the line y = 0, and let N and T be the tractions along y and x. The potential
 
     Phi(z) = -1 / (2 pi i) int (N - i T) / (t - z) dt
 
-holds on both sides of the line, and with its integral phi [Muskhelishvili1953]
+is defined on both sides of the line. With its integral phi [Muskhelishvili1953]
 
     sigma_xx + sigma_yy = 4 Re Phi(z),  sigma_yy - i sigma_xy = Phi(z) - Phi(z*) + (z - z*) Phi'(z)*,
     2 mu (u_x + i u_y) = kappa phi(z) + phi(z*) - (z - z*) Phi(z)*.
 
-On elements the integrals are sums over their ends t of c log(t - z), c the jump of N - i T there by 2 pi i; log sin pi
-(t - z) takes the place of the logarithm where the surface is periodic, with lengths measured by the period.
+The integrals are sums of c log(t - z) over the ends t of the elements, with c the jump of N - i T at t divided by 2 pi
+i. On a periodic surface log sin pi (t - z) replaces the logarithm, with the period as unit of length.
 """
 
 from __future__ import annotations
@@ -30,11 +30,11 @@ from bemkit.operators.somigliana.potentials import PotentialFields, as_points
 _CHUNK = 500_000
 """Pairs of points and ends of elements that are evaluated at a time."""
 _SAMPLED = 64
-"""Elements whose displacements say how the half-plane has moved far away."""
+"""Elements whose displacements determine the far motion."""
 _AT_DEPTH = 0.5j * np.pi - np.log(2.0)
 """Limit of log sin(pi w) + i pi w at depth."""
 _DEEP = 6.0
-"""Depth in periods below which no wave is felt: exp(-12 pi) is 4e-17."""
+"""Depth in periods below which all waves have vanished: exp(-12 pi) is 4e-17."""
 
 
 class HalfPlaneFields(PotentialFields):
@@ -43,23 +43,23 @@ class HalfPlaneFields(PotentialFields):
     Parameters
     ----------
     mesh : BoundaryMesh
-        Elements of its surface.
+        Elements of the surface.
     material : Material
     traction : (n_elements, 2) array [Pa]
-        On each element, in x and y.
+        Uniform traction on each element, in x and y.
     displacement : (n_elements, 2) array [m]
-        Means over elements, in x and y: the motion far away follows from them.
+        Means over elements, in x and y; they determine the far motion.
     strain : float [-]
-        Along the surface, far below it.
+        Strain along the surface, far below it.
 
     Raises
     ------
     InputError
-        If the mesh is not that of a half-plane.
+        If the mesh is not the surface of a half-plane.
 
     Notes
     -----
-    Every method takes points strictly below the surface, otherwise as those of `InteriorFields`. Below a periodic
+    Points must lie strictly below the surface; otherwise methods are those of `InteriorFields`. Below a periodic
     surface the mean strain along it is `strain` at all depths.
     """
 
@@ -83,39 +83,39 @@ class HalfPlaneFields(PotentialFields):
         ends = np.append(0.0, np.cumsum(lengths)) / self._length
         self._ends, self._jumps = ends[jumps != 0.0], jumps[jumps != 0.0]
         self._mean = complex((tractions * lengths).sum() / self._length)
-        # what is added: a uniform tension along x, a turn and a shift
+        # uniform tension along x, rotation and translation to be added
         self._tension, self._turn, self._shift = material.plane_modulus * strain, 0.0, 0j
         if self._is_periodic:
-            self._follow_period(displacement)
+            self._fit_period(displacement)
         else:
-            self._follow_strip(strain, traction, displacement)
+            self._fit_strip(strain, traction, displacement)
 
     def _local(self, vectors: FloatArray) -> ComplexArray:
         """Return vectors (n, 2) in x and y as complex numbers along the local axes."""
         return np.asarray((vectors[:, 0] + 1j * vectors[:, 1]) / self._axis)
 
-    def _follow_strip(self, strain: float, traction: FloatArray, displacement: FloatArray) -> None:
-        """Find how the half-plane has moved far away; forces move no point at the distance L."""
+    def _fit_strip(self, strain: float, traction: FloatArray, displacement: FloatArray) -> None:
+        """Fit the far motion to the displacements of some elements; forces do not move points at the distance L."""
         mesh, length = self.mesh, self._length
-        # the sign at both sides of an element: half of what the potentials take as zero on one of them
+        # the potentials take sign(s - r) + 1 on one side of an element, the flexibility takes sign(s - r)
         self._shift = 0.5j * self.material.plane_compressibility * self._mean * length
         nodes = np.unique(np.linspace(0.0, mesh.n_elements - 1.0, _SAMPLED).astype(int))
         x = length - (np.cumsum(mesh.lengths) - 0.5 * mesh.lengths)[nodes]
-        places = np.append(0.0, np.cumsum(mesh.lengths)) / length
-        equations = HalfPlaneEquations(places, self.material, np.zeros((0, mesh.n_elements), complex))
+        ends = np.append(0.0, np.cumsum(mesh.lengths)) / length
+        equations = HalfPlaneEquations(ends, self.material, np.zeros((0, mesh.n_elements), complex))
         along_surface = np.stack([mesh.tangents[0], mesh.normals[0]], axis=1)
-        left = length * equations.residual(nodes, traction @ along_surface, displacement @ along_surface / length)
-        moved = -left[:, 0] + 1j * left[:, 1] - strain * x
-        turn = float(np.polyfit(x / length, moved.imag, 1)[0]) / length if nodes.size > 1 else 0.0
+        rigid = length * equations.residual(nodes, traction @ along_surface, displacement @ along_surface / length)
+        rigid_motion = -rigid[:, 0] + 1j * rigid[:, 1] - strain * x
+        turn = float(np.polyfit(x / length, rigid_motion.imag, 1)[0]) / length if nodes.size > 1 else 0.0
         self._turn = turn
-        self._shift += complex((moved - 1j * turn * x).mean())
+        self._shift += complex((rigid_motion - 1j * turn * x).mean())
 
-    def _follow_period(self, displacement: FloatArray) -> None:
-        """Keep the mean strain along the surface, and its mean displacement."""
+    def _fit_period(self, displacement: FloatArray) -> None:
+        """Fit the mean strain along the surface and the mean displacement."""
         compressibility, lengths = self.material.plane_compressibility, self.mesh.lengths
         self._tension -= self.material.plane_modulus * compressibility * self._mean.imag
         self._turn = compressibility * self._mean.real
-        # deep below all waves the field is linear: so is its mean over the surface
+        # below all waves the field is linear; it continues to the mean displacement of the surface
         depth = _DEEP * self._length
         deep = (self._origin - depth * self.mesh.normals[0])[None, :]
         above = self.displacement(deep) + depth * self.displacement_gradient(deep) @ self.mesh.normals[0]
@@ -123,21 +123,21 @@ class HalfPlaneFields(PotentialFields):
 
     def is_inside(self, points: FloatArray) -> BoolArray:
         """Return the (n,) mask of the (n, 2) points [m] that lie strictly below the surface."""
-        return np.asarray(self._places(as_points(points)).imag < 0.0)
+        return np.asarray(self._local_points(as_points(points)).imag < 0.0)
 
-    def _places(self, points: FloatArray) -> ComplexArray:
-        """Return points along the local axes, by the length of the strip."""
+    def _local_points(self, points: FloatArray) -> ComplexArray:
+        """Return points in the local axes, with the length of the strip as unit."""
         return self._local(points - self._origin) / self._length
 
     def _checked(self, points: FloatArray) -> ComplexArray:
         points = as_points(points)
-        z = self._places(points)
-        wrong = np.flatnonzero(~(z.imag < 0.0))
-        if wrong.size:
-            x, y = points[wrong[0]]
+        z = self._local_points(points)
+        outside = np.flatnonzero(~(z.imag < 0.0))
+        if outside.size:
+            x, y = points[outside[0]]
             raise PointNotInsideError(
-                f"point {wrong[0]} at ({x:.9g}, {y:.9g}) lies on or above the surface of the half-plane "
-                f"({wrong.size} of {len(points)} points do): select points with is_inside(points)"
+                f"point {outside[0]} at ({x:.9g}, {y:.9g}) lies on or above the surface of the half-plane "
+                f"({outside.size} of {len(points)} points do): select points with is_inside(points)"
             )
         return z
 
@@ -156,12 +156,12 @@ class HalfPlaneFields(PotentialFields):
         kappa, two_mu = self.material.kappa, 2.0 * self.material.shear_modulus
         strained = kappa * integral + mirrored - (z - z.conj()) * potential.conj()
         tension = self._tension * (0.25 * (kappa - 1.0) * z + 0.5 * z.conj())
-        moved = ((strained + tension) / two_mu + 1j * self._turn * z) * self._length + self._shift
-        moved = moved * self._axis
-        return np.stack([moved.real, moved.imag], axis=1)
+        local = ((strained + tension) / two_mu + 1j * self._turn * z) * self._length + self._shift
+        displacement = local * self._axis
+        return np.stack([displacement.real, displacement.imag], axis=1)
 
     def _sums(self, z: ComplexArray, kernels: _Kernels) -> ComplexArray:
-        """Return the potentials (n,) of two kernels at z, and at its mirrored points: (2, 2, n)."""
+        """Return the potentials of two kernels at z and at the mirrored points z*, (2, 2, n)."""
         jumps = np.stack([self._jumps, self._jumps.conj()], axis=1)
         chunk = max(1, _CHUNK // max(1, self._ends.size))
         sums = np.zeros((2, z.size, 2), complex)
@@ -173,7 +173,7 @@ class HalfPlaneFields(PotentialFields):
 
 
 _Kernels = Callable[[ComplexArray, ComplexArray], tuple[ComplexArray, ComplexArray]]
-"""From ends t of elements and points z: log (t - z) or log sin pi (t - z), and its derivative or integral in z."""
+"""Ends t of elements and points z -> log (t - z) or log sin pi (t - z), and its derivative or integral in z."""
 
 
 def _slope(ends: ComplexArray, z: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
@@ -209,9 +209,9 @@ def _log_sine(arm: ComplexArray, log: ComplexArray) -> ComplexArray:
 
 
 def dilogarithm(z: ComplexArray, log: ComplexArray) -> ComplexArray:
-    """Return Li_2(z) for abs(z) <= 1, given log(1 - z), by its series in u = -log(1 - z) with Bernoulli numbers.
+    """Return Li_2(z) for abs(z) <= 1 and log(1 - z), by the series in u = -log(1 - z) with Bernoulli numbers.
 
-    `scipy.special.spence` needs some hundred terms next to the unit circle, which takes 70 times as long.
+    `scipy.special.spence` sums some hundred terms next to the unit circle, which takes 70 times as long.
     """
     from scipy.special import bernoulli, factorial
 

@@ -1,9 +1,9 @@
-"""The flexibility of a periodic half-plane: one number for each wave, by fast Fourier transforms.
+"""The flexibility of a periodic half-plane: one number for each wave, applied by fast Fourier transforms.
 
-Tractions and displacements are complex numbers, along the tangent and, as the imaginary part, along the normal. A
-traction wave exp(i q s) displaces the surface by 2 / (E' |q|) - c / q times itself, c the compressibility of
-`bemkit.operators.half_plane.flexibility` [Johnson1985]; of tractions constant on elements and displacements that are
-their means the waves q, q + 2 pi / h, ... look alike, and their shares add up to zeta functions.
+Tractions and displacements are complex numbers with the tangential component as real and the normal component as
+imaginary part. A traction wave exp(i q s) displaces the surface by 2 / (E' |q|) - c / q times itself, with the
+compressibility c of `bemkit.operators.half_plane.flexibility` [Johnson1985]. Tractions constant on elements and mean
+displacements cannot distinguish the waves q, q + 2 pi / h, ...; the sum of their contributions is a zeta function.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from bemkit.operators.material import Material
 from bemkit.operators.steklov_poincare.cost import BodyCase, BodyCost
 
 _EQUAL = 1e-6
-"""Relative difference of the lengths of equal elements: numbers hold those of a million elements to 1e-10."""
+"""Largest relative difference of the lengths of equal elements; round-off of a million elements is 1e-10."""
 
 
 def wave_flexibility(n_elements: int, period: float, material: Material) -> FloatArray:
@@ -36,8 +36,8 @@ def wave_flexibility(n_elements: int, period: float, material: Material) -> Floa
     Returns
     -------
     (n_elements,) array [m/Pa]
-        Positive, in the order of `numpy.fft.fftfreq`. The uniform wave displaces like the longest one, by
-        period / (pi E'): a convention, since no point of a half-plane is at rest.
+        Positive, in the order of `numpy.fft.fftfreq`. The uniform wave has the flexibility period / (pi E') of the
+        longest wave by convention, since no point of a half-plane is at rest.
     """
     from scipy.special import zeta
 
@@ -51,12 +51,12 @@ def wave_flexibility(n_elements: int, period: float, material: Material) -> Floa
 
 @dataclass(frozen=True, eq=False)
 class PeriodicElasticity(SurfaceElasticity):
-    """Elasticity of a periodic half-plane seen from equal elements of its surface; no matrix is ever formed.
+    """Elasticity of a periodic half-plane with equal elements on its surface; no matrix is formed.
 
     Raises
     ------
     InputError
-        If elements are not of equal lengths.
+        If the elements have different lengths.
     """
 
     def __post_init__(self) -> None:
@@ -73,7 +73,7 @@ class PeriodicElasticity(SurfaceElasticity):
 
     @cached_property
     def flexibility(self) -> FloatArray:
-        """(n_elements,) array [m/Pa], that of each wave; see `wave_flexibility`."""
+        """(n_elements,) array [m/Pa]: flexibility of each wave; see `wave_flexibility`."""
         return wave_flexibility(self.mesh.n_elements, float(self.mesh.lengths.sum()), self.material)
 
     def _displaced(self, traction: ComplexArray) -> ComplexArray:
@@ -83,15 +83,16 @@ class PeriodicElasticity(SurfaceElasticity):
 
     @cached_property
     def full_flexibility(self) -> FloatArray:
-        """(n_dofs, n_dofs) array [1/Pa]; see `SurfaceElasticity`. A force moves elements by their distance from it."""
+        """(n_dofs, n_dofs) array [1/Pa]; see `SurfaceElasticity`."""
         from scipy.fft import ifft
         from scipy.linalg import circulant
 
+        # the response depends only on the distance between two elements
         response = circulant(np.asarray(ifft(self.flexibility)) / self.mesh.lengths)
         return self.full_from_local(np.array([[response.real, -response.imag], [response.imag, response.real]]))
 
-    def held(self, displacement: ComplexArray) -> ComplexArray:
-        """Return the tractions (n_elements,) [Pa] that hold displacements (n_elements,) [m]."""
+    def tractions_of(self, displacement: ComplexArray) -> ComplexArray:
+        """Return the tractions (n_elements,) [Pa] that cause displacements (n_elements,) [m]."""
         from scipy.fft import fft, ifft
 
         return np.asarray(ifft(fft(displacement) / self.flexibility))

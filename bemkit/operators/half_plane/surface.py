@@ -1,6 +1,7 @@
-"""Base of the elasticity of all half-planes.
+"""Base class of the elastic maps of half-planes.
 
-Tractions and displacements are complex numbers, along the tangent and, as the imaginary part, along the normal.
+Tractions and displacements are complex numbers: the real part is the component along the tangent, the imaginary part
+that along the normal.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from bemkit.arrays import ComplexArray, FloatArray
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.spaces import ConstantSpace, dof_points
 from bemkit.operators.counts import Factorisation, FactorKind, OperationCounts
-from bemkit.operators.half_plane.far_drive import FarMotion
+from bemkit.operators.half_plane.far_motion import FarMotion
 from bemkit.operators.material import Material
 from bemkit.operators.pair_form import Tag
 from bemkit.operators.steklov_poincare.cost import BodyCase, BodyCost
@@ -26,42 +27,42 @@ from bemkit.operators.steklov_poincare.protocol import BoundaryMap, CondensedMap
 
 @dataclass(frozen=True, eq=False)
 class SurfaceElasticity(BoundaryMap, ABC):
-    """Elasticity of a half-plane seen from elements of its surface; fulfils `SteklovPoincare`.
+    """Elasticity of a half-plane with elements on its surface; fulfils `SteklovPoincare`.
 
     Parameters
     ----------
     mesh : BoundaryMesh
         The surface, in units of its length.
     material : Material
-    drive : FarMotion
-        How the half-plane moves far away; it rests unless given.
+    far_motion : FarMotion
+        Motion far away; by default the half-plane is at rest there.
     last : list
-        The last tractions and what they displace: a response, its certificate and its fields ask for the same.
+        The last tractions and their displacements, which a response, its certificate and its fields share.
     """
 
     mesh: BoundaryMesh
     material: Material
-    drive: FarMotion = field(default_factory=FarMotion)
+    far_motion: FarMotion = field(default_factory=FarMotion)
     last: list[tuple[ComplexArray, ComplexArray]] = field(default_factory=list, repr=False)
 
     @cached_property
     def displacement_space(self) -> ConstantSpace:
-        """Means over elements."""
+        """The space of mean displacements of elements."""
         return ConstantSpace(self.mesh)
 
     @property
     def traction_space(self) -> ConstantSpace:
-        """Constants on elements."""
+        """The space of tractions constant on elements."""
         return self.displacement_space
 
     @property
     @abstractmethod
     def flexibility(self) -> FloatArray:
-        """Displacements by tractions, without the rigid motion far away; computed once."""
+        """Displacements per traction without the far motion; computed once."""
 
     @property
     def tags(self) -> frozenset[Tag]:
-        """Symmetric."""
+        """The map is symmetric."""
         return frozenset({Tag.SYMMETRIC})
 
     @abstractmethod
@@ -73,9 +74,9 @@ class SurfaceElasticity(BoundaryMap, ABC):
         """Operation counts of the flexibility."""
         return OperationCounts()
 
-    def driven_by(self, drive: FarMotion) -> Self:
-        """Return the same half-plane under another drive; nothing is integrated again."""
-        other = replace(self, drive=drive)
+    def with_far_motion(self, far_motion: FarMotion) -> Self:
+        """Return the same half-plane under another far motion; nothing is integrated again."""
+        other = replace(self, far_motion=far_motion)
         if "flexibility" in self.__dict__:
             other.__dict__["flexibility"] = self.flexibility
         return other
@@ -90,7 +91,7 @@ class SurfaceElasticity(BoundaryMap, ABC):
 
     @abstractmethod
     def _displaced(self, traction: ComplexArray) -> ComplexArray:
-        """Return the same of tractions that are not zero."""
+        """Return the displacements of tractions that are not zero."""
 
     @cached_property
     def axes(self) -> ComplexArray:
@@ -106,11 +107,11 @@ class SurfaceElasticity(BoundaryMap, ABC):
         return np.asarray((numbers[:, None] * self.axes.conj()).real)
 
     def strain_displacement(self, force: FloatArray) -> FloatArray:
-        """Return the displacements (n_nodes, 2) that nodal forces (n_nodes, 2) cause, without those of the drive."""
+        """Return the displacements (n_nodes, 2) that nodal forces (n_nodes, 2) cause, without the far motion."""
         return self.to_vectors(self.displaced(self.to_complex(force / self.mesh.lengths[:, None])))
 
     def own_fields(self, displacement: FloatArray, force: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return displacement without that far away, and force."""
+        """Return the displacement without the far motion, and the force."""
         return self.strain_displacement(force), force
 
     @property
@@ -119,13 +120,13 @@ class SurfaceElasticity(BoundaryMap, ABC):
         """(n_dofs, n_dofs) array [1/Pa] from forces to displacements, index ``2 element + component`` in x and y."""
 
     def full_from_local(self, local: FloatArray) -> FloatArray:
-        """Return the full flexibility from that (2, 2, n, n) of the components along tangent and normal."""
+        """Return the full flexibility from that of tangential and normal components, (2, 2, n, n)."""
         axes = np.stack([self.mesh.tangents[0], self.mesh.normals[0]])
         full = np.einsum("ka,klij,lb->iajb", axes, local, axes, optimize=True).reshape(2 * local.shape[2], -1)
         return np.asarray(0.5 * (full + full.T))
 
     def condensed_work(self, n_acting: int) -> OperationCounts:
-        """Operation counts of the inverse of the flexibility on the directions retained or fixed."""
+        """Return the operation counts of the inverse of the flexibility on retained and fixed directions."""
         return OperationCounts(
             factorisations=(Factorisation(FactorKind.CHOLESKY, n_acting),) if n_acting else (),
             right_hand_sides=n_acting,
@@ -136,10 +137,10 @@ class SurfaceElasticity(BoundaryMap, ABC):
         from bemkit.operators.half_plane.condensed import CondensedHalfPlane  # only where there are other bodies
 
         points, flexibility = dof_points(self.displacement_space), self.full_flexibility
-        body = CondensedHalfPlane.of(conditions, self.drive, flexibility, points, self.mesh.tangents[0])
+        body = CondensedHalfPlane.of(conditions, self.far_motion, flexibility, points, self.mesh.tangents[0])
         condensed = body.under(force, conditions.displacement)
         return replace(condensed, work=self.work + self.condensed_work(body.acting.size))
 
     def element_tractions(self, displacement: FloatArray, force: FloatArray) -> FloatArray:
-        """Return the tractions (n_elements, 1, 2) [Pa], which are the forces per length."""
+        """Return the tractions (n_elements, 1, 2) [Pa]: forces per length."""
         return np.asarray(force / self.mesh.lengths[:, None])[:, None, :]

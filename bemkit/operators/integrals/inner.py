@@ -1,14 +1,14 @@
-"""Inner integrals over one trial element, seen from a point: closed forms, and what bending adds to them.
+"""Inner integrals over one trial element for a point: closed forms, and the contributions of curvature.
 
-With zeta - p(t) = (t0 - t) g(t) (see `curved_panels`) the integrals over a curved element near the point are those of
-the straight element seen from t0 = xi + i eta, plus integrals of functions that are smooth on [-1, 1]:
+With zeta - p(t) = (t0 - t) g(t) (see `curved_geometry`) the integrals over a curved element near the point are those of
+the straight element for the point t0 = xi + i eta, plus integrals of functions that are smooth on [-1, 1]:
 
     int P_b log|rho| dt        = straight + int P_b log|g| dt
     int P_b 2 pi k dt          = straight - int P_b Im(g' / g) dt
     int P_b rho / conj(rho) dt = int P_b h dt + 2 i eta (h0 conj(C_b) + int P_b (h - h0) / (conj(t0) - t) dt),
 
-with h = g / conj(g) on the real axis and h0 its value at conj(t0). Nothing is singular or cancels, wherever the point
-lies. Far from the element the integrands themselves are smooth and a Gauss rule serves.
+with h = g / conj(g) on the real axis and its value h0 at conj(t0). The remainders are not singular and lose no digits
+for any point. Far from the element the integrands themselves are smooth, and a Gauss rule is used.
 """
 
 from __future__ import annotations
@@ -18,70 +18,70 @@ import numpy as np
 from bemkit.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from bemkit.geometry.quadrature import gauss_legendre
 from bemkit.operators import kernels
-from bemkit.operators.integrals import curved_panels
+from bemkit.operators.integrals import curved_geometry
+from bemkit.operators.integrals.element_geometry import ElementGeometry
 from bemkit.operators.integrals.pairs import Degrees, Inner
-from bemkit.operators.integrals.panels import Panels
 
 N_SMOOTH = 16
-"""Points for the smooth remainders, and for the integrals themselves outside `curved_panels.ELLIPSE`."""
+"""Gauss points of the smooth remainders, and of the integrals themselves outside of `curved_geometry.ELLIPSE`."""
 
 
 def inner_integrals(
-    panels: Panels, degrees: Degrees, trial: IntArray, from_start: ComplexArray, from_end: ComplexArray
+    geometry: ElementGeometry, degrees: Degrees, trial: IntArray, from_start: ComplexArray, from_end: ComplexArray
 ) -> Inner:
-    """Integrate over trial elements that are seen from points at any distance, one point for each.
+    """Integrate over trial elements for points at any distance, one point for each element.
 
     Parameters
     ----------
-    panels : Panels
+    geometry : ElementGeometry
     degrees : Degrees
     trial : (n,) int array
-        Elements.
+        Indices of elements.
     from_start, from_end : (n,) complex arrays [m]
-        The points relative to either end of their element, each accurate near that end.
+        The points relative to the start and end of their element, each accurate near that end.
     """
-    plus, minus = from_start * panels.to_local[trial], from_end * panels.to_local[trial]
-    if panels.curved is None or bool(panels.is_straight[trial].all()):
+    plus, minus = from_start * geometry.to_local[trial], from_end * geometry.to_local[trial]
+    if geometry.curved is None or bool(geometry.is_straight[trial].all()):
         return _seen_from(degrees, plus, minus)
     result = Inner.zeros(degrees, trial.shape)
-    zeta = local_coordinates(panels, trial, from_start)
-    near = np.flatnonzero(np.abs(zeta) < panels.reach(curved_panels.ELLIPSE)[trial])
-    t_plus, t_minus, is_found = curved_panels.find_parameters(panels.curved, trial[near], plus[near], minus[near])
+    zeta = local_coordinates(geometry, trial, from_start)
+    near = np.flatnonzero(np.abs(zeta) < geometry.distance_at(curved_geometry.ELLIPSE)[trial])
+    t_plus, t_minus, is_found = curved_geometry.find_parameters(geometry.curved, trial[near], plus[near], minus[near])
     near = near[is_found]
-    store(result, near, near_inner(degrees, panels.polynomials(trial[near]), t_plus[is_found], t_minus[is_found]))
+    store(result, near, near_inner(degrees, geometry.polynomials(trial[near]), t_plus[is_found], t_minus[is_found]))
     is_far = np.ones(trial.size, bool)
     is_far[near] = False
     far = np.flatnonzero(is_far)
-    store(result, far, far_inner(degrees, panels.polynomials(trial[far]), zeta[far], N_SMOOTH + degrees.extra_points))
+    store(result, far, far_inner(degrees, geometry.polynomials(trial[far]), zeta[far], N_SMOOTH + degrees.extra_points))
     return result
 
 
-def local_coordinates(panels: Panels, trial: IntArray, from_start: ComplexArray) -> ComplexArray:
-    """Return the local coordinates of points given relative to the start of their element."""
-    zeta: ComplexArray = ((panels.start - panels.centre)[trial] + from_start) * panels.to_local[trial]
+def local_coordinates(geometry: ElementGeometry, trial: IntArray, from_start: ComplexArray) -> ComplexArray:
+    """Return the local coordinates of points from their position relative to the start of their element."""
+    zeta: ComplexArray = ((geometry.start - geometry.centre)[trial] + from_start) * geometry.to_local[trial]
     return zeta
 
 
-def inner_on_element(panels: Panels, degrees: Degrees, elements: IntArray, xi: float) -> Inner:
-    """Integrate over elements seen from their own points at the local coordinate `xi`; k is a principal value."""
+def inner_on_element(geometry: ElementGeometry, degrees: Degrees, elements: IntArray, xi: float) -> Inner:
+    """Integrate over elements for their own points at the local coordinate `xi`; k is a principal value."""
     end: ComplexArray = np.full(elements.size, 1.0 + 0j)
     integrals, log_product = kernels.near_integrals(xi + end, xi - end, degrees.highest_integral)
     principal = integrals.real.astype(complex)
     straight = Inner.straight(degrees, principal, log_product, np.zeros(elements.size))
-    if panels.curved is None or bool(panels.is_straight[elements].all()):
+    if geometry.curved is None or bool(geometry.is_straight[elements].all()):
         return straight
-    return _sum(straight, bending(degrees, panels.polynomials(elements), np.full(elements.size, xi + 0j)))
+    return _sum(straight, bending(degrees, geometry.polynomials(elements), np.full(elements.size, xi + 0j)))
 
 
 def store(result: Inner, chosen: IntArray | BoolArray, values: Inner) -> None:
-    """Write the integrals of some of the points."""
+    """Write the integrals of chosen points."""
     result.log[:, chosen] = values.log
     result.quotient[:, chosen] = values.quotient
     result.cauchy[:, chosen] = values.cauchy
 
 
 def _seen_from(degrees: Degrees, plus: ComplexArray, minus: ComplexArray) -> Inner:
-    """Return the closed forms of straight elements; `plus` and `minus` as in `kernels.near_integrals`."""
+    """Return the closed forms of straight elements; see `kernels.near_integrals`."""
     integrals, log_product = kernels.near_integrals(plus, minus, degrees.highest_integral)
     return Inner.straight(degrees, integrals, log_product, kernels.local_coordinate(plus, minus).imag)
 
@@ -103,7 +103,7 @@ def near_inner(degrees: Degrees, coefficients: ComplexArray, plus: ComplexArray,
 
 
 def _sum(straight: Inner, smooth: Inner) -> Inner:
-    """Add what bending adds; the quotient of `smooth` is the whole one."""
+    """Add the smooth remainders; the quotient of `smooth` is already complete."""
     return Inner(straight.log + smooth.log, smooth.quotient, straight.cauchy + smooth.cauchy)
 
 
@@ -114,12 +114,12 @@ def bending(
     eta: FloatArray | None = None,
     integrals: ComplexArray | None = None,
 ) -> Inner:
-    """Return what bending adds to log and double, and the whole quotient, at points with the parameters `root` (n,).
+    """Return the smooth remainders of log and double, and the complete quotient, at the parameters `root` (n,).
 
-    Points on the elements themselves need neither `eta`, which is zero, nor the integrals C_b.
+    For points on the elements themselves omit `eta`, which is zero, and the integrals C_b.
     """
     n_log, n_double = degrees.n_trial
-    divided = curved_panels.divided_difference(coefficients, root)
+    divided = curved_geometry.divided_difference(coefficients, root)
     n_points = N_SMOOTH + degrees.extra_points
     t, _ = gauss_legendre(n_points)
     powers = np.vander(t, divided.shape[0], increasing=True)
@@ -130,18 +130,18 @@ def bending(
     log = weights_of_log @ (0.5 * np.log(size))
     quotient = _product(weights_of_log, ratio)
     if n_log and eta is not None and integrals is not None:
-        at_mirror = curved_panels.evaluate(divided, root.conj()) / curved_panels.evaluate(divided, root).conj()
+        at_mirror = curved_geometry.evaluate(divided, root.conj()) / curved_geometry.evaluate(divided, root).conj()
         gap = root.conj() - t[:, None]
-        gap[gap == 0.0] = 1.0  # then eta is zero, and with it the whole term
+        gap[gap == 0.0] = 1.0  # eta, a factor of the term, is zero then
         change = _product(weights_of_log, (ratio - at_mirror) / gap)
         quotient += (2j * eta) * (at_mirror * integrals[:n_log].conj() + change)
-    slope = _product(powers[:, :-1], curved_panels.derivative(divided))
+    slope = _product(powers[:, :-1], curved_geometry.derivative(divided))
     double = kernels.legendre_weights(n_double, n_points) @ (-(slope * g.conj()).imag / size)
     return Inner(log, quotient, 1j * double)
 
 
 def far_inner(degrees: Degrees, coefficients: ComplexArray, zeta: ComplexArray, n_points: int) -> Inner:
-    """Integrate over curved elements far from points by a Gauss rule.
+    """Integrate over curved elements for far points by a Gauss rule.
 
     Parameters
     ----------
@@ -151,26 +151,26 @@ def far_inner(degrees: Degrees, coefficients: ComplexArray, zeta: ComplexArray, 
     zeta : (..., n_trial) complex array
         Local coordinates of the points.
     n_points : int
-        Enough for the distance of the points.
+        Number of Gauss points, which must suit the distance of the points.
     """
     n_log, n_double = degrees.n_trial
     result = Inner.zeros(degrees, zeta.shape)
-    slopes = curved_panels.derivative(coefficients)
+    slopes = curved_geometry.derivative(coefficients)
     factors = kernels.legendre_weights(max(n_log, n_double), n_points)
     for t, factor in zip(gauss_legendre(n_points)[0], factors.T, strict=True):
-        place = np.full(coefficients.shape[1], t + 0j)
-        rho = zeta - curved_panels.evaluate(coefficients, place)
+        parameter = np.full(coefficients.shape[1], t + 0j)
+        rho = zeta - curved_geometry.evaluate(coefficients, parameter)
         size = np.square(rho.real) + np.square(rho.imag)
         if n_log:
             result.log[:] += np.multiply.outer(0.5 * factor[:n_log], np.log(size))
             result.quotient[:] += np.multiply.outer(factor[:n_log], rho * rho / size)
         if n_double:
-            angle = (curved_panels.evaluate(slopes, place) * rho.conj()).imag / size
+            angle = (curved_geometry.evaluate(slopes, parameter) * rho.conj()).imag / size
             result.double[:] += np.multiply.outer(factor[:n_double], angle)
     return result
 
 
 def _product(matrix: FloatArray, values: ComplexArray) -> ComplexArray:
-    """Return matrix @ values for a real matrix and complex values by one real product."""
+    """Return the product of a real matrix and complex values."""
     values = np.ascontiguousarray(values)
     return np.asarray(matrix @ values.view(float)).view(complex)

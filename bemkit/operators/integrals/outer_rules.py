@@ -1,4 +1,4 @@
-"""Gauss rules on the outer elements of pairs: their number of points follows from the distance of the inner element."""
+"""Gauss rules on the outer elements of pairs, with more points the closer the inner element is."""
 
 from __future__ import annotations
 
@@ -12,37 +12,39 @@ import numpy.typing as npt
 from bemkit.arrays import BoolArray, FloatArray, IntArray, read_only
 from bemkit.geometry.quadrature import gauss_graded, gauss_legendre
 from bemkit.operators import kernels
-from bemkit.operators.integrals.panels import Panels, squared_distance
+from bemkit.operators.integrals.element_geometry import ElementGeometry, squared_distance
 from bemkit.operators.integrals.splitting import SEPARATION, split_until
 
-# An analytic function whose nearest singularity lies z half lengths from the centre is integrated by n Gauss points
-# with an error of about (z + sqrt(z^2 - 1))^(-2n). A factor P_a costs a digits of that base, and every rule has one
-# point more for every two degrees (`Degrees.extra_points`), so that an odd a costs one digit: the distances below make
-# the error 1e-15 for even a and at most 7e-14 for odd a, of what P_0 gives.
+# n Gauss points integrate an analytic function, whose nearest singularity is z half lengths from the centre, with an
+# error of about r^(-2n), r = z + sqrt(z^2 - 1). A factor P_a increases the error by r^a, and each rule has one point
+# more for every two degrees (`Degrees.extra_points`). At the distances below the error is 1e-15 for even a and at most
+# 7e-14 for odd a, relative to the integral with P_0.
 GAUSS_LEVELS = ((2, 1.2e4), (3, 212.0), (4, 38.0), (6, 9.0), (10, 3.0))
-"""Numbers of outer points, and the distance [half lengths of the outer element] from which each is enough."""
+"""Numbers of outer points, and the smallest distance of each [half lengths of the outer element]."""
 N_REGULAR = 10
+"""Points on a piece away from both ends of the inner element."""
 N_TOUCHING = 30
+"""Graded points on a piece that begins at a common node."""
 LevelArray = npt.NDArray[np.int8]
-"""An index into `GAUSS_LEVELS` for each pair; one byte, because there are as many as matrix blocks."""
+"""An index into `GAUSS_LEVELS` for each pair, in one byte because pairs are many."""
 
 
-def gauss_levels(panels: Panels, outer: IntArray, inner: IntArray) -> LevelArray:
-    """Return how many of the distances of `GAUSS_LEVELS` pairs fall short of, for elements of shapes that broadcast.
+def gauss_levels(geometry: ElementGeometry, outer: IntArray, inner: IntArray) -> LevelArray:
+    """Return the level of pairs: the number of distances in `GAUSS_LEVELS` that exceed theirs; arrays broadcast.
 
-    A curved inner element needs a rule of its own, with the same distances in its own half lengths.
+    Curved inner elements take a Gauss rule, too, with the same distances in half lengths of the inner element.
     """
-    centre, half = panels.centre[outer], panels.half[outer]
-    nearest = np.minimum(squared_distance(centre, panels.start[inner]), squared_distance(centre, panels.end[inner]))
+    centre, half = geometry.centre[outer], geometry.half[outer]
+    nearest = np.minimum(squared_distance(centre, geometry.start[inner]), squared_distance(centre, geometry.end[inner]))
     level = np.zeros(nearest.shape, np.int8)
     for _, distance in GAUSS_LEVELS:
-        level += nearest < np.square(half * panels.reach(distance)[outer])
-    if panels.curved is not None:
-        from_centre = squared_distance(centre, panels.centre[inner])
-        own = np.zeros_like(level)
+        level += nearest < np.square(half * geometry.distance_at(distance)[outer])
+    if geometry.curved is not None:
+        from_centre = squared_distance(centre, geometry.centre[inner])
+        inner_level = np.zeros_like(level)
         for _, distance in GAUSS_LEVELS:
-            own += from_centre < np.square(panels.half[inner] * panels.reach(distance)[inner] + half)
-        level = np.where(panels.is_straight[inner], level, np.maximum(level, own))
+            inner_level += from_centre < np.square(geometry.half[inner] * geometry.distance_at(distance)[inner] + half)
+        level = np.where(geometry.is_straight[inner], level, np.maximum(level, inner_level))
     return level
 
 
@@ -50,18 +52,18 @@ def gauss_levels(panels: Panels, outer: IntArray, inner: IntArray) -> LevelArray
 class OuterRule:
     """Points on the outer elements of some pairs.
 
-    Points are given as fractions of the length from one end node, so that the distance to a shared node, and to a node
-    at any small distance from it, is exact however small it is.
+    Points are fractions of the length from one end node. So their distances from a common node are exact, however
+    small.
 
     Parameters
     ----------
     item : (n,) int array
         The pairs, ascending.
     at_start : (n, n_points) bool array
-        Whether the start is the end node that points are measured from.
+        Whether fractions are measured from the start node.
     fraction : (n, n_points) array
     weight : (n, n_points) array, optional
-        By default points and weights are Gauss' on whole elements; then a single row of points serves all pairs.
+        By default points and weights are those of Gauss on whole elements; one row of points then serves all pairs.
     """
 
     item: IntArray
@@ -71,18 +73,18 @@ class OuterRule:
 
     @classmethod
     def whole(cls, item: IntArray, n_points: int) -> OuterRule:
-        """Return one Gauss rule for all, each half of it measured from its own end."""
+        """Return one Gauss rule for all pairs, each half of it measured from the nearer end."""
         points, _ = gauss_legendre(n_points)
         return cls(item, (points < 0.0)[None], 0.5 * (1.0 - np.abs(points))[None])
 
     @property
     def n_points(self) -> int:
-        """How many points there are on all pairs."""
+        """Number of points of all pairs."""
         return int(self.item.size * self.fraction.shape[1])
 
     @property
     def points(self) -> tuple[IntArray, BoolArray, FloatArray]:
-        """The pair of each point, which end it is measured from and how far it is away."""
+        """The pair of each point, whether it is measured from the start, and its fraction."""
         shape = self.item.size, self.fraction.shape[1]
         at_start, fraction = np.broadcast_to(self.at_start, shape), np.broadcast_to(self.fraction, shape)
         return np.repeat(self.item, shape[1]), at_start.ravel(), fraction.ravel()
@@ -94,12 +96,12 @@ class OuterRule:
         return OuterRule(self.item[chosen], self.at_start[chosen], self.fraction[chosen], self.weight[chosen])
 
     def moments(self, values: FloatArray, n_polynomials: int) -> tuple[IntArray, FloatArray]:
-        """Sum values (n_rows, n_points) at the points, times the Legendre polynomials of the outer elements.
+        """Integrate values (n_rows, n_points) at the points times the Legendre polynomials of the outer elements.
 
         Returns
         -------
         items : (m,) int array
-            Without repetition.
+            The distinct pairs.
         moments : (n_rows, n_polynomials, m) array
         """
         n_points = self.fraction.shape[1]
@@ -116,7 +118,7 @@ class OuterRule:
 
 
 def batches(rules: Iterable[OuterRule], n_points: int) -> Iterator[list[OuterRule]]:
-    """Group rules, cut where they are long, so that each group has so many points at most."""
+    """Group rules into batches of at most `n_points` points; long rules are cut."""
     batch: list[OuterRule] = []
     room = n_points
     for rule in rules:
@@ -144,28 +146,29 @@ def _on_unit_interval(n_points: int) -> tuple[FloatArray, FloatArray]:
 
 
 def split_rules(
-    panels: Panels, outer: IntArray, inner: IntArray, item: IntArray, extra_points: int
+    geometry: ElementGeometry, outer: IntArray, inner: IntArray, item: IntArray, extra_points: int
 ) -> tuple[OuterRule, OuterRule]:
     """Return rules on pieces of outer elements, bisected until each piece is away from both ends of the inner element.
 
-    A piece that begins at a common node takes a rule for that, the second one, but must be away from the other node.
+    Pieces that begin at a common node take the second, graded rule; they must be away from the other end only.
     """
-    own, other = np.tile(outer[item], 2), np.tile(inner[item], 2)
+    # both halves of each outer element, measured from its start and its end
+    outer_element, inner_element = np.tile(outer[item], 2), np.tile(inner[item], 2)
     at_start = np.repeat([True, False], item.size)
-    node = np.where(at_start, panels.start[own], panels.end[own])
-    number = np.where(at_start, panels.start_node[own], panels.end_node[own])
-    reach = (panels.reach(SEPARATION) * panels.half)[own]
-    to_start, to_end = node - panels.start[other], node - panels.end[other]
-    meets_start, meets_end = number == panels.start_node[other], number == panels.end_node[other]
+    point = np.where(at_start, geometry.start[outer_element], geometry.end[outer_element])
+    node = np.where(at_start, geometry.start_node[outer_element], geometry.end_node[outer_element])
+    least_distance = (geometry.distance_at(SEPARATION) * geometry.half)[outer_element]
+    to_start, to_end = point - geometry.start[inner_element], point - geometry.end[inner_element]
+    meets_start, meets_end = node == geometry.start_node[inner_element], node == geometry.end_node[inner_element]
 
-    def is_clear(half: IntArray, low: FloatArray, high: FloatArray) -> BoolArray:
-        centre = panels.offset(own[half], 0.5 * (low + high), at_start[half])
-        distance, at_node = reach[half] * (high - low), low == 0.0
-        start_is_clear = (np.abs(to_start[half] + centre) >= distance) | (at_node & meets_start[half])
-        end_is_clear = (np.abs(to_end[half] + centre) >= distance) | (at_node & meets_end[half])
-        return np.asarray(start_is_clear & end_is_clear)
+    def is_separated(half: IntArray, low: FloatArray, high: FloatArray) -> BoolArray:
+        centre = geometry.offset(outer_element[half], 0.5 * (low + high), at_start[half])
+        distance, at_node = least_distance[half] * (high - low), low == 0.0
+        from_start = (np.abs(to_start[half] + centre) >= distance) | (at_node & meets_start[half])
+        from_end = (np.abs(to_end[half] + centre) >= distance) | (at_node & meets_end[half])
+        return np.asarray(from_start & from_end)
 
-    half, low, high = split_until(is_clear, own.size, 0.0, 0.5)
+    half, low, high = split_until(is_separated, outer_element.size, 0.0, 0.5)
     order = np.argsort(half % max(item.size, 1), kind="stable")
     half, low, high = half[order], low[order], high[order]
     touches = (low == 0.0) & (meets_start | meets_end)[half]

@@ -1,4 +1,4 @@
-"""Element-pair integrals: the one module that distinguishes coincident, touching, near and far elements.
+"""Integrals of element pairs that are coincident, touching, near or far.
 
 For a test element i and a trial element j, with local coordinates xi and t in [-1, 1] on each and the Legendre
 polynomials P_k, the scalar integrals
@@ -7,11 +7,11 @@ polynomials P_k, the scalar integrals
     quotient[a, b] = int int P_a(xi) P_b(t) (x - y) / conj(x - y)          (complex: Q11 - Q22 + 2i Q12)
     double[a, b]   = int int P_a(xi) P_b(t) k(x, y)                        (Laplace double layer)
 
-serve all four operators. The inner integral is closed form on straight elements (`kernels`); on curved ones it is the
-same closed form plus a smooth remainder near by, and a Gauss rule far away (`inner`). The outer is a Gauss rule whose
-number of points follows from the distance of the two singular points of the inner integral, the end points of the trial
-element. Most pairs are far and are swept densely in chunks; the few that need more points or exact local coordinates
-are listed and corrected (`near`).
+serve all four operators. The inner integral has a closed form on straight elements (`kernels`). On curved elements it
+is the same closed form plus a smooth remainder for near points, and a Gauss rule for far points (`inner`). The outer
+integral is a Gauss rule, whose number of points depends on the distance of the end points of the trial element, where
+the inner integral is singular. Most pairs are far and are swept densely in chunks; the few that need more points or
+exact local coordinates are listed and corrected (`near`).
 """
 
 from __future__ import annotations
@@ -25,44 +25,43 @@ from bemkit.arrays import BoolArray, IntArray
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.quadrature import gauss_legendre
 from bemkit.operators import kernels
+from bemkit.operators.integrals.element_geometry import ElementGeometry, squared_distance
 from bemkit.operators.integrals.inner import far_inner
 from bemkit.operators.integrals.near import integrate_listed
 from bemkit.operators.integrals.outer_rules import GAUSS_LEVELS, LevelArray, gauss_levels
 from bemkit.operators.integrals.pairs import Degrees, Inner, PairIntegrals
-from bemkit.operators.integrals.panels import Panels, squared_distance
 
 DENSE_DISTANCE = 45.0
-"""Pairs closer than this, in half lengths of the trial element, leave the dense sweep."""
+"""Smallest distance of a pair in the dense sweep, in half lengths of the trial element."""
 CHUNK_PAIRS = 32768
-"""Pairs treated at once, at most: a few complex arrays of this length stay in the cache."""
+"""Largest number of pairs in a chunk, of which a few complex arrays stay in the cache."""
 CHUNK_INTEGRALS = 65536
-"""Integrals of one kind treated at once, at most: those of all polynomials."""
+"""Largest number of integrals of one kind in a chunk, over all polynomials."""
 LISTED_COST = 1.5
-"""Cost of a listed pair and point against one of the dense sweep (measured)."""
+"""Cost of a listed pair and point relative to the dense sweep (measured)."""
 LISTED_PAIRS = 60
-"""Listed pairs of an element, at most, where all are of like length: those within `DENSE_DISTANCE` and around corners
-(counted)."""
+"""Largest number of listed pairs of an element on meshes of uniform length: those within `DENSE_DISTANCE` and around
+corners (counted)."""
 FEW = 2 * LISTED_PAIRS
-"""Straight elements whose pairs are all listed: both orders of two elements then share their integrals, which in the
-dense sweep they do not."""
+"""Largest number of straight elements whose pairs are all listed; both orders of two elements then share integrals."""
 LISTED_SHARE_OF_CURVED = 1.0 / 3.0
-"""Share of all pairs that is listed on small curved meshes, which have no `DENSE_DISTANCE` (counted)."""
+"""Share of listed pairs on small curved meshes, which have no `DENSE_DISTANCE` (counted)."""
 BATCH_MEMORY = 1.2e6
 """Bytes of the temporary arrays of one batch of outer points (measured)."""
 CURVED_BATCH_MEMORY = 0.1e6, 8e6
-"""The same of curved elements: for each element, and at most."""
+"""Bytes of a batch on curved elements: for each element, and at most."""
 
 
 class PairSweep:
-    """Integrals of all pairs of some test and trial elements, delivered in chunks of rows (from any thread).
+    """Integrals of all pairs of some test and trial elements, in chunks of rows; safe to call from threads.
 
     Parameters
     ----------
     mesh : BoundaryMesh
     degrees : Degrees
-        The integrals that are wanted.
+        The required integrals.
     test_elements, trial_elements : (n_test,), (n_trial,) arrays, optional
-        Element numbers of the rows and the columns; by default all elements.
+        Elements of the rows and the columns; by default all elements.
     """
 
     def __init__(
@@ -72,11 +71,11 @@ class PairSweep:
         test_elements: IntArray | None = None,
         trial_elements: IntArray | None = None,
     ) -> None:
-        everything = np.arange(mesh.n_elements)
-        self.panels = Panels(mesh)
+        all_elements = np.arange(mesh.n_elements)
+        self.geometry = ElementGeometry(mesh)
         self.degrees = degrees
-        self.test = everything if test_elements is None else test_elements
-        self.trial = everything if trial_elements is None else trial_elements
+        self.test = all_elements if test_elements is None else test_elements
+        self.trial = all_elements if trial_elements is None else trial_elements
         self._n_rows = rows_per_chunk(degrees, self.trial.size, 1)
         level, is_close = self._classify()
         counts = np.bincount(level.ravel(), minlength=len(GAUSS_LEVELS) + 1)
@@ -86,7 +85,7 @@ class PairSweep:
         self._n_rows = rows_per_chunk(degrees, self.trial.size, n_points)
         self._rows, self._columns = np.nonzero(is_listed)
         pairs = self.test[self._rows], self.trial[self._columns]
-        self._listed, self._places = integrate_listed(self.panels, degrees, *pairs)
+        self._listed, self._slots = integrate_listed(self.geometry, degrees, *pairs)
 
     def _n_points(self, level: int) -> int:
         """Return the number of points of a Gauss level."""
@@ -99,54 +98,55 @@ class PairSweep:
         )
 
     def _classify(self) -> tuple[LevelArray, BoolArray]:
-        """Find the Gauss level of every pair on its test element, and which pairs are too close for the dense sweep."""
-        p = self.panels
+        """Return the Gauss level of each pair, and a mask of pairs too close for the dense sweep."""
+        geometry = self.geometry
         level = np.empty((self.test.size, self.trial.size), np.int8)
         is_close = np.empty(level.shape, bool)
-        # curved elements have no closed form that needs a distance
+        # only the closed forms of straight elements need a distance
         distance = np.inf if self.trial.size <= FEW else DENSE_DISTANCE
-        reach = np.where(p.is_straight, distance * p.half, -np.inf)[self.trial]
+        least = np.where(geometry.is_straight, distance * geometry.half, -np.inf)[self.trial]
         for rows in self.row_slices():
             test = self.test[rows, None]
-            level[rows] = gauss_levels(p, test, self.trial)
-            is_close[rows] = np.sqrt(squared_distance(p.centre[test], p.centre[self.trial])) < reach + p.half[test]
+            level[rows] = gauss_levels(geometry, test, self.trial)
+            between = np.sqrt(squared_distance(geometry.centre[test], geometry.centre[self.trial]))
+            is_close[rows] = between < least + geometry.half[test]
         return level, is_close
 
     @cached_property
     def _columns_by_kind(self) -> tuple[IntArray, IntArray]:
-        """Return the columns of straight and of curved trial elements."""
-        is_straight = self.panels.is_straight[self.trial]
+        """Columns of straight and of curved trial elements."""
+        is_straight = self.geometry.is_straight[self.trial]
         return np.flatnonzero(is_straight), np.flatnonzero(~is_straight)
 
     def chunk(self, rows: slice) -> PairIntegrals:
         """Return the integrals of some rows, of shape (..., n_rows, n_trial).
 
-        All pairs are swept with the base rule, then the listed pairs are put in their places.
+        All pairs are swept with the base rule, then listed pairs replace theirs.
         """
         listed = slice(*np.searchsorted(self._rows, [rows.start, rows.stop]))
         shape = self.test[rows].size, self.trial.size
         if listed.stop - listed.start == shape[0] * shape[1]:  # on small meshes
-            return self._listed.take(self._places[listed].reshape(shape))
+            return self._listed.take(self._slots[listed].reshape(shape))
         straight, curved = self._columns_by_kind
-        with np.errstate(all="ignore"):  # listed pairs may overflow here; they are replaced below
+        with np.errstate(all="ignore"):  # listed pairs may overflow here; they are replaced
             if not curved.size:
                 result = self._sweep_straight(rows, self.trial)
             else:
                 result = PairIntegrals.zeros(self.degrees, shape)
                 result.put(slice(None), straight, self._sweep_straight(rows, self.trial[straight]))
                 result.put(slice(None), curved, self._sweep_curved(rows, self.trial[curved]))
-        result.put(self._rows[listed] - rows.start, self._columns[listed], self._listed.take(self._places[listed]))
+        result.put(self._rows[listed] - rows.start, self._columns[listed], self._listed.take(self._slots[listed]))
         return result
 
     def _sweep_straight(self, rows: slice, trial: IntArray) -> PairIntegrals:
-        """Integrate with the base rule on the test elements and the far series of the closed forms on the others."""
-        p, test = self.panels, self.test[rows]
+        """Integrate with the base rule on the test elements and far series of closed forms on the trial elements."""
+        geometry, test = self.geometry, self.test[rows]
         points, _ = gauss_legendre(self._n_points(self.base))
         n_terms = kernels.terms_needed(DENSE_DISTANCE)
-        to_local, offset = p.to_local[trial], p.to_local[trial] * p.centre[trial]
+        to_local, offset = geometry.to_local[trial], geometry.to_local[trial] * geometry.centre[trial]
         inner = []
         for xi in points.tolist():
-            zeta = p.point(test, xi)[:, None] * to_local
+            zeta = geometry.point(test, xi)[:, None] * to_local
             zeta -= offset
             integrals = kernels.far_integrals(zeta, self.degrees.highest_integral, n_terms)
             log_product = kernels.far_log_product(zeta) if self.degrees.log else zeta.real
@@ -155,21 +155,21 @@ class PairSweep:
 
     def _sweep_curved(self, rows: slice, trial: IntArray) -> PairIntegrals:
         """Integrate with the base rule on both elements."""
-        p, test = self.panels, self.test[rows]
+        geometry, test = self.geometry, self.test[rows]
         n_points = self._n_points(self.base)
         points, _ = gauss_legendre(n_points)
-        polynomials = p.polynomials(trial)
-        zeta = [(p.point(test, xi)[:, None] - p.centre[trial]) * p.to_local[trial] for xi in points.tolist()]
-        inner = [far_inner(self.degrees, polynomials, one, n_points) for one in zeta]
+        polynomials, centre, to_local = geometry.polynomials(trial), geometry.centre[trial], geometry.to_local[trial]
+        at_points = [(geometry.point(test, xi)[:, None] - centre) * to_local for xi in points.tolist()]
+        inner = [far_inner(self.degrees, polynomials, zeta, n_points) for zeta in at_points]
         return self._scaled(PairIntegrals.summed(self.degrees, inner), test, trial)
 
     def _scaled(self, sums: PairIntegrals, test: IntArray, trial: IntArray) -> PairIntegrals:
-        sums.scale(self.panels.half[test, None], self.panels.half[trial], self.panels.tangent[trial])
+        sums.scale(self.geometry.half[test, None], self.geometry.half[trial], self.geometry.tangent[trial])
         return sums
 
 
 def sweep_memory(degrees: Degrees, n_test: int, n_trial: int, n_threads: int, *, is_curved: bool) -> int:
-    """Foresee the largest memory of a sweep over elements of like length and of the chunks of its matrices [bytes]."""
+    """Predict the largest memory of a sweep over elements of uniform length and of its chunks [bytes]."""
     (n_log, n_double), level = degrees.n_trial, 3 if n_trial <= FEW else 2  # few elements are all near
     n_points = GAUSS_LEVELS[level][0] + degrees.extra_points
     n_inner, n_outer = 3 * n_log + 2 * n_double, max(n_log, n_double)
@@ -181,24 +181,23 @@ def sweep_memory(degrees: Degrees, n_test: int, n_trial: int, n_threads: int, *,
     )
     n_listed = int(n_test * n_near)
     n_chunk = n_trial * min(n_test, n_threads * rows_per_chunk(degrees, n_trial, 1 if is_listed else n_points))
-    # while pairs are listed: what is kept of them, and the sums that serve both orders of two elements, four times
+    # while pairs are listed: their integrals, and four copies of the sums for both orders of two elements
     listing = 8 * n_listed * (n_integrals + 2 * n_inner * n_outer)
     listing += int(min(CURVED_BATCH_MEMORY[0] * n_test, CURVED_BATCH_MEMORY[1]) if is_curved else BATCH_MEMORY)
-    # later: what is kept, and for each pair of a chunk its inner integrals at all points, those of the quotient copied,
-    # and their sums
+    # later: listed integrals and, for each pair of a chunk, inner integrals at all points (quotients twice) and sums
     of_pair = (0 if is_listed else n_points * (n_inner + 2 * n_log)) + n_integrals
     sweeping = 8 * (n_listed * n_integrals + n_chunk * of_pair)
     return max(listing, sweeping)
 
 
 def rows_per_chunk(degrees: Degrees, n_trial: int, n_points: int) -> int:
-    """Return how many rows of pairs fit into the cache, where the inner integrals of all points are held at once."""
+    """Return how many rows of pairs fit into the cache with the inner integrals of all points."""
     n_rows = min(CHUNK_PAIRS, CHUNK_INTEGRALS // degrees.n_products) // max(1, n_trial)
     return max(1, 3 * n_rows // max(3, n_points))
 
 
 def _cheapest_level(counts: IntArray, extra_points: int) -> int:
-    """Choose the Gauss level of the dense sweep: more points for all, or fewer and a longer list."""
+    """Return the Gauss level of the dense sweep that minimises the cost of swept and listed pairs."""
     n_points = extra_points + np.array([n for n, _ in GAUSS_LEVELS] + [GAUSS_LEVELS[-1][0]])
     listed = LISTED_COST * counts * n_points
     costs = [n_points[base] * counts.sum() + listed[base + 1 :].sum() for base in range(len(GAUSS_LEVELS))]

@@ -1,4 +1,4 @@
-"""Dense factorisations with LAPACK: each names what could not be factored."""
+"""Dense factorisations with LAPACK, whose errors name the matrix."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from bemkit.operators.counts import Factorisation, FactorKind
 def multiply(left: FloatArray, right: FloatArray) -> FloatArray:
     """Return left @ right by the BLAS of scipy.
 
-    numpy and scipy bring one BLAS each, and the threads of one keep spinning for a while after each call: products
-    between LAPACK calls are several times faster when they come from the same library.
+    numpy and scipy have separate BLAS libraries, whose threads keep spinning for a while after each call. Products
+    between LAPACK calls are several times faster if both use the same library.
     """
     from scipy.linalg.blas import dgemm
 
@@ -25,22 +25,22 @@ def multiply(left: FloatArray, right: FloatArray) -> FloatArray:
 
 
 def subtract_product(target: FloatArray, left: FloatArray, right: FloatArray) -> None:
-    """Subtract left @ right.T from a column-major array in its place."""
+    """Subtract left @ right.T from a column-major array in place."""
     from scipy.linalg.blas import dgemm
 
     dgemm(-1.0, left, right, beta=1.0, c=target, trans_b=1, overwrite_c=1)
 
 
 _SMALLEST_PIVOT = 1e-13
-"""Pivots below this share of the largest entry of their column are round-off."""
+"""Smallest pivot relative to the largest entry of its column; smaller pivots are round-off."""
 
 
 class SingularMatrixError(InputError):
-    """A matrix that must be regular is not; the message names it."""
+    """A matrix is singular; the message names it."""
 
 
 class Cholesky:
-    """Factor a symmetric positive definite matrix, which is also the proof that it is one.
+    """Cholesky factors of a symmetric positive definite matrix.
 
     Parameters
     ----------
@@ -48,7 +48,7 @@ class Cholesky:
     name : str
         Name of the matrix in the message.
     overwrite : bool
-        Whether the matrix is needed no longer: a row-major one is then factored in its place.
+        Whether a row-major matrix may be overwritten.
 
     Raises
     ------
@@ -59,11 +59,11 @@ class Cholesky:
     def __init__(self, matrix: FloatArray, name: str, *, overwrite: bool = False) -> None:
         from scipy.linalg.lapack import dpotrf
 
-        # each pivot by its own diagonal entry: on graded meshes these differ by the square of the grading
+        # pivots are compared with their diagonal entries, which vary with the square of the grading of a mesh
         sizes = np.sqrt(np.abs(np.diag(matrix)))
-        # the transpose of a row-major matrix is column-major: no copy beyond the one that is overwritten
-        own = np.asarray(matrix.T, order="F") if overwrite else np.array(matrix.T, order="F")
-        self._factor, info = dpotrf(own, lower=1, overwrite_a=1, clean=0)
+        # the transpose of a row-major matrix is column-major and needs no copy
+        column_major = np.asarray(matrix.T, order="F") if overwrite else np.array(matrix.T, order="F")
+        self._factor, info = dpotrf(column_major, lower=1, overwrite_a=1, clean=0)
         pivots = np.diag(self._factor)
         if info or np.any(pivots <= 1e-14 * sizes):
             raise SingularMatrixError(
@@ -78,14 +78,14 @@ class Cholesky:
 
     @property
     def factorisations(self) -> tuple[Factorisation, ...]:
-        """The same as one of several."""
+        """A tuple with the only factorisation."""
         return (self.factorisation,)
 
     def solve(self, right: FloatArray) -> FloatArray:
         """Solve A x = right."""
         from scipy.linalg.lapack import dpotrs
 
-        if not right.size:  # a body in contact all round leaves nothing else to solve for, which LAPACK does not take
+        if not right.size:  # LAPACK refuses empty systems, as of a body in contact on its whole boundary
             return np.zeros(right.shape)
         return np.asarray(dpotrs(self._factor, right, lower=1)[0])
 
@@ -93,7 +93,7 @@ class Cholesky:
         """Solve L x = right with A = L L^T; a row-major right-hand side may be overwritten by the solution."""
         from scipy.linalg.blas import dtrsm
 
-        # the transpose of a row-major matrix is column-major: x^T L^T = right^T is solved in its place, at once
+        # the transpose of a row-major matrix is column-major: solve x^T L^T = right^T in place
         x = np.array(right.reshape(len(right), -1), order="C", copy=None if overwrite else True)
         dtrsm(1.0, self._factor, x.T, side=1, lower=1, trans_a=1, overwrite_b=1)
         return x.reshape(right.shape)
@@ -106,7 +106,7 @@ class Cholesky:
 
 
 class DenseLU:
-    """Factor a general square matrix.
+    """LU factors of a general square matrix.
 
     Parameters
     ----------
@@ -124,11 +124,11 @@ class DenseLU:
     def __init__(self, matrix: FloatArray, name: str) -> None:
         from scipy.linalg.lapack import dgecon, dgetrf, dlange
 
-        # columns belong to elements: on graded meshes their sizes differ by the grading, which is not a singularity
+        # columns belong to elements, whose size varies on graded meshes: scale them
         sizes = np.maximum(matrix.max(axis=0, initial=0.0), -matrix.min(axis=0, initial=0.0))
         self._column_sizes = np.where(sizes > 0.0, sizes, 1.0)
         matrix /= self._column_sizes
-        # LAPACK stores by columns: a matrix that is stored by rows is factored as its transpose, without a copy
+        # LAPACK uses column-major storage: factor the transpose of a row-major matrix, without a copy
         self._is_transposed = matrix.flags.c_contiguous and not matrix.flags.f_contiguous
         stored = matrix.T if self._is_transposed else matrix
         lange: Callable[..., float] = dlange  # some stubs lack its arguments
@@ -156,7 +156,7 @@ class DenseLU:
 
 
 class SmallLU:
-    """Factors of one of many small matrices, whose columns may have any size.
+    """LU factors of one of many small matrices, whose columns may have any size.
 
     Parameters
     ----------
@@ -164,7 +164,7 @@ class SmallLU:
     error : SingularMatrixError
         Raised if the matrix is singular.
     smallest_size : float
-        Columns count as at least so large.
+        Lower bound of the column sizes with which pivots are compared.
     """
 
     def __init__(self, matrix: FloatArray, error: SingularMatrixError, smallest_size: float = 0.0) -> None:

@@ -12,14 +12,13 @@ if TYPE_CHECKING:
     from scipy.sparse import csr_array
 
 NULL_TOLERANCE = 1e-9
-"""A unit vector belongs to the null space if it changes no row by more than this. The round-off of normals gives 1e-16,
-a single held node out of a million 1e-3."""
+"""Largest singular value of the null space. Round-off of normals gives 1e-16, one held node among a million 1e-3."""
 _NORMAL_EQUATIONS_TOLERANCE = 1e-7
-"""The same tolerance where normal equations are formed, which hold half of the digits."""
+"""The same tolerance for normal equations, which have half of the digits."""
 _SHIFT = 1e-12
-"""Added to the diagonal of the singular normal equations: well above their round-off, far below any condition."""
+"""Shift of the diagonal of the singular normal equations: larger than round-off, smaller than any condition."""
 _MOST_DENSE = 400
-"""Most coupled columns whose null space is found by a singular value decomposition; that of more is by iteration."""
+"""Largest number of coupled columns that take a singular value decomposition; more columns take an iteration."""
 
 
 def null_space(matrix: csr_array) -> csr_array:
@@ -33,7 +32,8 @@ def null_space(matrix: csr_array) -> csr_array:
     Returns
     -------
     (n_null, n) sparse array
-        One vector a row. Groups of columns that share no row are treated one by one, so vectors stay sparse.
+        One vector in each row. Groups of columns without common rows are treated separately, so that vectors are
+        sparse.
     """
     from scipy.sparse import csgraph, csr_array
 
@@ -72,7 +72,7 @@ def _null_space_of_group(part: csr_array) -> FloatArray:
     from scipy.sparse import csc_array, eye_array
     from scipy.sparse.linalg import splu
 
-    # inverse iteration on the normal equations, with more and more vectors until some lie outside of the null space
+    # inverse iteration on the normal equations with more and more vectors, until some are outside of the null space
     normal = csc_array(part.T @ part)
     factors = splu(
         normal + _SHIFT * eye_array(part.shape[1], format="csc"),

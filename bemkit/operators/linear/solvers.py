@@ -1,4 +1,4 @@
-"""Linear solvers for the displacements of a body away from its contact boundary."""
+"""Linear solvers for the displacements of a body outside of its contact boundary."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ class Factor(Protocol):
 
     @property
     def factorisations(self) -> tuple[Factorisation, ...]:
-        """Sizes of the factorisations, for the counts of a run."""
+        """The factorisations, for operation counts."""
 
     def solve(self, right: FloatArray) -> FloatArray:
         """Return A^-1 right for (order,) or (order, m) arrays."""
 
 
 class LinearSolver(Protocol):
-    """A way to solve for the free displacements of a body whose matrix is formed."""
+    """Solves for the free displacements of a body whose matrix is formed."""
 
     def factor(self, matrix: FloatArray, name: str) -> Factor:
         """Factor a matrix.
@@ -33,12 +33,12 @@ class LinearSolver(Protocol):
         matrix : (order, order) array
             Symmetric positive definite; not changed.
         name : str
-            Its name in messages.
+            Name of the matrix in messages.
 
         Raises
         ------
         SingularMatrixError
-            If it is not positive definite; raised here or by `Factor.solve`.
+            If the matrix is not positive definite; raised here or by `Factor.solve`.
         """
 
 
@@ -53,15 +53,15 @@ class DenseCholesky:
 
 @dataclass(frozen=True)
 class Automatic:
-    """Dense or compressed equations, whichever take less time and fit into memory."""
+    """Choose dense or compressed equations: the faster ones that fit into memory."""
 
 
 @dataclass(frozen=True)
 class Hierarchical:
     """Boundary equations compressed over a tree and factored: time and memory grow like the number of elements.
 
-    For constant collocation; scenes with equations of Galerkin's method are refused. Bodies whose equations cannot be
-    compressed are solved as by `Automatic`; the plan says why.
+    It requires constant collocation; scenes with Galerkin elements are refused. Bodies whose equations cannot be
+    compressed are solved as by `Automatic`; the plan gives the reason.
 
     Parameters
     ----------
@@ -71,8 +71,8 @@ class Hierarchical:
     Raises
     ------
     ValueError
-        If the tolerance is not between 1e-12 and 1e-8: finer ones cannot be met in double precision, and from 1e-7 on
-        residuals of the equations may exceed the 1e-9 that certificates allow.
+        If the tolerance is not between 1e-12 and 1e-8. Smaller tolerances cannot be reached in double precision, and
+        from 1e-7 on residuals may exceed the 1e-9 that certificates allow.
     """
 
     tolerance: float = 1e-10
@@ -86,9 +86,10 @@ class Hierarchical:
 
     @property
     def accuracy(self) -> float:
-        """Largest error of tractions and displacements that is expected.
+        """Largest expected error of tractions and displacements: ten times the tolerance.
 
-        Ten times the tolerance: two to four on bodies from a strip of 100 : 1 to a plate with a hole.
+        Errors of two to four times the tolerance were measured, on bodies from a strip of 100 : 1 to a plate with a
+        hole.
         """
         return 10.0 * self.tolerance
 
@@ -97,16 +98,16 @@ class Hierarchical:
 class MatrixFree:
     """Boundary equations solved by GMRES with products by the fast multipole method, in a fraction of the memory.
 
-    For constant collocation on straight elements. Other equations are solved as by `Automatic`; the plan says why.
-    Every response takes up to about seventeen products, for any number of elements.
+    It requires constant collocation on straight elements. Other equations are solved as by `Automatic`; the plan gives
+    the reason. A response takes about seventeen products or fewer, for any number of elements.
 
     Parameters
     ----------
     tolerance : float
-        Of the residual after preconditioning, in the mean of all elements. The largest residual of an equation, which
-        certificates bound by 1e-9, is at most 2.5 times that.
+        Tolerance of the preconditioned residual, in the mean of all elements. The largest residual of an equation,
+        which certificates bound by 1e-9, is at most 2.5 times larger.
     max_steps : int
-        Steps allowed for a response.
+        Largest number of steps of a response.
 
     Raises
     ------
@@ -128,9 +129,9 @@ class MatrixFree:
 
     @property
     def accuracy(self) -> float:
-        """Largest error of tractions and displacements that is expected: a hundred times the tolerance.
+        """Largest expected error of tractions and displacements: a hundred times the tolerance.
 
-        The error of tractions where the contact status changes is that much larger than the mean error.
+        Errors of tractions are largest where the contact status changes.
         """
         return 100.0 * self.tolerance
 
@@ -140,7 +141,7 @@ LinearSolverChoice: TypeAlias = Automatic | Hierarchical | MatrixFree | LinearSo
 
 @dataclass(frozen=True)
 class ChosenLinearSolver:
-    """A linear solver and why it was taken.
+    """A linear solver and the reason for its choice.
 
     Parameters
     ----------
@@ -148,7 +149,7 @@ class ChosenLinearSolver:
     reason : str
         Part of a sentence, for the plan.
     hierarchical : Hierarchical or MatrixFree, optional
-        Given if the equations are compressed over a tree or not stored at all, and not solved by `solver`.
+        If given, the equations are compressed over a tree or not stored, and `solver` is not used.
     """
 
     solver: LinearSolver
@@ -157,7 +158,7 @@ class ChosenLinearSolver:
 
 
 def choose_linear_solver(requested: LinearSolverChoice) -> ChosenLinearSolver:
-    """Choose the linear solver of a body whose Steklov-Poincare map is symmetric and formed.
+    """Choose the linear solver of a body with a symmetric Steklov-Poincare matrix.
 
     Parameters
     ----------
@@ -166,7 +167,7 @@ def choose_linear_solver(requested: LinearSolverChoice) -> ChosenLinearSolver:
     Returns
     -------
     ChosenLinearSolver
-        The linear solver if one is requested, else Cholesky.
+        The requested linear solver if there is one, otherwise Cholesky.
     """
     if not isinstance(requested, Automatic | Hierarchical | MatrixFree):
         return ChosenLinearSolver(requested, "asked for")

@@ -1,4 +1,4 @@
-"""Threads: one for small work, all for large."""
+"""Number of threads: one for small problems, all for large ones."""
 
 from __future__ import annotations
 
@@ -20,16 +20,16 @@ Chunk = TypeVar("Chunk")
 LARGE = 2500
 """Order of a matrix above which several threads factor it faster than one."""
 MANY_INTEGRALS = 300_000
-"""Integrals, of products of polynomials on pairs of elements, above which several threads assemble faster than one."""
+"""Number of integrals (element pairs times products of polynomials) above which several threads are faster than one."""
 MAX_THREADS = 8
 
 
 class _Turns:
-    """Lets threads of one process share a setting that only the whole process can have.
+    """Lets threads share a setting of the whole process.
 
-    Threads that want the same setting share it, others wait for their turn, in the order in which they came. The
-    first of those who share switches the setting on and the last one off again. A thread that has it already keeps
-    it, in every call: waiting for itself would never end.
+    Threads that request the same setting share it; the others wait in the order of their requests. The first thread
+    that shares a setting switches it on, the last one switches it off. Nested calls of a thread that has the setting
+    return at once, because waiting for itself would never end.
     """
 
     def __init__(self) -> None:
@@ -41,22 +41,22 @@ class _Turns:
 
     @contextmanager
     def shared(self, is_wanted: bool, setting: Callable[[], AbstractContextManager[Any]]) -> Iterator[None]:
-        """Hold the setting if it is wanted, and keep it off if it is not."""
-        me = get_ident()
+        """Hold the setting on or off within a context."""
+        thread = get_ident()
         with self._change:
-            if not self._users[me]:
+            if not self._users[thread]:
                 self._take_turn(is_wanted)
             if not self._users.total() and is_wanted:
                 self._setting.enter_context(setting())
-            self._users[me] += 1
+            self._users[thread] += 1
         try:
             yield
         finally:
             with self._change:
-                self._users[me] -= 1
+                self._users[thread] -= 1
                 if not self._users.total():
                     self._setting.close()
-                self._users += Counter()  # drops the threads that have left
+                self._users += Counter()  # remove threads with the count zero
                 self._change.notify_all()
 
     def _take_turn(self, is_wanted: bool) -> None:
@@ -66,7 +66,7 @@ class _Turns:
             self._change.wait_for(
                 lambda: self._waiting[0] is ticket and (not self._users.total() or self._shared == is_wanted)
             )
-        finally:  # an interrupt ends the waiting, too
+        finally:  # also after an interrupt
             self._waiting.remove(ticket)
             self._change.notify_all()
         self._shared = is_wanted
@@ -74,9 +74,10 @@ class _Turns:
 
 @contextmanager
 def _held_by_a_thread(setting: Callable[[], AbstractContextManager[Any]]) -> Iterator[None]:
-    """Hold a setting in a thread of its own: threadpoolctl lets no other thread lift a limit than the one that set it.
+    """Hold a setting in a separate thread.
 
-    The threads that share the setting come and go; the first need not be the last.
+    threadpoolctl requires that the thread that set a limit also removes it, but the first of the threads that share the
+    setting need not be the last.
     """
     is_on, is_over = Event(), Event()
 
@@ -99,12 +100,12 @@ def _held_by_a_thread(setting: Callable[[], AbstractContextManager[Any]]) -> Ite
 
 
 _TURNS = _Turns()
-"""One for the process, because the threads of BLAS belong to the process."""
+"""A single object, because the threads of BLAS belong to the process."""
 
 
 @contextmanager
 def blas_threads_for(order: int) -> Iterator[None]:
-    """Hold BLAS to one thread while matrices of a small order are at work, and to all while larger ones are.
+    """Limit BLAS to one thread for matrices of small order, and allow all threads for larger matrices.
 
     Parameters
     ----------
@@ -113,13 +114,13 @@ def blas_threads_for(order: int) -> Iterator[None]:
 
     Notes
     -----
-    On matrices of a few hundred rows a second thread gains nothing, and on a machine that is busy with other things
-    waiting for it has been seen to cost ten times the work itself.
+    For matrices of a few hundred rows a second thread gains nothing; on a busy computer waiting for it has taken ten
+    times as long as the work itself.
 
-    The last bits of a product depend on the number of threads, which most BLAS libraries keep for the whole process. So
-    that a result does not depend on what other threads of the program compute, small and large work take turns: any
-    number of small runs at the same time, or any number of large ones. When nothing runs, BLAS has the threads that it
-    had before. Libraries that know a limit for each thread get it besides.
+    The last bits of a product depend on the number of threads, which most BLAS libraries set for the whole process.
+    Results must not depend on other threads of the program, so small and large problems take turns: either small ones
+    run at the same time, or large ones. Afterwards BLAS has its previous number of threads. Libraries with a limit for
+    each thread get that limit, too.
     """
     is_small = order <= LARGE
     with _TURNS.shared(is_small, _one_blas_thread_for_all), _one_blas_thread() if is_small else nullcontext():
@@ -138,7 +139,7 @@ def _one_blas_thread() -> AbstractContextManager[Any]:
 
 @cache
 def _blas_libraries() -> ThreadpoolController:
-    """Find the BLAS libraries of numpy and scipy; that takes as long as the LU of a matrix of order 200."""
+    """Return the BLAS libraries of numpy and scipy; the search takes as long as an LU of order 200."""
     import scipy.linalg.lapack  # noqa: F401 - only libraries that are loaded are found
     from threadpoolctl import ThreadpoolController
 
@@ -146,21 +147,21 @@ def _blas_libraries() -> ThreadpoolController:
 
 
 def for_each_chunk(work: Callable[[Chunk], Result], chunks: Iterable[Chunk], *, n_integrals: int) -> list[Result]:
-    """Call a function on every chunk of rows, from several threads if there are many integrals.
+    """Call a function for each chunk of rows, in several threads if there are many integrals.
 
     Parameters
     ----------
     work : callable
-        Takes a chunk; array operations release the interpreter, so threads help although this is Python.
+        Function of a chunk. Array operations release the interpreter lock, so threads run in parallel.
     chunks : iterable
-        Slices of rows, or the numbers of clusters of rows.
+        Slices of rows, or indices of clusters.
     n_integrals : int
-        Of one kind in all chunks together: element pairs times products of the polynomials on both elements.
+        Integrals of one kind in all chunks: element pairs times products of the polynomials on both elements.
 
     Returns
     -------
     list
-        What the function returned, in the order of the chunks.
+        Results in the order of the chunks.
     """
     count = n_threads(n_integrals)
     if count == 1:
@@ -170,7 +171,7 @@ def for_each_chunk(work: Callable[[Chunk], Result], chunks: Iterable[Chunk], *, 
 
 
 def n_threads(n_integrals: int) -> int:
-    """Return how many threads compute a number of integrals."""
+    """Return the number of threads for a number of integrals."""
     affinity = getattr(os, "sched_getaffinity", None)
     available = len(affinity(0)) if affinity else os.cpu_count() or 1
     return 1 if n_integrals < MANY_INTEGRALS else min(available, MAX_THREADS)

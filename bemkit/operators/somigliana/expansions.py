@@ -1,19 +1,19 @@
-"""Series of the complex potentials of a cluster of elements, and how they move from cluster to cluster.
+"""Series of the complex potentials of clusters of elements, and their translations.
 
-Displacements of plane strain are those of two analytic functions [Muskhelishvili1953],
+Two analytic functions give the displacements of plane strain [Muskhelishvili1953],
 
     2 mu u = kappa phi(z) - (z - c) conj(phi'(z)) - conj(psi(z)),      kappa = 3 - 4 nu,
 
-c being any point, on which psi depends: psi_d = psi_c + conj(d - c) phi'. A force F at w and a double layer of strength
-v with the normal n there have, with f = -F / (8 pi (1 - nu)), g = mu n v / (4 pi (1 - nu)) and e = -2 Re(conj(n) v)
-by the same factor,
+with any point c, on which psi depends: psi_d = psi_c + conj(d - c) phi'. Let F be a force at w, and v the strength of a
+double layer at w with the normal n. With f = -F / (8 pi (1 - nu)), g = mu n v / (4 pi (1 - nu)) and
+e = -2 mu Re(conj(n) v) / (4 pi (1 - nu)), their potentials are
 
     phi = f log(z - w) + g / (z - w)
     psi = -kappa conj(f) log(z - w) + (e - conj(w - c) f) / (z - w) + conj(w - c) g / (z - w)^2
 
-(and the force a displacement -f / (2 mu) besides). Far from a disc around c of the radius r that holds all sources they
-are ``a_0 log(z - c) + sum a_k (r / (z - c))^k``; in a disc far from all sources they are ``sum a_m ((z - c) / r)^m``
-[GreengardRokhlin1987]. Coefficients are arrays (n_clusters, 2, order + 1), those of phi and of psi.
+and the force causes an additional displacement -f / (2 mu). Far from a disc around c of radius r that contains all
+sources the potentials are ``a_0 log(z - c) + sum a_k (r / (z - c))^k``; in a disc far from all sources they are
+``sum a_m ((z - c) / r)^m`` [GreengardRokhlin1987]. Coefficients of phi and psi are arrays (n_clusters, 2, order + 1).
 """
 
 from __future__ import annotations
@@ -32,9 +32,9 @@ Numbers = TypeVar("Numbers", FloatArray, ComplexArray)
 
 
 class Sources(NamedTuple):
-    """Places w from a centre [m] and strengths f, g (complex) and e of sources, arrays of one shape."""
+    """Positions w relative to a centre [m] and strengths f, g (complex) and e of sources; arrays of one shape."""
 
-    place: ComplexArray
+    position: ComplexArray
     f: ComplexArray
     g: ComplexArray
     e: FloatArray
@@ -43,7 +43,7 @@ class Sources(NamedTuple):
 def layer_sources(
     y: ComplexArray, dy: ComplexArray, traction: ComplexArray, displacement: ComplexArray, material: Material
 ) -> Sources:
-    """Return the sources of the single layer of tractions less the double layer of displacements.
+    """Return the sources of the single layer of tractions minus the double layer of displacements.
 
     Parameters
     ----------
@@ -61,16 +61,16 @@ def layer_sources(
 
 @dataclass(frozen=True)
 class Expansions:
-    """Series of one order for one material.
+    """Series of a given order for one material.
 
     Parameters
     ----------
     order : int
-        The largest power.
+        Highest power.
     kappa : float
         3 - 4 nu.
     log_length : float [m]
-        Unit of length of the logarithm.
+        Unit of length in the logarithm.
     """
 
     order: int
@@ -83,7 +83,7 @@ class Expansions:
 
     @cached_property
     def _of_local(self) -> FloatArray:
-        """(order + 1, order + 1): (1 - x)^-k = sum C(m + k - 1, m) x^m, rows m; nothing of the logarithm, k = 0."""
+        """(order + 1, order + 1) array: (1 - x)^-k = sum C(m + k - 1, m) x^m, rows m; zero for the logarithm, k = 0."""
         m, k = np.meshgrid(self._powers, self._powers, indexing="ij")
         return np.asarray(np.where(k > 0, comb(m + k - 1, m), 0.0))
 
@@ -93,17 +93,17 @@ class Expansions:
         Parameters
         ----------
         sources : Sources of (n_sources,) arrays
-            Placed from the centre of the cluster of each.
+            Positions are relative to the centre of the cluster.
         radius : (n_sources,) array [m]
-            Of that cluster.
+            Radius of the cluster of each source.
         first : (n_clusters,) int array
-            The first source of each cluster.
+            Index of the first source of each cluster.
         """
-        f, x, g, e = sources.f, sources.place / radius, sources.g / radius, sources.e / radius
+        f, x, g, e = sources.f, sources.position / radius, sources.g / radius, sources.e / radius
         on_psi, powers = -self.kappa * f.conj(), self._powers_of(x)
         columns = np.stack([f, on_psi, g, e - x.conj() * f, x.conj() * g], axis=1)
         ends = np.append(first[1:], x.size)
-        # sums over the sources of a cluster, by power
+        # sums over the sources of a cluster for each power
         sums = np.stack([powers[i:j].T @ columns[i:j] for i, j in zip(first, ends, strict=True)])
         result = np.ascontiguousarray(sums[:, :, :2].transpose(0, 2, 1))
         result[:, :, 1:] /= -self._powers[1:]
@@ -114,39 +114,39 @@ class Expansions:
     def of_parents(
         self, series: ComplexArray, arm: ComplexArray, radius: FloatArray, parent: FloatArray
     ) -> ComplexArray:
-        """Return the series of the sources of clusters about the centres of their parents.
+        """Translate the far series of clusters to the centres of their parents.
 
         Parameters
         ----------
         series : (n, 2, order + 1) complex array
-            Of the clusters.
+            Series of the clusters.
         arm : (n,) complex array [m]
             From the centre of the parent to that of the cluster.
         radius, parent : (n,) arrays [m]
             Radii of the cluster and of its parent.
         """
-        own = series.copy()
-        own[:, 1, 1:] -= (arm.conj() / radius)[:, None] * self._of_gradient(series[:, 0])
-        own *= self._powers_of(radius / parent)[:, None]
+        scaled = series.copy()
+        scaled[:, 1, 1:] -= (arm.conj() / radius)[:, None] * self._of_gradient(series[:, 0])
+        scaled *= self._powers_of(radius / parent)[:, None]
         x = arm / parent
-        logs = own[:, :, :1] * self._powers_of(x)[:, None, 1:] / self._powers[1:]
-        terms = _by_power(own)
-        for j in range(self.order - 1, 0, -1):  # (1 - x)^-k, Taylor's shift transposed
+        logs = scaled[:, :, :1] * self._powers_of(x)[:, None, 1:] / self._powers[1:]
+        terms = _by_power(scaled)
+        for j in range(self.order - 1, 0, -1):  # transposed Taylor shift: (1 - x)^-k
             for k in range(j, self.order):
                 terms[k + 1] += x * terms[k]
-        moved = _by_cluster(terms)
-        moved[:, :, 1:] -= logs
-        return moved
+        translated = _by_cluster(terms)
+        translated[:, :, 1:] -= logs
+        return translated
 
     def of_fields(
         self, series: ComplexArray, arm: ComplexArray, radius: FloatArray, target: FloatArray
     ) -> ComplexArray:
-        """Return the series in discs of what sources in other discs, far away, cause.
+        """Convert far series of sources to local series in distant discs.
 
         Parameters
         ----------
         series : (n, 2, order + 1) complex array
-            Of the sources.
+            Series of the sources.
         arm : (n,) complex array [m]
             From the centre of the disc to that of the sources.
         radius, target : (n,) arrays [m]
@@ -155,32 +155,32 @@ class Expansions:
         logs = series[:, :, 0]
         weighted = series * self._powers_of(-radius / arm)[:, None]
         parts = np.stack([weighted.real, weighted.imag]).reshape(-1, self.order + 1) @ self._of_local.T
-        own = (parts[: parts.shape[0] // 2] + 1j * parts[parts.shape[0] // 2 :]).reshape(series.shape)
-        own[:, :, 0] += logs * np.log(-arm / self.log_length)[:, None]
-        own[:, 0, 0] -= logs[:, 0] / self.kappa  # the displacement -f / (2 mu)
-        own[:, :, 1:] -= logs[:, :, None] / self._powers[1:]
-        own *= self._powers_of(target / arm)[:, None]
-        own[:, 1, :-1] -= (arm.conj() / target)[:, None] * own[:, 0, 1:] * self._powers[1:]
-        return own
+        local = (parts[: parts.shape[0] // 2] + 1j * parts[parts.shape[0] // 2 :]).reshape(series.shape)
+        local[:, :, 0] += logs * np.log(-arm / self.log_length)[:, None]
+        local[:, 0, 0] -= logs[:, 0] / self.kappa  # the displacement -f / (2 mu)
+        local[:, :, 1:] -= logs[:, :, None] / self._powers[1:]
+        local *= self._powers_of(target / arm)[:, None]
+        local[:, 1, :-1] -= (arm.conj() / target)[:, None] * local[:, 0, 1:] * self._powers[1:]
+        return local
 
     def of_children(
         self, series: ComplexArray, arm: ComplexArray, radius: FloatArray, child: FloatArray
     ) -> ComplexArray:
-        """Return the series in discs within discs.
+        """Translate local series to the centres of child discs.
 
         Parameters
         ----------
         series : (n, 2, order + 1) complex array
-            In the larger discs.
+            Series in the parent discs.
         arm : (n,) complex array [m]
-            From the centre of the larger disc to that of the smaller one.
+            From the centre of the parent to that of the child.
         radius, child : (n,) arrays [m]
-            Radii of both.
+            Radii of parent and child.
         """
-        own = series.copy()
-        own[:, 1, :-1] += (arm.conj() / radius)[:, None] * series[:, 0, 1:] * self._powers[1:]
-        terms, x = _by_power(own), arm / radius
-        for j in range(self.order):  # Taylor's shift by Horner's rule
+        shifted = series.copy()
+        shifted[:, 1, :-1] += (arm.conj() / radius)[:, None] * series[:, 0, 1:] * self._powers[1:]
+        terms, x = _by_power(shifted), arm / radius
+        for j in range(self.order):  # Taylor shift by Horner's rule
             for k in range(self.order - 1, j - 1, -1):
                 terms[k] += x * terms[k + 1]
         return _by_cluster(terms) * self._powers_of(child / radius)[:, None]
@@ -191,7 +191,7 @@ class Expansions:
         Parameters
         ----------
         series : (n, 2, order + 1) complex array
-            Of the disc of each point.
+            Local series of the disc of each point.
         arm : (n,) complex array [m]
             From the centre of the disc to the point.
         radius : (n,) array [m]
@@ -210,7 +210,7 @@ class Expansions:
         Parameters
         ----------
         series : (n_series, 2, order + 1) complex array
-            Of the sources in the disc.
+            Far series of the sources in the disc.
         arm : (n_points,) complex array [m]
             From the centre of the disc to the points.
         radius : float [m]
@@ -224,7 +224,7 @@ class Expansions:
     def outer_gradients(
         self, series: ComplexArray, arm: ComplexArray, radius: float
     ) -> tuple[ComplexArray, ComplexArray]:
-        """Return Phi = phi' and D = 2 mu du/dzbar, each (n_points, n_series); parameters as `outer_displacements`."""
+        """Return Phi = phi' and D = 2 mu du/dzbar, each (n_points, n_series); see `outer_displacements`."""
         y = radius / arm[:, None]
         first = y * self._powers_of(y[:, 0]) * (self._of_slope / radius)
         second = y * first * (-(self._powers + 1.0) / radius)
@@ -233,11 +233,11 @@ class Expansions:
 
     @cached_property
     def _of_slope(self) -> FloatArray:
-        """(order + 1,): r times the derivative of (r / z)^k is this times (r / z)^(k + 1), of the logarithm r / z."""
+        """(order + 1,) array: factors of (r / z)^(k + 1) in r times the derivative of (r / z)^k; for k = 0 of log z."""
         return np.concatenate([[1.0], -self._powers[1:]])
 
     def _of_gradient(self, phi: ComplexArray) -> ComplexArray:
-        """Return r phi' (n, order), from the power 1 on, of phi (n, order + 1) outside of discs of the radius r."""
+        """Return the far series r phi' (n, order), powers 1 ..., for phi (n, order + 1)."""
         return np.asarray(phi[:, :-1] * self._of_slope[:-1])
 
     def _powers_of(self, x: Numbers) -> Numbers:
@@ -248,10 +248,10 @@ class Expansions:
 
 
 def _by_power(series: ComplexArray) -> ComplexArray:
-    """Return series (n, 2, order + 1) as (order + 1, 2, n)."""
+    """Transpose series (n, 2, order + 1) to (order + 1, 2, n)."""
     return np.ascontiguousarray(series.transpose(2, 1, 0))
 
 
 def _by_cluster(terms: ComplexArray) -> ComplexArray:
-    """Return series (order + 1, 2, n) as (n, 2, order + 1)."""
+    """Transpose series (order + 1, 2, n) to (n, 2, order + 1)."""
     return np.ascontiguousarray(terms.transpose(2, 1, 0))

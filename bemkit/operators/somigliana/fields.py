@@ -6,8 +6,8 @@ With complex displacements u = u_x + i u_y and z = x + i y, the formula is diffe
     2 mu du/dzbar  = D                          (shears)
     sigma_xx + sigma_yy = 4 Re Phi,    sigma_xx - sigma_yy + 2 i sigma_xy = 2 D
 
-[Muskhelishvili1953], where Phi and D are boundary integrals of the tractions and displacements. No division by
-1 - 2 nu occurs, so stresses hold for incompressible materials, too.
+[Muskhelishvili1953], where Phi and D are boundary integrals of the tractions and displacements. There is no division by
+1 - 2 nu, so stresses hold for incompressible materials.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from bemkit.geometry.local_values import values_on_elements
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.spaces import BoundarySpace, local_coefficients
 from bemkit.operators.hierarchy.tree import Pairs
-from bemkit.operators.integrals.panels import Panels
+from bemkit.operators.integrals.element_geometry import ElementGeometry
 from bemkit.operators.kernels import legendre_of_monomials, legendre_values
 from bemkit.operators.linear.threads import for_each_chunk
 from bemkit.operators.material import Material
@@ -43,12 +43,13 @@ from bemkit.operators.somigliana.moments import (
 from bemkit.operators.somigliana.potentials import Background, PotentialFields, as_points
 
 CHUNK_PAIRS = 8192
-"""Points and elements near them that are integrated at a time."""
+"""Pairs of points and near elements that are integrated at a time."""
 CHUNK_POINTS = 8192
+"""Points that are evaluated at a time with series."""
 _INTEGRALS = 400
-"""Cost of a point, in integrals."""
+"""Number of integrals that take as long as a point."""
 MOST_ELEMENTS, FEW_POINTS = 300, 30
-"""Elements, and points on more elements, up to which all pairs are integrated: no series are made then."""
+"""Largest number of elements, or of points, for which all pairs are integrated without series."""
 
 Terms: TypeAlias = Callable[[ComplexArray, IntArray, ComplexArray, bool], ComplexArray]
 """Contribution of elements at points: a function of points, elements, subtracted displacements, and a curved flag."""
@@ -63,37 +64,36 @@ class InteriorFields(PotentialFields):
     mesh : BoundaryMesh
     material : Material
     displacement_space : BoundarySpace
-        Any space, discontinuous ones included.
+        Any space, continuous or not.
     displacement_dofs : (n_scalar, 2) array [m]
         Boundary displacements.
     traction_space : BoundarySpace
     traction_dofs : (n_scalar, 2) array [Pa]
-        Boundary tractions, stress @ n with n out of the body.
+        Boundary tractions, stress @ n with the outward normal n.
     background : Background, optional
-        A field to add; boundary data are those without it.
+        Field to be added; the boundary data exclude it.
 
     Raises
     ------
     GeometryError
-        If a space lives on another mesh.
+        If a space is defined on another mesh.
     ValueError
         If the dofs have the wrong shape or are not finite.
 
     Notes
     -----
-    Every method takes points strictly inside the body; `is_inside` finds them. At a point outside or on the
-    boundary they raise `PointNotInsideError`, which names it. For the body outside of a closed boundary the fields
-    are those that vanish at infinity, up to the logarithm that belongs to a resultant force.
+    Points must lie strictly inside the body, see `is_inside`; any other point raises `PointNotInsideError`. Fields
+    outside of a closed boundary vanish at infinity, up to the logarithm of a resultant force.
 
-    All integrals are exact to round-off: straight elements are integrated in closed form, curved ones by a rule that
-    follows the distance d of the point, and the displacement of the nearest boundary point is subtracted before the
-    strongly singular kernels act. On straight sides that holds at any distance; near curved elements the round-off
-    of the coordinates enters stresses as eps L / d (L the diameter of the body).
+    Integrals are exact to round-off: straight elements are integrated in closed form, curved elements by a rule that
+    depends on the distance d of the point, and the displacement of the nearest boundary point is subtracted before
+    strongly singular kernels act. On straight sides this holds at any distance; near curved elements stresses have
+    round-off of eps L / d, with the diameter L of the body.
 
-    What limits the accuracy is the boundary data: the result is the exact field of the given piecewise polynomials.
-    Where these jump or kink, at a node between constant or linear elements, stresses of that field grow like log(d)
-    (jumps of tractions or kinks of displacements) or 1 / d (jumps of displacements). Closer to the boundary than
-    about one element length, read stresses of discrete solutions opposite the middle of elements.
+    The result is the exact field of the given piecewise polynomials; the boundary data limit the accuracy. At a node
+    between elements where the data jump or kink, stresses grow like log(d) (jumps of tractions, kinks of displacements)
+    or 1 / d (jumps of displacements). Within about one element length of the boundary, evaluate stresses of discrete
+    solutions opposite the midpoints of elements.
     """
 
     def __init__(
@@ -115,7 +115,7 @@ class InteriorFields(PotentialFields):
         self._curved = self._locator.curved
         centre = (float(mesh.centre[0]), float(mesh.centre[1]))
         curves = tuple(scaled_curve(curve, centre, (1.0, 1.0)) for curve in mesh.curves)
-        self._panels = Panels(mesh.unchecked_copy(mesh.nodes - mesh.centre, curves))
+        self.geometry = ElementGeometry(mesh.unchecked_copy(mesh.nodes - mesh.centre, curves))
 
     def is_inside(self, points: FloatArray) -> BoolArray:
         """Return the (n,) mask of the (n, 2) points [m] that lie strictly inside the body."""
@@ -125,12 +125,12 @@ class InteriorFields(PotentialFields):
         """Evaluate the displacement (n, 2) [m] at points (n, 2) [m]."""
         points, location = self._located(points)
         reference = self._at_nearest(location)
-        # a constant displacement c is represented as c inside a bounded body, and as zero inside an exterior one
+        # the representation of a constant displacement c is c in a bounded body, and zero in an exterior
         result = self._summed(points, reference, 1, self._displacement_terms, FarFields.displacements)[0]
         if not self.mesh.is_exterior:
             result += reference
-        own = np.column_stack([result.real, result.imag])
-        return own if self.background is None else own + self.background.displacement(points)
+        displacement = np.column_stack([result.real, result.imag])
+        return displacement if self.background is None else displacement + self.background.displacement(points)
 
     def potentials(self, points: FloatArray) -> tuple[ComplexArray, ComplexArray]:
         """Return Phi and D (n,) [Pa]."""
@@ -155,12 +155,12 @@ class InteriorFields(PotentialFields):
     def _far(self) -> FarFields:
         displacement, traction = self._displacement[CENTRE], self._traction[CENTRE]
         clusters, length = self._locator.clusters, self.mesh.diameter
-        return FarFields(clusters, self._panels, self._curved, self.material, displacement, traction, length)
+        return FarFields(clusters, self.geometry, self._curved, self.material, displacement, traction, length)
 
     def _summed(
         self, points: FloatArray, reference: ComplexArray, n_fields: int, terms: Terms, of_clusters: OfClusters
     ) -> ComplexArray:
-        """Sum what all elements cause at points: (n_fields, n_points)."""
+        """Return the fields of all elements at points, (n_fields, n_points)."""
         relative = points - self.mesh.centre
         x = relative[:, 0] + 1j * relative[:, 1]
         n = self.mesh.n_elements
@@ -168,12 +168,13 @@ class InteriorFields(PotentialFields):
         far = None if is_dense else self._far
 
         def of_points(rows: slice) -> ComplexArray:
-            own, at = x[rows], reference[rows]
+            chunk, subtracted = x[rows], reference[rows]
             if far is None:
-                pairs = np.repeat(np.arange(own.size), n), np.tile(np.arange(n), own.size)
-                return self._of_pairs(own, at, pairs, n_fields, terms)
-            afar, pairs = far.divided(own)
-            return self._of_pairs(own, at, pairs, n_fields, terms) + of_clusters(far, own, at, afar)
+                pairs = np.repeat(np.arange(chunk.size), n), np.tile(np.arange(n), chunk.size)
+                return self._of_pairs(chunk, subtracted, pairs, n_fields, terms)
+            far_pairs, pairs = far.divided(chunk)
+            near_fields = self._of_pairs(chunk, subtracted, pairs, n_fields, terms)
+            return near_fields + of_clusters(far, chunk, subtracted, far_pairs)
 
         step = max(1, CHUNK_PAIRS // n) if is_dense else CHUNK_POINTS
         chunks = [slice(first, first + step) for first in range(0, max(1, x.size), step)]
@@ -182,15 +183,15 @@ class InteriorFields(PotentialFields):
     def _of_pairs(
         self, x: ComplexArray, reference: ComplexArray, pairs: Pairs, n_fields: int, terms: Terms
     ) -> ComplexArray:
-        """Sum what elements cause at points near them, from all pairs of both, ascending by point."""
+        """Return the fields of elements at near points, from pairs of points (ascending) and elements."""
         points, elements = pairs
         is_curved = ~self.mesh.is_straight[elements]
         result: ComplexArray = np.zeros((n_fields, x.size), complex)
         for kind in (False, True):
             chosen = np.flatnonzero(is_curved == kind)
             for begin in range(0, chosen.size, CHUNK_PAIRS):
-                some = chosen[begin : begin + CHUNK_PAIRS]
-                point, element = points[some], elements[some]
+                chunk = chosen[begin : begin + CHUNK_PAIRS]
+                point, element = points[chunk], elements[chunk]
                 result = result + _at_points(terms(x[point], element, reference[point], kind), point, x.size)
         return result
 
@@ -202,12 +203,12 @@ class InteriorFields(PotentialFields):
     def _displacement_terms(
         self, x: ComplexArray, element: IntArray, reference: ComplexArray, is_curved: bool
     ) -> ComplexArray:
-        """Return what each element adds to the displacement, (1, n_pairs)."""
+        """Return the contribution of each pair to the displacement, (1, n_pairs)."""
         highest, length = self._highest, self.mesh.diameter
         if is_curved:
             moments = self._curved.displacement_moments(x, element, highest, length)
         else:
-            moments = straight_displacement_moments(self._panels, x, element, highest, length)
+            moments = straight_displacement_moments(self.geometry, x, element, highest, length)
         kappa = self.material.kappa
         factor = 1.0 / (np.pi * (kappa + 1.0))
         result = np.zeros(element.size, complex)
@@ -217,18 +218,18 @@ class InteriorFields(PotentialFields):
             result += (0.5 * factor / self.material.shear_modulus) * single
         for k, v in enumerate(self._displacement[CENTRE, element].T):
             v = v - reference if k == 0 else v
-            own = kappa * moments.cauchy[k] - moments.cauchy[k].conj()
-            result += (0.5j * factor) * (own * v - moments.turn[k] * v.conj())
+            direct = kappa * moments.cauchy[k] - moments.cauchy[k].conj()
+            result += (0.5j * factor) * (direct * v - moments.turn[k] * v.conj())
         return result[None]
 
     def _gradient_terms(
         self, x: ComplexArray, element: IntArray, reference: ComplexArray, is_curved: bool
     ) -> ComplexArray:
-        """Return what each element adds to Phi and to D, (2, n_pairs)."""
+        """Return the contribution of each pair to Phi and D, (2, n_pairs)."""
         if is_curved:
             moments = self._curved.gradient_moments(x, element, self._highest)
         else:
-            moments = straight_gradient_moments(self._panels, x, element, self._highest)
+            moments = straight_gradient_moments(self.geometry, x, element, self._highest)
         kappa = self.material.kappa
         factor = 1.0 / (np.pi * (kappa + 1.0))
         potential, shear = np.zeros(element.size, complex), np.zeros(element.size, complex)
@@ -246,29 +247,31 @@ class InteriorFields(PotentialFields):
 def _at_points(terms: ComplexArray, point: IntArray, n_points: int) -> ComplexArray:
     """Sum the terms (n_fields, n_pairs) of each point."""
     result = np.empty((len(terms), n_points), complex)
-    for own, each in zip(result, terms, strict=True):
-        own.real, own.imag = (np.bincount(point, part, n_points) for part in (each.real, each.imag))
+    for total, field in zip(result, terms, strict=True):
+        total.real, total.imag = (np.bincount(point, part, n_points) for part in (field.real, field.imag))
     return result
 
 
 def _require_inside(location: Location, points: FloatArray) -> None:
-    wrong = np.flatnonzero(~location.is_inside)
-    if wrong.size:
-        first = int(wrong[0])
-        place = "on the boundary of" if location.is_on_boundary[first] else "outside of"
+    outside = np.flatnonzero(~location.is_inside)
+    if outside.size:
+        first = int(outside[0])
+        relation = "on the boundary of" if location.is_on_boundary[first] else "outside of"
         raise PointNotInsideError(
-            f"point {first} at ({points[first, 0]:.9g}, {points[first, 1]:.9g}) lies {place} the body "
-            f"({wrong.size} of {len(points)} points do not lie inside): select points with is_inside(points)"
+            f"point {first} at ({points[first, 0]:.9g}, {points[first, 1]:.9g}) lies {relation} the body "
+            f"({outside.size} of {len(points)} points do not lie inside): select points with is_inside(points)"
         )
 
 
 def _element_polynomials(mesh: BoundaryMesh, space: BoundarySpace, dofs: FloatArray, name: str) -> ComplexArray:
-    """Return a boundary field as (3, n_elements, degree + 1) complex coefficients.
+    """Return the complex coefficients (3, n_elements, degree + 1) of a boundary field.
 
-    Those of Legendre polynomials, and of powers of the local coordinate about start and end.
+    The first axis is Legendre polynomials, powers about the start, powers about the end.
     """
     if space.mesh is not mesh:
-        raise GeometryError(f"{name}_space lives on another mesh: build it on the BoundaryMesh object given as mesh")
+        raise GeometryError(
+            f"{name}_space is defined on another mesh: build it on the BoundaryMesh object given as mesh"
+        )
     dofs = np.asarray(dofs, dtype=np.float64)
     shape = (space.n_dofs // 2, 2)
     if dofs.shape != shape or not np.isfinite(dofs).all():
@@ -285,6 +288,6 @@ def _element_polynomials(mesh: BoundaryMesh, space: BoundarySpace, dofs: FloatAr
         for k in range(space.degree + 1):
             for j in range(k + 1):
                 result[origin, :, j] += comb(k, j) * e ** (k - j) * in_powers[:, k]
-    # the very value at the node, so that two elements agree there to the last bit
+    # the exact value at the node, so that two elements have the same value there
     result[[START, END], :, 0] = (on_elements @ space.basis(np.array([-1.0, 1.0]))).T
     return result

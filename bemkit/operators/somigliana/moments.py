@@ -1,18 +1,18 @@
-r"""Integrals over single elements, seen from points off the boundary, that fields inside a body are made of.
+r"""Integrals over single elements for points off the boundary, from which interior fields are computed.
 
-With rho = x - y, rho* its conjugate, tau the unit tangent at y, t the local coordinate of the element and p the
-Legendre polynomials P_0, P_1, ... of t, or close to an end e of the element the powers of t - e:
+Let rho = x - y, rho* its conjugate, tau the unit tangent at y, t the local coordinate of the element, and p the
+Legendre polynomials P_0, P_1, ... of t, or the powers of t - e for points close to an end e of the element:
 
     log          int p log|rho| ds          quotient     int p rho / rho* ds
     cauchy       int p tau / rho ds         turn         int p (rho tau* / rho*^2 - tau / rho*) ds
     reciprocal   int p / rho ds             spread       int p rho / rho*^2 ds
     hyper        int p tau / rho^2 ds       twist        int p (tau / rho*^2 - 2 rho tau* / rho*^3) ds
 
-Straight elements have them in closed form: with the local coordinate zeta = xi + i eta of x, they are combinations of
+On straight elements they have closed forms: with the local coordinate zeta = xi + i eta of x, they are combinations of
 
     C_k = int P_k / (zeta - t) dt,  G_k = int P_k / (zeta - t)^2 dt,  H_k = int P_k / (zeta - t)^3 dt
 
-Curved elements are bisected until each piece is well away from the point, and every piece takes one Gauss rule.
+Curved elements are bisected until each piece is far enough from the point for one Gauss rule.
 """
 
 from __future__ import annotations
@@ -26,21 +26,22 @@ from bemkit.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.quadrature import gauss_legendre
 from bemkit.operators import kernels
-from bemkit.operators.integrals.panels import Panels
+from bemkit.operators.integrals.element_geometry import ElementGeometry
 from bemkit.operators.integrals.splitting import SEPARATION, split_until
 
 Integrands = Callable[[ComplexArray, ComplexArray], list[ComplexArray]]
 """Integrands as functions of rho and tau."""
 N_POINTS = 14
-"""Gauss points of a piece: (3 + sqrt(8))**-28 is far below round-off, which leaves room for the third power of rho."""
+"""Gauss points of a piece; (3 + sqrt(8))**-28 is far below round-off, because kernels contain rho to the power -3."""
 CENTRE, START, END = 0, 1, 2
+"""Origins of the expansion of densities."""
 AT_END = 0.5
-"""Points closer to an end of an element than this, in half lengths, see its densities expanded about that end."""
+"""Distance of a point from an end, in half lengths, below which densities are expanded about that end."""
 
 
 @dataclass(frozen=True, eq=False)
 class DisplacementMoments:
-    """Integrals for displacements; every array is (n_polynomials, n_pairs), `measure` the integral of P_k ds."""
+    """Integrals for displacements, arrays (n_polynomials, n_pairs); `measure` is the integral of P_k ds."""
 
     log: FloatArray
     measure: FloatArray
@@ -51,11 +52,11 @@ class DisplacementMoments:
 
 @dataclass(frozen=True, eq=False)
 class GradientMoments:
-    """Integrals for displacement gradients and stresses; every array is (n_polynomials, n_pairs).
+    """Integrals for displacement gradients and stresses, arrays (n_polynomials, n_pairs).
 
-    Densities are sums of Legendre polynomials, or of powers of t - e with e = -1, 1, as `origin` (n_pairs,) says
-    (`CENTRE`, `START`, `END`): close to an end of an element they are expanded about it, or the two elements that meet
-    there would cancel.
+    Densities are expanded in Legendre polynomials if `origin` (n_pairs,) is `CENTRE`, and in powers of t + 1 or t - 1
+    if it is `START` or `END`. Without the expansion about an end, the contributions of the two elements that meet in a
+    close node would lose digits.
     """
 
     origin: IntArray
@@ -66,12 +67,12 @@ class GradientMoments:
 
 
 def local_moments(plus: ComplexArray, minus: ComplexArray, highest: int, n_orders: int) -> list[ComplexArray]:
-    """Return C_k, G_k, H_k (the first `n_orders` of them) for k = 0 ... highest, at any distance from the element.
+    """Return the first `n_orders` of C_k, G_k, H_k for k = 0 ... highest, at any distance from the element.
 
     Parameters
     ----------
     plus, minus : complex arrays
-        zeta + 1 and zeta - 1, each formed from the distance to its own end point.
+        zeta + 1 and zeta - 1, each computed from the position relative to its end.
     highest : int
         Highest degree.
     n_orders : int
@@ -79,8 +80,8 @@ def local_moments(plus: ComplexArray, minus: ComplexArray, highest: int, n_order
 
     Notes
     -----
-    G_k = -C_k' and H_k = C_k'' / 2 follow from (zeta^2 - 1) C_k' = k (zeta C_k - C_{k-1}) and from the differential
-    equation of the C_k, which is that of the Legendre polynomials [DLMF, 14.10.5 and 14.2.1]; nothing cancels.
+    G_k = -C_k' and H_k = C_k'' / 2 follow without cancellation from (zeta^2 - 1) C_k' = k (zeta C_k - C_{k-1}) and from
+    the differential equation of the Legendre polynomials [DLMF, 14.10.5 and 14.2.1].
     """
     integrals, _ = kernels.near_integrals(plus, minus, highest)
     result = [integrals]
@@ -88,31 +89,31 @@ def local_moments(plus: ComplexArray, minus: ComplexArray, highest: int, n_order
     product = plus * minus
     if n_orders > 1:
         pairs = zip(range(1, highest + 1), integrals[1:], integrals, strict=False)
-        result.append(np.stack([2.0 / product, *(k * (below - zeta * own) / product for k, own, below in pairs)]))
+        result.append(np.stack([2.0 / product, *(k * (below - zeta * c_k) / product for k, c_k, below in pairs)]))
     if n_orders > 2:
         pairs = zip(range(highest + 1), integrals, result[1], strict=True)
-        result.append(np.stack([(zeta * slope + 0.5 * k * (k + 1) * own) / product for k, own, slope in pairs]))
+        result.append(np.stack([(zeta * g_k + 0.5 * k * (k + 1) * c_k) / product for k, c_k, g_k in pairs]))
     return result
 
 
 def straight_displacement_moments(
-    panels: Panels, x: ComplexArray, elements: IntArray, highest: int, length: float
+    geometry: ElementGeometry, x: ComplexArray, elements: IntArray, highest: int, length: float
 ) -> DisplacementMoments:
     """Return the moments of straight elements for displacements, in closed form.
 
     Parameters
     ----------
-    panels : Panels
+    geometry : ElementGeometry
     x : (n_pairs,) complex array [m]
         Points, none on its element.
     elements : (n_pairs,) int array
     highest : int
         Highest degree.
     length : float [m]
-        Unit of length r0 of the logarithm.
+        Unit of length r0 in the logarithm.
     """
-    plus, minus, eta = _local(panels, x, elements)
-    half, square = panels.half[elements], panels.tangent[elements] ** 2
+    plus, minus, eta = _local(geometry, x, elements)
+    half, square = geometry.half[elements], geometry.tangent[elements] ** 2
     c, g = local_moments(plus, minus, highest + 1, 2)
     log_product = np.log(np.abs(plus)) + np.log(np.abs(minus))
     measure = np.stack([half * kernels.interval_moment(k) for k in range(highest + 1)])
@@ -121,19 +122,19 @@ def straight_displacement_moments(
         measure=measure,
         quotient=half * square * kernels.quotient_integrals(c[:-1], eta),
         cauchy=c[:-1],
-        turn=np.stack([2j * eta * square * own.conj() for own in g[:-1]]),
+        turn=np.stack([2j * eta * square * g_k.conj() for g_k in g[:-1]]),
     )
 
 
 def straight_gradient_moments(
-    panels: Panels, x: ComplexArray, elements: IntArray, highest: int, at_end: float = AT_END
+    geometry: ElementGeometry, x: ComplexArray, elements: IntArray, highest: int, at_end: float = AT_END
 ) -> GradientMoments:
-    """Return the moments of straight elements for gradients; parameters as in `straight_displacement_moments`.
+    """Return the moments of straight elements for gradients; see `straight_displacement_moments`.
 
-    Points within ``at_end`` of an end, in halves of the element, have their powers about it.
+    For points within ``at_end`` half lengths of an end, densities are expanded about that end.
     """
-    plus, minus, eta = _local(panels, x, elements)
-    half, tangent = panels.half[elements], panels.tangent[elements]
+    plus, minus, eta = _local(geometry, x, elements)
+    half, tangent = geometry.half[elements], geometry.tangent[elements]
     origin = np.where(np.abs(plus) < at_end, START, np.where(np.abs(minus) < at_end, END, CENTRE))
     orders = local_moments(plus, minus, max(1, highest), 3)
     for end, zeta in ((START, plus), (END, minus)):
@@ -150,7 +151,7 @@ def straight_gradient_moments(
 
 
 def _expand_about_end(orders: list[ComplexArray], zeta: ComplexArray, chosen: IntArray, end: int) -> None:
-    """Replace the Legendre polynomials by the powers of t - e at some points, `zeta` from that end."""
+    """Replace Legendre polynomials by powers of t - e for chosen points with `zeta` relative to the end e."""
     for k in range(1, len(orders[0])):
         # the integral of (t - e)**(k - 1) over [-1, 1]
         moment = 2.0**k / k if end == START else -((-2.0) ** k) / k
@@ -160,37 +161,38 @@ def _expand_about_end(orders: list[ComplexArray], zeta: ComplexArray, chosen: In
             below = row[k - 1][chosen]
 
 
-def _local(panels: Panels, x: ComplexArray, elements: IntArray) -> tuple[ComplexArray, ComplexArray, FloatArray]:
-    """Return zeta + 1, zeta - 1 and eta, each exact near its end point."""
-    to_local = panels.to_local[elements]
-    plus, minus = (x - panels.start[elements]) * to_local, (x - panels.end[elements]) * to_local
+def _local(
+    geometry: ElementGeometry, x: ComplexArray, elements: IntArray
+) -> tuple[ComplexArray, ComplexArray, FloatArray]:
+    """Return zeta + 1, zeta - 1 and eta, accurate near both ends."""
+    to_local = geometry.to_local[elements]
+    plus, minus = (x - geometry.start[elements]) * to_local, (x - geometry.end[elements]) * to_local
     return plus, minus, kernels.local_coordinate(plus, minus).imag
 
 
 class ArcQuadrature:
-    """Quadrature over curved elements that follows how near a point is.
+    """Quadrature over curved elements that adapts to the distance of a point.
 
     Parameters
     ----------
     mesh : BoundaryMesh
-        Curved where asked.
     origin : (2,) array [m]
-        Complex coordinates are relative to it.
+        Origin of complex coordinates.
     """
 
     def __init__(self, mesh: BoundaryMesh, origin: FloatArray) -> None:
         self._mesh, self._origin = mesh, complex(origin[0], origin[1])
         self._rules: dict[int, tuple[ComplexArray, ComplexArray]] = {}
 
-    def place(self, elements: IntArray, xi: FloatArray) -> tuple[ComplexArray, ComplexArray]:
-        """Return y and dy/dxi, (n, q), for (n,) elements at (q,) or (n, q) local coordinates."""
+    def points(self, elements: IntArray, xi: FloatArray) -> tuple[ComplexArray, ComplexArray]:
+        """Return y and dy/dxi, (n, q), of n elements at local coordinates (q,) or (n, q)."""
         plane = np.array([1.0, 1j])
         return self._mesh.points(elements, xi) @ plane - self._origin, self._mesh.derivatives(elements, xi) @ plane
 
     def displacement_moments(
         self, x: ComplexArray, elements: IntArray, highest: int, length: float
     ) -> DisplacementMoments:
-        """Return the moments for displacements; parameters as in `straight_displacement_moments`."""
+        """Return the moments for displacements; see `straight_displacement_moments`."""
 
         def integrands(rho: ComplexArray, tau: ComplexArray) -> list[ComplexArray]:
             conjugate = rho.conj()
@@ -206,7 +208,7 @@ class ArcQuadrature:
         return DisplacementMoments(log.real, measure.real, quotient, cauchy, turn)
 
     def gradient_moments(self, x: ComplexArray, elements: IntArray, highest: int) -> GradientMoments:
-        """Return the moments for gradients; parameters as in `straight_displacement_moments`."""
+        """Return the moments for gradients; see `straight_displacement_moments`."""
 
         def integrands(rho: ComplexArray, tau: ComplexArray) -> list[ComplexArray]:
             conjugate = rho.conj()
@@ -227,7 +229,7 @@ class ArcQuadrature:
         highest: int,
         integrands: Integrands,
     ) -> list[ComplexArray]:
-        """Integrate the Legendre polynomials times each integrand: a list of (highest + 1, n) arrays."""
+        """Integrate the Legendre polynomials times each integrand; return a list of (highest + 1, n) arrays."""
         middle, slope = (values[elements, 0] for values in self._rule(1))
         is_far = _is_away(x, middle, slope, 2.0)
         sums = []
@@ -244,7 +246,7 @@ class ArcQuadrature:
     def _integrate_whole(
         self, x: ComplexArray, elements: IntArray, highest: int, integrands: Integrands
     ) -> list[ComplexArray]:
-        """Integrate over elements that are well away from their points; all points share the places on an element."""
+        """Integrate over elements far from their points; all points share the Gauss points of an element."""
         n_points = N_POINTS + highest // 2
         polynomials = kernels.legendre_weights(highest + 1, n_points)
         y, slope = (values[elements] for values in self._rule(n_points))
@@ -254,11 +256,11 @@ class ArcQuadrature:
     def _integrate_pieces(
         self, x: ComplexArray, elements: IntArray, highest: int, integrands: Integrands
     ) -> list[ComplexArray]:
-        """Integrate over elements that are bisected until each piece is well away from its point."""
+        """Integrate over elements that are bisected until each piece is far from its point."""
         pair, low, high = self._split(x, elements)
         reference, weights = gauss_legendre(N_POINTS + highest // 2)
         xi = 0.5 * (low + high)[:, None] + 0.5 * (high - low)[:, None] * reference
-        y, slope = self.place(elements[pair], xi)
+        y, slope = self.points(elements[pair], xi)
         speed = np.abs(slope)
         measure = 0.5 * (high - low)[:, None] * weights * speed
         values = integrands(x[pair, None] - y, slope / speed)
@@ -269,23 +271,23 @@ class ArcQuadrature:
         return sums
 
     def _rule(self, n_points: int) -> tuple[ComplexArray, ComplexArray]:
-        """Return y and dy/dxi (n_elements, n_points) of every element, computed once."""
+        """Return y and dy/dxi (n_elements, n_points) of all elements, from a cache."""
         if n_points not in self._rules:
             xi = gauss_legendre(n_points)[0]
-            self._rules[n_points] = self.place(np.arange(self._mesh.n_elements), xi)
+            self._rules[n_points] = self.points(np.arange(self._mesh.n_elements), xi)
         return self._rules[n_points]
 
     def _split(self, x: ComplexArray, elements: IntArray) -> tuple[IntArray, FloatArray, FloatArray]:
-        """Bisect elements until each piece [low, high] is well away from its point."""
+        """Bisect elements until each piece [low, high] is far from its point."""
 
         def is_away(pair: IntArray, low: FloatArray, high: FloatArray) -> BoolArray:
-            y, slope = self.place(elements[pair], 0.5 * (low + high)[:, None])
+            y, slope = self.points(elements[pair], 0.5 * (low + high)[:, None])
             return _is_away(x[pair], y[:, 0], slope[:, 0], high - low)
 
         return split_until(is_away, x.size, -1.0, 1.0)
 
 
 def _is_away(x: ComplexArray, middle: ComplexArray, slope: ComplexArray, length: FloatArray | float) -> BoolArray:
-    """Return which pieces, of lengths in the local coordinate, are so far from their points that one rule serves."""
+    """Return which pieces, of given lengths in the local coordinate, are far enough from their points for one rule."""
     away: BoolArray = np.abs(x - middle) >= SEPARATION * 0.5 * length * np.abs(slope)
     return away

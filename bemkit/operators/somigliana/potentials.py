@@ -14,13 +14,13 @@ from bemkit.operators.somigliana.stress import gradient_of, stress_of
 
 
 class Background(Protocol):
-    """A field in the whole body that is added to the one of the boundary data, such as a particular solution."""
+    """A field in the whole body that is added to that of the boundary data, such as a particular solution."""
 
     def displacement(self, points: FloatArray) -> FloatArray:
         """Evaluate the (n, 2) displacement [m] at (n, 2) points [m]."""
 
     def displacement_gradient(self, points: FloatArray) -> FloatArray:
-        """Evaluate its (n, 2, 2) gradient [-]."""
+        """Evaluate the (n, 2, 2) displacement gradient [-]."""
 
     def stress(self, points: FloatArray) -> FloatArray:
         """Evaluate the (n, 2, 2) stress [Pa]."""
@@ -33,7 +33,7 @@ class PotentialFields(ABC):
     ----------
     material : Material
     background : Background or None
-        A field that is added.
+        Field to be added.
     """
 
     material: Material
@@ -59,7 +59,7 @@ class PotentialFields(ABC):
         Raises
         ------
         PointNotInsideError
-            Naming the first point that is not inside.
+            If a point is not inside; the message gives the first one.
         """
 
     @abstractmethod
@@ -67,26 +67,26 @@ class PotentialFields(ABC):
         """Return Phi and D (n,) [Pa], without the background."""
 
     def displacement_gradient(self, points: FloatArray) -> FloatArray:
-        """Evaluate the (n, 2, 2) displacement gradient, [:, i, j] = du_i / dx_j; otherwise as `displacement`."""
+        """Evaluate the (n, 2, 2) displacement gradient, [:, i, j] = du_i / dx_j; see `displacement`."""
         potential, shear = self.potentials(points)
         kappa, two_mu = self.material.kappa, 2.0 * self.material.shear_modulus
-        own = gradient_of((kappa * potential - potential.conj()) / two_mu, shear / two_mu)
-        return own if self.background is None else own + self.background.displacement_gradient(points)
+        gradient = gradient_of((kappa * potential - potential.conj()) / two_mu, shear / two_mu)
+        return gradient if self.background is None else gradient + self.background.displacement_gradient(points)
 
     def strain(self, points: FloatArray) -> FloatArray:
-        """Evaluate the (n, 2, 2) strain, the symmetric part of the gradient; otherwise as `displacement`."""
+        """Evaluate the (n, 2, 2) strain, the symmetric part of the gradient; see `displacement`."""
         gradient = self.displacement_gradient(points)
         return 0.5 * (gradient + np.swapaxes(gradient, 1, 2))
 
     def stress(self, points: FloatArray) -> FloatArray:
-        """Evaluate the (n, 2, 2) stress [Pa]; otherwise as `displacement`."""
+        """Evaluate the (n, 2, 2) stress [Pa]; see `displacement`."""
         potential, shear = self.potentials(points)
-        own = stress_of(2.0 * potential.real, shear)
-        return own if self.background is None else own + self.background.stress(points)
+        stress = stress_of(2.0 * potential.real, shear)
+        return stress if self.background is None else stress + self.background.stress(points)
 
 
 def as_points(points: FloatArray) -> FloatArray:
-    """Return (n, 2) points; InputError if they are none."""
+    """Return points as an (n, 2) array, or raise InputError."""
     points = np.asarray(points, dtype=float)
     if points.ndim != 2 or points.shape[1] != 2 or not np.isfinite(points).all():
         raise InputError(f"points has the shape {points.shape}: give an (n, 2) array of finite coordinates")

@@ -1,4 +1,4 @@
-"""Plane gradients and stresses from complex numbers, and measures of a stress state."""
+"""Gradients and stresses in the plane from complex numbers, and invariants of stress."""
 
 from __future__ import annotations
 
@@ -31,25 +31,25 @@ def von_mises(stress: FloatArray, poisson_ratio: float, plane: Plane) -> FloatAr
     stress : (..., 2, 2) array [Pa]
         Symmetric stresses in the plane.
     poisson_ratio : float [-]
-        Of the material itself (not the effective one).
+        Poisson's ratio of the material, not the effective one.
     plane : Plane
-        In plane strain the stress across the plane is poisson_ratio (sigma_xx + sigma_yy), in plane stress zero.
+        In plane strain sigma_zz is poisson_ratio (sigma_xx + sigma_yy), in plane stress zero.
 
     Returns
     -------
     (...) array [Pa]
-        sqrt(3 J_2), not negative.
+        sqrt(3 J_2).
     """
     trace = stress[..., 0, 0] + stress[..., 1, 1]
     across = poisson_ratio * trace if plane is Plane.STRAIN else np.zeros_like(trace)
     radius = _shear_radius(stress)
-    # 3 J_2 = 3 radius^2 + (trace / 2 - sigma_zz)^2: a sum of squares, hence without cancellation
+    # 3 J_2 = 3 radius^2 + (trace / 2 - sigma_zz)^2 is a sum of squares, without cancellation
     result: FloatArray = np.hypot(np.sqrt(3.0) * radius, 0.5 * trace - across)
     return result
 
 
 def principal_stresses(stress: FloatArray) -> FloatArray:
-    """Return the two principal stresses in the plane, the larger (more tensile) one first.
+    """Return the two principal stresses in the plane, the larger one (more tensile) first.
 
     Parameters
     ----------
@@ -66,6 +66,6 @@ def principal_stresses(stress: FloatArray) -> FloatArray:
 
 
 def _shear_radius(stress: FloatArray) -> FloatArray:
-    """Return the radius of Mohr's circle, the largest shear stress in the plane."""
+    """Return the radius of Mohr's circle: the largest shear stress in the plane."""
     radius: FloatArray = np.hypot(0.5 * (stress[..., 0, 0] - stress[..., 1, 1]), stress[..., 0, 1])
     return radius

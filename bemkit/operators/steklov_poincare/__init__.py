@@ -1,15 +1,15 @@
-"""Elasticity of a body seen from its boundary, from displacements to tractions, by Galerkin or by collocation.
+"""Maps of an elastic body from boundary displacements to tractions, by Galerkin or by collocation.
 
-Scenes take `galerkin.GalerkinElasticity` or `collocation.CollocationElasticity`; `maps` makes linear operators of scipy
+Scenes use `galerkin.GalerkinElasticity` or `collocation.CollocationElasticity`; `operator` makes scipy linear operators
 of them.
 
-On bounded bodies both maps hold their tractions in exact equilibrium of forces and moments, as the continuous map
-does. Discretisation would break it slightly, and with it the independence of the arbitrary constant in the
-logarithm of the single layer.
+On bounded bodies the tractions of both maps are in exact equilibrium of forces and moments, as those of the continuous
+map. A plain discretisation would violate equilibrium slightly, and results would depend on the arbitrary constant in
+the logarithm of the single layer.
 
-On the exterior of a body (`BoundaryMesh.is_exterior`) no motion is free of tractions, and tractions may have a
-resultant F. The displacement then grows like F log(r / r0) with the distance r, and nothing but the choice of r0, the
-diameter of the mesh, fixes its constant; without a resultant it vanishes at infinity, rotation included.
+On the exterior of a body (`BoundaryMesh.is_exterior`) every rigid motion causes tractions, and tractions may have a
+resultant F. The displacement then grows like F log(r / r0) with the distance r; its constant depends on the choice of
+r0, the diameter of the mesh. Without a resultant, displacement and rotation vanish at infinity.
 """
 
 from bemkit.operators.steklov_poincare.nodal_conditions import TractionField as TractionField

@@ -1,4 +1,4 @@
-"""The direct collocation map of the paper, and its equations with one unknown a dof: traction or displacement."""
+"""The direct collocation map of the paper, and its mixed equations for unknown tractions and displacements."""
 
 from __future__ import annotations
 
@@ -32,17 +32,17 @@ class CollocationElasticity(BoundaryMap):
     mesh : BoundaryMesh
     material : Material
     slopes : bool
-        Whether the double layer takes slopes between neighbouring elements
+        Whether the displacements of the double layer vary linearly on each element, with slopes from its neighbours
         (`bemkit.operators.collocation.gradient_reconstruction`).
 
     Notes
     -----
-    The paper's discretisation, with three additions. With slopes, rotations cause no tractions, as translations do not
-    in any case; constant elements do not hold them by themselves. Plain collocation satisfies the equilibrium of
-    forces and moments only up to the discretisation error: here a rigid motion c is added to the equations and the
-    resultants of the tractions are set to zero; c vanishes with the mesh size. On an exterior neither c nor the
-    condition on the resultants is there. Likewise one reciprocity for each loop gives the pressure there, which the
-    displacement equation loses as Poisson's ratio approaches 1/2 (`bemkit.operators.collocation.reciprocity`).
+    The discretisation of the paper has three additions. With slopes, rotations cause no tractions; constant elements
+    represent only translations exactly. Plain collocation fulfils the equilibrium of forces and moments up to the
+    discretisation error. Here the resultants of the tractions are set to zero, and a rigid motion c, which vanishes
+    with the mesh size, is added to the equations; an exterior has neither. One reciprocity for each loop determines the
+    uniform pressure there, which the displacement equation loses as Poisson's ratio approaches 1/2
+    (`bemkit.operators.collocation.reciprocity`).
     """
 
     def __init__(self, mesh: BoundaryMesh, material: Material, *, slopes: bool = True) -> None:
@@ -54,7 +54,7 @@ class CollocationElasticity(BoundaryMap):
 
     @property
     def tags(self) -> frozenset[Tag]:
-        """Zero on rigid motions of a bounded body, with slopes; without them on translations only."""
+        """The map of a bounded body vanishes on rigid motions with slopes, and on translations without slopes."""
         if self.mesh.is_exterior:
             return frozenset()
         return frozenset({Tag.KILLS_RIGID_MOTIONS if self.slopes else Tag.KILLS_TRANSLATIONS})
@@ -64,7 +64,7 @@ class CollocationElasticity(BoundaryMap):
         return collocation_cost(case, takes_slopes=self.slopes)
 
     def stiffness(self) -> FloatArray:
-        """Return S, (n_dofs, n_dofs) [Pa]: the stiffness when all displacements are retained."""
+        """Return S, (n_dofs, n_dofs) [Pa]: the stiffness with all displacements retained."""
         shape = self.mesh.n_elements, 2
         frame = np.broadcast_to(np.eye(2), (*shape, 2))
         retained = NodalConditions(frame, np.zeros(shape, bool), np.zeros(shape), np.ones(shape, bool))
@@ -73,58 +73,57 @@ class CollocationElasticity(BoundaryMap):
         return system.condensed().stiffness
 
     def condense(self, conditions: NodalConditions, force: FloatArray) -> CondensedMap:
-        """Exchange columns so that all unknowns but the retained displacements are on the left, and solve once.
+        """Solve for all unknowns under unit displacements of the retained directions and the given load.
 
-        Columns of tractions and displacements that are known to be zero are neither computed nor stored.
+        Columns of tractions and displacements that are zero are neither computed nor stored.
         """
         name = "the body held by its supports and its contact boundary"
         return MixedSystem(self.mesh, self.material, conditions, name, force, slopes=self.slopes).condensed()
 
     def element_tractions(self, displacement: FloatArray, force: FloatArray) -> FloatArray:
-        """Return the (n_elements, 1, 2) tractions: forces over lengths."""
+        """Return the tractions (n_elements, 1, 2) [Pa]: forces per length."""
         return force[:, None] / self.mesh.lengths[:, None, None]
 
 
 @dataclass(frozen=True, eq=False)
 class _Solved:
-    """Given data, and the unknowns (n_dofs,) under them with the retained displacements at rest."""
+    """Given data, and the unknowns (n_dofs,) under them while the retained directions are at rest."""
 
     data: GivenData
     at_rest: FloatArray
 
 
 class MixedSystem:
-    """(1/2 + T) u = U t solved for every unknown but the retained displacements.
+    """(1/2 + T) u = U t solved for all unknowns except the retained displacements.
 
     Parameters
     ----------
     mesh : BoundaryMesh
     material : Material
     conditions : NodalConditions
-        Of the elements.
+        Conditions of the elements.
     name : str
-        What is singular if the equations are.
+        Name of the equations in error messages.
     force : (n_elements, 2) array [N/m]
-        In x and y: the first load, under which `condensed` is given.
+        First load, in x and y; `condensed` returns the map under it.
     slopes : bool
-        Whether the double layer takes the slopes of displacements; see
-        `bemkit.operators.collocation.gradient_reconstruction`.
+        See `CollocationElasticity`.
 
     Raises
     ------
     SingularMatrixError
-        If the supports, and the retained directions held fast, leave the body free.
+        If the body can move while its supports and its retained directions are held.
 
     Notes
     -----
-    The unknown of a dof is its displacement where the force is known, else its traction; the columns of the matrix are
-    those of the double layer there, else those of the single layer with the other sign. Columns that are multiplied by
-    zero are neither computed nor stored: those of tractions on free directions without a load, and of displacements in
-    directions that are held at rest. Columns of given data are multiplied by them at once and not stored either; loads
-    that are not multiples of the one before take another sweep over the pairs.
+    The unknown of a dof is its displacement if the force is given, otherwise its traction. Its column is that of the
+    double layer, or that of the single layer with opposite sign. Columns of quantities that are zero are neither
+    computed nor stored: tractions on free directions without a load, displacements of fixed directions at rest. Columns
+    of other given data are multiplied by the data when they are computed, and not stored. A load that is no multiple of
+    the last one takes another sweep over the element pairs.
 
-    Resultants of the tractions and reciprocities come after the displacement equations, which have one more unknown for
-    each of these: an error.
+    The equations for resultants and reciprocities follow the displacement equations; each adds an unknown, an error of
+    the displacement equations.
     """
 
     def __init__(
@@ -142,17 +141,17 @@ class MixedSystem:
         self._free, self._fixed, self._retained = (
             np.flatnonzero(x) for x in (conditions.is_free, conditions.is_fixed, conditions.is_retained)
         )
-        every = np.arange(mesh.n_elements)
-        self._equations = collocation_equations(mesh, material, every, takes_slopes=slopes, layer=straight_layer)
+        elements = np.arange(mesh.n_elements)
+        self._equations = collocation_equations(mesh, material, elements, takes_slopes=slopes, layer=straight_layer)
         border, frame = self._equations.border, conditions.frame
         balances = border.balances.reshape(-1, mesh.n_elements, 2, 2)
         self._on_traction, self._on_displacement = (
-            each.reshape(len(balances), -1).copy() for each in (balances[:, :, 0], -balances[:, :, 1])
+            columns.reshape(len(balances), -1).copy() for columns in (balances[:, :, 0], -balances[:, :, 1])
         )
-        for each in (self._on_traction, self._on_displacement):
-            turn_columns(each, frame)
+        for columns in (self._on_traction, self._on_displacement):
+            turn_columns(columns, frame)
 
-        # the displacement equations with the columns of their errors, and the balances below them
+        # displacement equations with the columns of their errors, then the balances
         n_rows, order = self._weights.size, self._weights.size + len(balances)
         matrix, right = np.zeros((order, order), order="F"), np.zeros((order, self._retained.size), order="F")
         data = GivenData.of(conditions, force, conditions.displacement)
@@ -179,16 +178,16 @@ class MixedSystem:
     def _sweep(
         self, data: GivenData, matrix: FloatArray | None = None, right: FloatArray | None = None
     ) -> tuple[FloatArray, OperationCounts]:
-        """Return what data contribute to the equations (n_rows,), and fill the columns of what is not given.
+        """Return the contribution of given data to the equations (n_rows,), and fill the columns of unknowns.
 
-        The matrix (n_rows, n_rows) takes the columns of unknowns, `right` (n_rows, n_retained) those of the retained
-        displacements.
+        `matrix` (n_rows, n_rows) receives the columns of the unknowns, `right` (n_rows, n_retained) those of the
+        retained displacements.
         """
         n, n_rows, conditions = self._mesh.n_elements, self._weights.size, self._conditions
         loaded, moved = (np.flatnonzero(x) for x in (data.force, data.displacement))
         traction, displacement = data.force.ravel()[loaded] / self._weights[loaded], data.displacement.ravel()[moved]
         unknown = np.zeros(0, np.intp) if matrix is None else np.flatnonzero(~conditions.is_free)
-        # elements with tractions, and the indices of their dofs among those of all of them
+        # elements with tractions, and the index of each of their dofs among the computed columns
         elements = np.unique(np.concatenate([unknown, loaded]) // 2)
         of_traction = (4 * elements[:, None] + np.arange(2)).ravel()
         index = np.zeros(n_rows, np.intp)
@@ -197,13 +196,13 @@ class MixedSystem:
         needs_double = matrix is not None or moved.size > 0
 
         def fill(nodes: slice) -> None:
-            rows, own = slice(2 * nodes.start, 2 * nodes.stop), np.arange(nodes.start, nodes.stop)
+            rows, targets = slice(2 * nodes.start, 2 * nodes.stop), np.arange(nodes.start, nodes.stop)
             single = self._equations.block(np.arange(rows.start, rows.stop), of_traction)  # minus the single layer
             turn_columns(single, conditions.frame[elements])
             known[rows] -= _product(single[:, index[loaded]], traction)
             if not needs_double:
                 return
-            double = displacement_rows(self._equations, own, value_of_one)
+            double = displacement_rows(self._equations, targets, value_of_one)
             turn_columns(double, conditions.frame)
             known[rows] -= _product(double[:, moved], displacement)
             if matrix is not None and right is not None:
@@ -219,7 +218,7 @@ class MixedSystem:
         return known, OperationCounts(element_pairs=n_pairs, single_layer=of_loads, double_layer=of_motions)
 
     def _solution(self, data: GivenData, known: FloatArray) -> FloatArray:
-        """Return the unknowns (n_dofs,), the retained displacements at rest."""
+        """Return the unknowns (n_dofs,) while the retained directions are at rest."""
         traction, displacement = data.force.ravel() / self._weights, data.displacement.ravel()
         balances = self._on_traction @ traction - self._on_displacement @ displacement
         return self._factor.solve(np.concatenate([known, balances]))[: traction.size]
@@ -227,13 +226,13 @@ class MixedSystem:
     def _condensed(
         self, force: FloatArray, data: GivenData, base: _Solved, factor: float, work: OperationCounts
     ) -> CondensedMap:
-        """Return the condensed map under forces (n_elements, 2) and data that are a multiple of others."""
+        """Return the condensed map under forces (n_elements, 2) and data that are `factor` times those of `base`."""
         traction = self._conditions.in_frames(force).ravel() / self._weights
         at_rest = factor * base.at_rest
-        own, retained = self._weights[self._retained], self._retained
+        weights, retained = self._weights[self._retained], self._retained
         return _MixedMap(
-            stiffness=own[:, None] * self._response[retained],
-            load=own * (traction[retained] - at_rest[retained]),
+            stiffness=weights[:, None] * self._response[retained],
+            load=weights * (traction[retained] - at_rest[retained]),
             work=work,
             system=self,
             at_rest=at_rest,
@@ -243,7 +242,7 @@ class MixedSystem:
         )
 
     def recovered(self, loaded: _MixedMap, retained: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return displacement and force of all elements of a map under retained displacements (n_retained,)."""
+        """Return displacement and force of all elements under retained displacements (n_retained,)."""
         is_free = self._conditions.is_free.ravel()
         unknowns = loaded.at_rest + self._response @ retained
         local = np.where(is_free, unknowns, loaded.given)
@@ -252,11 +251,11 @@ class MixedSystem:
         return self._conditions.in_plane(local), self._conditions.in_plane(force)
 
     def followed(self, loaded: _MixedMap, directions: IntArray) -> tuple[FloatArray, FloatArray]:
-        """Return what free directions of a map do; see `CondensedMap.follow`."""
+        """Return response and displacement at rest of free directions; see `CondensedMap.follow`."""
         return self._response[directions], loaded.at_rest[directions]
 
     def under(self, base: _Solved, force: FloatArray, displacement: FloatArray) -> CondensedMap:
-        """Return the condensed map under other data; load factors, the usual case, take no other solution."""
+        """Return the condensed map under other data; a multiple of the last data takes no other solution."""
         data, work = GivenData.of(self._conditions, force, displacement), OperationCounts()
         factor = data.factor_of(base.data)
         if factor is None:
@@ -274,11 +273,11 @@ class _MixedMap(CondensedMap):
     ----------
     system : MixedSystem
     at_rest : (n_dofs,) array
-        The unknowns with the retained displacements at rest.
+        The unknowns while the retained directions are at rest.
     traction, given : (n_dofs,) arrays [Pa], [m]
         Given tractions and displacements in the frames.
     base : _Solved
-        A load of which this one is a multiple.
+        Solved data of which the given data are a multiple.
     """
 
     system: MixedSystem
@@ -296,11 +295,11 @@ class _MixedMap(CondensedMap):
         return self.system.under(self.base, force, displacement)
 
     def follow(self, directions: IntArray) -> tuple[FloatArray, FloatArray]:
-        """Return what free directions do."""
+        """Return response and displacement at rest of free directions."""
         return self.system.followed(self, directions)
 
 
 def _product(columns: FloatArray, values: FloatArray) -> FloatArray:
-    """Return columns (2, n_rows, n) times values, without BLAS, whose threads would wait for those of the sweep."""
+    """Return columns (n_rows, n) times values (n,), without BLAS, whose threads would wait for those of the sweep."""
     product: FloatArray = np.einsum("rn,n->r", columns, values)
     return product

@@ -1,8 +1,8 @@
-"""Any elastic map under forces and heat inside the body, by a particular solution: no mesh of the domain.
+"""Body forces and heat for any elastic map by a particular solution, without a mesh of the domain.
 
-With a displacement u_p and stresses sigma_p that balance the forces inside, u = u_h + u_p, and u_h obeys the map S
-without them: S (u - u_p) = f - f_p, with f the nodal forces of all tractions and f_p those of sigma_p n. At the nodes
-u_p is exact, so that all that S holds exactly stays exact, and only u_h has a discretisation error.
+Let u_p be a displacement whose stresses sigma_p balance the body forces. The rest u_h = u - u_p fulfils the map S
+without body forces: S (u - u_p) = f - f_p, with f the nodal forces of all tractions and f_p those of sigma_p n. The
+values of u_p at the nodes are exact, so that only u_h has a discretisation error.
 """
 
 from __future__ import annotations
@@ -28,22 +28,22 @@ if TYPE_CHECKING:
     from bemkit.operators.steklov_poincare.cost import BodyCase, BodyCost
 
 _MORE_POINTS = 5
+"""Gauss points beyond the degree of the tractions."""
 
 
 @dataclass(frozen=True, eq=False)
 class ForcesInside:
-    """A particular solution as the nodes of a space see it.
+    """Nodal values of a particular solution for body forces and heat.
 
     Parameters
     ----------
     solution : ParticularSolution
     displacement, force : (n_nodes, 2) arrays [m], [N/m]
-        Its values, and the nodal forces of its tractions.
+        Displacements at the nodes, and the nodal forces of the tractions.
     volume_force : (3,) array [N/m], [N/m], [N]
-        Resultants along x and y of the forces inside, and their moment about the origin.
+        Resultants of the body forces along x and y, and their moment about the origin.
     inner_force : float [N/m]
-        Sum of the magnitudes of the forces that body forces and heat exert on the boundary, balanced or not: of those
-        above, and of E' times the strains that heat causes.
+        Sum of the magnitudes of the nodal forces and of E' times the thermal strains along the boundary.
     """
 
     solution: ParticularSolution
@@ -68,7 +68,7 @@ class ForcesInside:
         )
 
     def blended(self, other: ForcesInside, share: float) -> ForcesInside:
-        """Return what nodes see a share of the way to other forces; its solution is that of the other ones."""
+        """Return nodal values (1 - share) self + share other, with the particular solution of `other`."""
         return replace(
             other,
             displacement=blended(self.displacement, other.displacement, share),
@@ -78,17 +78,17 @@ class ForcesInside:
         )
 
     def add_to(self, without_body_forces: CondensedMap, conditions: NodalConditions) -> CondensedMap:
-        """Return a condensed map under forces inside.
+        """Return a condensed map under these body forces.
 
         Parameters
         ----------
         without_body_forces : CondensedMap
-            Under what is left of the given data: see `left_of`.
+            The map under the data of `left_of`.
         conditions : NodalConditions
         """
         along = conditions.in_frames(self.displacement)
         shift = along[conditions.is_retained]
-        return _HeavyMap(
+        return _MapWithBodyForces(
             stiffness=without_body_forces.stiffness,
             load=without_body_forces.load + without_body_forces.stiffness @ shift,
             sensitivity=without_body_forces.sensitivity,
@@ -103,31 +103,30 @@ class ForcesInside:
         )
 
     def left_of(self, conditions: NodalConditions, force: FloatArray) -> tuple[NodalConditions, FloatArray]:
-        """Return the conditions and the given forces (n_nodes, 2) [N/m] less what the particular solution takes."""
-        own = conditions.in_frames(self.displacement)
-        displacement = np.where(conditions.is_fixed, conditions.displacement - own, 0.0)
+        """Return the conditions and the given forces (n_nodes, 2) [N/m] minus those of the particular solution."""
+        particular = conditions.in_frames(self.displacement)
+        displacement = np.where(conditions.is_fixed, conditions.displacement - particular, 0.0)
         return replace(conditions, displacement=displacement), force - self.force
 
     def under(self, without_body_forces: CondensedMap, conditions: NodalConditions, force: FloatArray) -> CondensedMap:
-        """Return a condensed body without forces inside under other data and these."""
+        """Return a condensed body without body forces under other data and these body forces."""
         left, left_force = self.left_of(conditions, force)
         return self.add_to(without_body_forces.under(left_force, left.displacement), conditions)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class _HeavyMap(CondensedMap):
-    """A condensed map under forces inside; see `ForcesInside.add_to`.
+class _MapWithBodyForces(CondensedMap):
+    """A condensed map under body forces; see `ForcesInside.add_to`.
 
     Parameters
     ----------
     without_body_forces : CondensedMap
-        Without what acts inside.
     inside : ForcesInside
     conditions : NodalConditions
     along : (n_nodes, 2) array [m]
-        The particular solution in the frames.
+        Particular displacements in the frames.
     shift : (n_retained,) array [m]
-        The same along the retained directions.
+        Particular displacements along the retained directions.
     """
 
     without_body_forces: CondensedMap
@@ -142,11 +141,11 @@ class _HeavyMap(CondensedMap):
         return displacement + self.inside.displacement, force + self.inside.force
 
     def under(self, force: FloatArray, displacement: FloatArray) -> CondensedMap:
-        """Return the map under other loads and the same forces inside."""
+        """Return the map under other loads and the same body forces."""
         return self.inside.under(self.without_body_forces, replace(self.conditions, displacement=displacement), force)
 
     def follow(self, directions: IntArray) -> tuple[FloatArray, FloatArray]:
-        """Return what free directions do."""
+        """Return response and displacement at rest of free directions."""
         response, at_rest = self.without_body_forces.follow(directions)
         return response, at_rest + self.along.ravel()[directions] - response @ self.shift
 
@@ -154,7 +153,7 @@ class _HeavyMap(CondensedMap):
 def condensed_under(
     condensed: CondensedMap, conditions: NodalConditions, force: FloatArray, inside: ForcesInside | None = None
 ) -> CondensedMap:
-    """Return a condensed body under other displacements, forces and, if given, forces inside; nothing is factored."""
+    """Return a condensed body under other displacements, forces and, if given, body forces; nothing is factored."""
     if inside is None:
         return condensed.under(force, conditions.displacement)
     return inside.under(condensed.without_body_forces or condensed, conditions, force)
@@ -162,14 +161,14 @@ def condensed_under(
 
 @dataclass(frozen=True, eq=False)
 class ElasticityWithBodyForces:
-    """An elastic map under forces and heat inside the body; fulfils `SteklovPoincare`.
+    """An elastic map under body forces and heat; fulfils `SteklovPoincare`.
 
     Parameters
     ----------
     without_body_forces : SteklovPoincare
         Any map of a bounded body.
     inside : ForcesInside
-        On its space of displacements.
+        Values on the displacement space of the map.
     """
 
     without_body_forces: SteklovPoincare
@@ -192,24 +191,24 @@ class ElasticityWithBodyForces:
 
     @property
     def tags(self) -> frozenset[Tag]:
-        """Those of the map without forces inside."""
+        """Tags of the map without body forces."""
         return self.without_body_forces.tags
 
     def cost(self, case: BodyCase) -> BodyCost:
-        """Return the costs of the map without forces inside."""
+        """Return the costs of the map without body forces."""
         return self.without_body_forces.cost(case)
 
     def condense(self, conditions: NodalConditions, force: FloatArray) -> CondensedMap:
-        """Condense the map without forces inside, and add these; see `SteklovPoincare.condense`."""
+        """Condense the map without body forces, then add them; see `SteklovPoincare.condense`."""
         return self.inside.add_to(
             self.without_body_forces.condense(*self.inside.left_of(conditions, force)), conditions
         )
 
     def element_tractions(self, displacement: FloatArray, force: FloatArray) -> FloatArray:
-        """Return all tractions (n_elements, n_local, 2) [Pa], those of the particular solution projected."""
+        """Return all tractions (n_elements, n_local, 2) [Pa]; those of the particular solution are projected."""
         inside = self.inside
-        left = self.without_body_forces.element_tractions(displacement - inside.displacement, force - inside.force)
-        return left + self._particular_tractions
+        rest = self.without_body_forces.element_tractions(displacement - inside.displacement, force - inside.force)
+        return rest + self._particular_tractions
 
     @cached_property
     def _particular_tractions(self) -> FloatArray:
@@ -220,33 +219,36 @@ class ElasticityWithBodyForces:
         return self.inside.solution.energy(self.traction_space.mesh)
 
     def own_fields(self, displacement: FloatArray, force: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return displacement and force less those of the particular solution."""
+        """Return displacement and force minus those of the particular solution."""
         return displacement - self.inside.displacement, force - self.inside.force
 
     def further_energy(self, displacement: FloatArray, force: FloatArray) -> FloatArray:
-        """Return the parts (4,) of the elastic energy [J/m] that a body has beyond the one of the map, f_h u_h / 2.
+        """Return the parts (4,) of the elastic energy [J/m] in addition to that of the map, f_h u_h / 2.
 
         Parameters
         ----------
         displacement, force : (n_nodes, 2) arrays [m], [N/m]
-            Of the map: u_h and f_h.
+            u_h and f_h of the map without body forces.
 
         Notes
         -----
-        The energy of sigma_p itself, and the work of sigma_h on the strains of sigma_p: by Betti's theorem that is the
-        work of the tractions t_h on u_p for forces, and of the tractions sigma_p n on u_h for heat. The nodal forces
-        do the first on the interpolant of u_p, and the tractions, which hold normals only by interpolation, on the
-        small rest.
+        The parts are the energy of sigma_p and the work of sigma_h on the strains of sigma_p. By Betti's theorem the
+        latter is the work of the tractions t_h on u_p for forces, and of the tractions sigma_p n on u_h for heat. The
+        nodal forces f_h work on the interpolant of u_p; the tractions t_h, whose normals are interpolated, work on the
+        small interpolation error.
         """
         traction = self.without_body_forces.element_tractions(displacement, force)
         at_nodes, rest, of_heat = self._work_on_particular
         strained = without_motion(self.traction_space.mesh, dof_points(self.displacement_space), displacement)
         pairs = (force, at_nodes), (traction, rest), (of_heat, strained)
-        return np.array([*(np.sum(one * two) for one, two in pairs), self._particular_energy])
+        return np.array([*(np.sum(force * path) for force, path in pairs), self._particular_energy])
 
     @cached_property
     def _work_on_particular(self) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Work conjugates of forces (n_nodes, 2), tractions (n_elements, n_local, 2) and displacements (n_nodes, 2)."""
+        """Factors whose products with forces, tractions and displacements are work; see `further_energy`.
+
+        Shapes are (n_nodes, 2), (n_elements, n_local, 2) and (n_nodes, 2).
+        """
         inside, space, moved_space = self.inside, self.traction_space, self.displacement_space
         xi, weights = gauss_legendre(space.degree + _MORE_POINTS)
         elements = np.arange(space.mesh.n_elements)
@@ -261,7 +263,7 @@ class ElasticityWithBodyForces:
 
 
 def projected_tractions(solution: ParticularSolution, space: BoundarySpace) -> FloatArray:
-    """Return the tractions (n_elements, n_local, 2) [Pa] of a solution, projected onto a space element by element."""
+    """Project the tractions of a solution onto a space, element by element; return (n_elements, n_local, 2) [Pa]."""
     xi, weights = gauss_legendre(space.degree + _MORE_POINTS)
     elements, basis = np.arange(space.mesh.n_elements), space.basis(xi)
     points, normals = space.mesh.points(elements, xi), space.mesh.normals_at(elements, xi)

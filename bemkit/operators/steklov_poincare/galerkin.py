@@ -39,9 +39,9 @@ from bemkit.operators.steklov_poincare.volume_constraint import Volume
 
 _DIRECT = DenseCholesky()
 _MIRRORED = 128
-"""Rows that are mirrored at a time, so that they stay in the cache."""
+"""Rows that are mirrored at a time, to stay in the cache."""
 _NEARLY_INCOMPRESSIBLE = 0.49
-"""Poisson's ratio up to which errors of the pressure in a curved hole are those of the discretisation."""
+"""Poisson's ratio above which displacements hardly determine the pressure in a curved hole."""
 _HELD_BODY = "the body held by its supports and its contact boundary"
 
 
@@ -52,13 +52,13 @@ class GalerkinFactors:
     Parameters
     ----------
     matrix : (n_dofs, n_dofs) array [Pa]
-        S, symmetric, without the uniform pressure.
+        Symmetric S without the uniform pressure.
     single_layer : Cholesky
         V = L L^T.
     whitened_trace : (n_traction_dofs, n_dofs) array
-        L^-1 (1/2 M + K), less the part whose tractions exert a resultant.
+        L^-1 (1/2 M + K), projected on tractions without a resultant.
     work : OperationCounts
-        Operations of their assembly and factorisation.
+        Operations of assembly and factorisation.
     """
 
     matrix: FloatArray
@@ -75,9 +75,9 @@ class GalerkinElasticity(BoundaryMap):
     mesh : BoundaryMesh
     material : Material
     displacement_space, traction_space : BoundarySpace, optional
-        Continuous linear displacements and piecewise constant tractions unless given.
+        By default continuous linear displacements and piecewise constant tractions.
     linear_solver : LinearSolver
-        How `condense` solves for the free displacements: by forming S and factoring it unless given otherwise.
+        Solver of `condense` for the free displacements; by default S is formed and factored.
 
     Raises
     ------
@@ -86,13 +86,13 @@ class GalerkinElasticity(BoundaryMap):
 
     Notes
     -----
-    [Paper], eq. (28); [Steinbach2008]. V is inverted on the tractions that exert no resultant force and moment, so that
-    all tractions are in exact equilibrium and S is independent of the constant in the logarithm; S is symmetric, and
-    positive definite on displacements without rigid motions.
+    [Paper], eq. (28); [Steinbach2008]. V is inverted on tractions without resultant force and moment. All tractions are
+    then in exact equilibrium, and S does not depend on the constant in the logarithm. S is symmetric, and positive
+    definite on displacements without rigid motions.
 
-    At nu = 1/2 a uniform pressure on a loop causes no displacement, and only displacements that keep the volume are
-    possible: V is then inverted on tractions without such pressures, the matrix is S without the pressure that keeps
-    the volume, and `condense` finds that pressure as one more unknown, as it does for compressible bodies.
+    At nu = 1/2 a uniform pressure on a loop causes no displacement, and displacements keep the volume. V is then
+    inverted on tractions without such pressures, the matrix is S without the uniform pressure, and `condense` solves
+    for that pressure as an additional unknown, as it does for compressible bodies.
     """
 
     def __init__(
@@ -116,7 +116,7 @@ class GalerkinElasticity(BoundaryMap):
 
     @property
     def tags(self) -> frozenset[Tag]:
-        """Symmetric and semidefinite; the kernel are the rigid motions that the space holds, of a bounded body."""
+        """Symmetric and positive semidefinite; rigid motions in the space are the kernel of a bounded body."""
         tags = {Tag.SYMMETRIC, Tag.POSITIVE_SEMIDEFINITE}
         return frozenset(tags if self.mesh.is_exterior else tags | {Tag.KILLS_RIGID_MOTIONS})
 
@@ -133,36 +133,37 @@ class GalerkinElasticity(BoundaryMap):
 
     @cached_property
     def _pressures(self) -> FloatArray:
-        """(n_traction_dofs, n_pressures) uniform pressures, for which the map takes normals that are exact.
+        """(n_traction_dofs, n_pressures) array: uniform pressures with exact normals.
 
-        That of the whole boundary, those of each loop of an incompressible body; none of a compressible exterior.
+        A compressible body has one on its whole boundary, an incompressible body one on each loop, and a compressible
+        exterior none.
         """
         dofs = self.traction_space.element_dofs
-        everywhere = np.arange(self.mesh.n_elements)
+        elements = np.arange(self.mesh.n_elements)
         normals = np.zeros((self.traction_space.n_dofs // 2, 2))
-        normals[dofs] = self.mesh.normals_at(everywhere, element_nodes(self.traction_space))
+        normals[dofs] = self.mesh.normals_at(elements, element_nodes(self.traction_space))
         pressures = np.zeros((len(normals), 2, len(self._pressed)))
-        for number, elements in enumerate(self._pressed):
-            pressures[dofs[elements].ravel(), :, number] = normals[dofs[elements].ravel()]
+        for index, elements in enumerate(self._pressed):
+            pressures[dofs[elements].ravel(), :, index] = normals[dofs[elements].ravel()]
         return pressures.reshape(self.traction_space.n_dofs, -1)
 
     @property
     def _pressed(self) -> tuple[IntArray, ...]:
-        """The elements under each of the uniform pressures."""
+        """The elements under each uniform pressure."""
         if self.material.is_incompressible:
             return self.mesh.loops
         return () if self.mesh.is_exterior else (np.arange(self.mesh.n_elements),)
 
     @cached_property
     def _flux(self) -> FloatArray:
-        """(n_dofs, 1) change of volume per displacement dof; no column for an exterior."""
+        """(n_dofs, 1) array: change of volume per displacement dof; an exterior has no column."""
         fluxes = self._fluxes(() if self.mesh.is_exterior else self._pressed)
         return np.asarray(fluxes.sum(axis=1, keepdims=True)[:, : fluxes.shape[1]])
 
     def _fluxes(self, parts: Sequence[IntArray]) -> FloatArray:
         """Return the (n_dofs, n_parts) changes of volume per displacement dof on parts of the boundary.
 
-        Normals are integrated along the curves: those that traction dofs interpolate let a curved body gain volume.
+        Normals are integrated along the curves; with interpolated normals a curved body would gain volume.
         """
         fluxes = [
             integrate_traction(self.displacement_space, elements, lambda _, normals: normals).ravel()
@@ -170,19 +171,19 @@ class GalerkinElasticity(BoundaryMap):
         ]
         flux: FloatArray = np.array(fluxes).reshape(-1, self.displacement_space.n_dofs)
         flux[:, antisymmetric_dofs(self.displacement_space)] = 0.0
-        # the interpolant of a rotation changes the volume of curved elements; a rigid motion does not
+        # the interpolant of a rotation changes the volume of curved elements: remove that part
         motions = traction_free_modes(self.mesh, dof_points(self.displacement_space))
         return np.asarray(flux.T - motions @ np.linalg.lstsq(motions, flux.T, rcond=None)[0])
 
     @cached_property
     def _volume(self) -> Volume:
-        """The change of volume, on which the uniform pressure works.
+        """The change of volume, which is conjugate to the uniform pressure.
 
-        Curved elements hold normals n only by interpolation; the rest of them, which does not vanish with 1 - 2 nu as
-        V n does, would resist every change of volume of a nearly incompressible body. Exact normals are among the
-        tractions instead. With the dilatation x, whose tractions are n / beta, beta the compressibility, and the flux f
-        of displacements, the identities V n = beta (1/2 + K) x and (1/2 + K') n = n - beta W x give
-        (f - beta W x) u = beta x (f - beta W x) p. On the other tractions, <V n, t> = 0, W x is S x.
+        Curved elements interpolate normals n. The interpolation error, unlike V n, does not vanish with 1 - 2 nu and
+        would resist every change of volume of a nearly incompressible body. So exact normals are added to the
+        tractions. Let x be the dilatation, whose tractions are n / beta with the compressibility beta, and f the flux
+        of displacements. The identities V n = beta (1/2 + K) x and (1/2 + K') n = n - beta W x give (f - beta W x) u =
+        beta x (f - beta W x) p. On the other tractions, with <V n, t> = 0, W x equals S x.
         """
         total = self._flux
         if self.material.is_incompressible or self.mesh.is_exterior:
@@ -192,29 +193,29 @@ class GalerkinElasticity(BoundaryMap):
         return Volume(change, beta * float(np.vdot(dilatation, change)))
 
     def stiffness(self) -> FloatArray:
-        """Return S, (n_dofs, n_dofs) [Pa]; of an incompressible body without the pressure that keeps the volume."""
+        """Return S, (n_dofs, n_dofs) [Pa]; for an incompressible body without the uniform pressure."""
         if not self._volume.compliance:
             return self.factors.matrix
         change = self._volume.change
         return np.asarray(self.factors.matrix + change @ change.T / self._volume.compliance)
 
     def condense(self, conditions: NodalConditions, force: FloatArray) -> CondensedMap:
-        """Eliminate every direction that is not retained, by a Schur complement, with the linear solver of the map."""
+        """Eliminate all directions that are not retained by a Schur complement, with the linear solver of the map."""
         condensation = SchurCondensation(self.factors.matrix, self._volume, conditions, self.linear_solver, _HELD_BODY)
         first = condensation.under(force, conditions.displacement)
         return replace(first, work=self.factors.work + condensation.work + first.work)
 
     def tractions(self, displacement: FloatArray) -> FloatArray:
-        """Return the traction dofs (n_scalar, 2) [Pa] that belong to nodal displacements (n_nodes, 2) [m].
+        """Return the traction dofs (n_scalar, 2) [Pa] of nodal displacements (n_nodes, 2) [m].
 
-        Of an incompressible body they lack the pressures, which displacements do not give; those on curved loops of a
-        nearly incompressible one they hardly determine.
+        Displacements do not determine the uniform pressures of an incompressible body, which are left zero. They hardly
+        determine those on curved loops of a nearly incompressible body.
         """
         factors = self.factors  # V^-1 (1/2 M + K) u on tractions without uniform pressures
         rest = factors.single_layer.solve_upper(factors.whitened_trace @ displacement.ravel())
         if self.material.is_incompressible or self.mesh.is_exterior:
             return rest.reshape(-1, 2)
-        # the pressure by the work on the dilatation, whose forces are the flux over the compressibility
+        # reciprocity with the dilatation, whose forces are the flux over the compressibility, gives the pressure
         arms, flux, of_dilatation = self._dilatation
         work = flux @ displacement.ravel() / self.material.plane_compressibility
         tension = (work - arms @ rest) / of_dilatation
@@ -222,16 +223,17 @@ class GalerkinElasticity(BoundaryMap):
 
     @cached_property
     def _dilatation(self) -> tuple[FloatArray, FloatArray, float]:
-        """The work of tractions on the dilatation x, of pressures on displacements, and of pressures on x."""
-        everywhere, centre, flux = np.arange(self.mesh.n_elements), self.mesh.centre, self._flux[:, 0]
-        arms = integrate_traction(self.traction_space, everywhere, lambda points, _: points - centre).ravel()
+        """The work of tractions on the dilatation x, of a unit pressure on displacements, and of that pressure on x."""
+        elements, centre, flux = np.arange(self.mesh.n_elements), self.mesh.centre, self._flux[:, 0]
+        arms = integrate_traction(self.traction_space, elements, lambda points, _: points - centre).ravel()
         return arms, flux, float(flux @ dilatation_of(self.displacement_space))
 
     def element_tractions(self, displacement: FloatArray, force: FloatArray) -> FloatArray:
-        """Return the (n_elements, n_local, 2) tractions V^-1 (1/2 M + K) u, with the pressures that `force` determines.
+        """Return the tractions (n_elements, n_local, 2) [Pa], V^-1 (1/2 M + K) u with pressures fitted to `force`.
 
-        Around a hole V n is of the order of the compressibility. Curved elements interpolate the normal n, so their V n
-        has an error, which causes an error of the pressure that grows without bound as Poisson's ratio approaches 1/2.
+        Around a hole V n is of the order of the compressibility. Curved elements interpolate the normal n, so that
+        their V n has an error. The resulting error of the pressure grows without bound as Poisson's ratio approaches
+        1/2.
         """
         tractions = self.tractions(displacement)
         at_nodes = values_on_elements(self.traction_space, tractions)
@@ -245,13 +247,13 @@ class GalerkinElasticity(BoundaryMap):
 
     @property
     def _needs_forces(self) -> bool:
-        """Whether displacements do not, or hardly, determine the pressures on the loops."""
+        """Whether displacements determine the pressures on the loops hardly or not at all."""
         has_curved_holes = (self.mesh.is_exterior or len(self.mesh.loops) > 1) and not self.mesh.is_straight.all()
         is_nearly = self.material.effective_poisson_ratio > _NEARLY_INCOMPRESSIBLE
         return self.material.is_incompressible or bool(is_nearly and has_curved_holes)
 
     def _normals_of_true_mean(self) -> FloatArray:
-        """Return the normals (n_elements, n_local, 2) at the local nodes, with the mean of those along the curve."""
+        """Return normals (n_elements, n_local, 2) at the local nodes, shifted to the exact mean over each element."""
         space, mesh = self.traction_space, self.mesh
         xi, weights = gauss_legendre(space.degree + 1)
         normals = mesh.normals_at(np.arange(mesh.n_elements), space.local_nodes)
@@ -262,15 +264,15 @@ class GalerkinElasticity(BoundaryMap):
 
 
 def _symmetric_sum(hyper: FloatArray, whitened_trace: FloatArray) -> FloatArray:
-    """Return `hyper`, symmetric, plus whitened_trace^T whitened_trace, read-only; `hyper` is overwritten."""
+    """Return the symmetric `hyper` plus whitened_trace^T whitened_trace, read-only; `hyper` is overwritten."""
     from scipy.linalg.blas import dsyrk
 
-    # one triangle, row-major that above the diagonal, which is then copied below it
+    # BLAS computes one triangle (above the diagonal in row-major order), which is then mirrored
     column_major = hyper.T if hyper.flags.c_contiguous else hyper
     matrix: FloatArray = dsyrk(1.0, whitened_trace.T, beta=1.0, c=column_major, lower=1, overwrite_c=1).T
     for begin in range(0, len(matrix), _MIRRORED):
-        own, after = slice(begin, begin + _MIRRORED), slice(begin + _MIRRORED, None)
-        matrix[after, own] = matrix[own, after].T
-        matrix[own, own] = np.triu(matrix[own, own]) + np.triu(matrix[own, own], 1).T
+        block, after = slice(begin, begin + _MIRRORED), slice(begin + _MIRRORED, None)
+        matrix[after, block] = matrix[block, after].T
+        matrix[block, block] = np.triu(matrix[block, block]) + np.triu(matrix[block, block], 1).T
     read_only(matrix)
     return matrix

@@ -24,18 +24,17 @@ from bemkit.operators.rigid_modes import traction_free_modes
 
 @dataclass(frozen=True, eq=False)
 class Layers:
-    """S = W + B^T V^-1 B, V inverted on tractions without a resultant or a uniform pressure.
+    """Operators of S = W + B^T V^-1 B, with V inverted on tractions without a resultant or a uniform pressure.
 
     Parameters
     ----------
     single_layer : Cholesky
         V = L L^T.
     whitened_trace : (n_traction_dofs, n_dofs) array
-        L^-1 B with B = 1/2 M + K, less what belongs to tractions that exert a resultant.
+        L^-1 B with B = 1/2 M + K, projected on tractions without a resultant.
     hypersingular : (n_dofs, n_dofs) array
         W.
     work : OperationCounts
-        What they took.
     """
 
     single_layer: Cholesky
@@ -54,12 +53,13 @@ def assemble_layers(
     displacements, tractions : BoundarySpace
     material : Material
     pressures : (n_traction_dofs, n_pressures) array
-        Uniform pressures as traction dofs hold them; V is not inverted on those of an incompressible body.
+        Traction dofs of uniform pressures; V is not inverted on those of an incompressible body.
 
     Returns
     -------
     Layers
-        On tractions t with <V n, t> = 0, n the normals of a compressible body: those of its dilatation are n.
+        Operators on tractions t with <V n, t> = 0, for a compressible body with normals n; n are the tractions of its
+        dilatation.
     """
     u, t, mesh = displacements, tractions, displacements.mesh
     single = SingleLayerForm(t, t, material)
@@ -74,42 +74,42 @@ def assemble_layers(
     annihilated = np.zeros((t.n_dofs, 0)) if is_compressible else mass_matrix(t, t) @ pressures
     kernel = np.column_stack([annihilated, _unit_vectors(antisymmetric_dofs(t))])
     factor = Cholesky(_without_kernel(v, kernel), "the single layer operator", overwrite=True)
-    del v  # matrices are dropped as soon as they are used: there is room for few of them at once
+    del v  # free each matrix after its last use: memory holds few of them
     motions = traction_free_modes(mesh, dof_points(u))
     mass = mass_matrix(u, t).tocoo()
     resultants = mass @ motions
     k[mass.row, mass.col] += 0.5 * mass.data
-    # polynomials do not hold a rotation of curved elements exactly: its interpolant is made a rigid motion
+    # polynomials do not represent a rotation of curved elements exactly: treat its interpolant as a rigid motion
     at_rest, _ = np.linalg.qr(motions[:, : 0 if mesh.is_straight.all() else 3])
     trace = _without(k, at_rest)
     del k
     hyper = _without(_without(w, at_rest).T, at_rest).T
     dilatation = dilatation_of(u)[:, None][:, : int(is_compressible)]
-    idle = np.column_stack([resultants, annihilated, trace @ dilatation])
-    # L^-T times the complement of this are the tractions that exert no resultant
-    resultant, _ = np.linalg.qr(factor.solve_lower(idle))
+    excluded = np.column_stack([resultants, annihilated, trace @ dilatation])
+    # L^-T maps the orthogonal complement of this basis to the tractions without a resultant
+    basis, _ = np.linalg.qr(factor.solve_lower(excluded))
     whitened = factor.solve_lower(trace, overwrite=True)
-    if resultant.shape[1]:
-        subtract_product(whitened.T, multiply(whitened.T, resultant), resultant)
-    n_solved = idle.shape[1] + whitened.shape[1]
+    if basis.shape[1]:
+        subtract_product(whitened.T, multiply(whitened.T, basis), basis)
+    n_solved = excluded.shape[1] + whitened.shape[1]
     work += OperationCounts(factorisations=(factor.factorisation,), right_hand_sides=n_solved)
     return Layers(factor, whitened, hyper, work)
 
 
 def dilatation_of(space: BoundarySpace) -> FloatArray:
-    """Return the dofs (n_dofs,) of the displacement by which every point moves away from the middle of the body."""
+    """Return the dofs (n_dofs,) of the dilatation x - centre of the body."""
     return np.where(antisymmetric_dofs(space), 0.0, (dof_points(space) - space.mesh.centre).ravel())
 
 
 def _without(matrix: FloatArray, motions: FloatArray) -> FloatArray:
-    """Return the matrix made to vanish on some orthonormal motions (n_dofs, n_motions)."""
+    """Return the matrix projected so that it vanishes on some orthonormal motions (n_dofs, n_motions)."""
     if not motions.shape[1]:
         return matrix
     return matrix - multiply(multiply(matrix, motions), np.ascontiguousarray(motions.T))
 
 
 def _unit_vectors(chosen: BoolArray) -> FloatArray:
-    """Return the unit vectors (n, n_chosen) of some dofs."""
+    """Return the unit vectors (n, n_chosen) of the chosen dofs."""
     rows = np.flatnonzero(chosen)
     vectors = np.zeros((chosen.size, rows.size))
     vectors[rows, np.arange(rows.size)] = 1.0
@@ -117,7 +117,7 @@ def _unit_vectors(chosen: BoolArray) -> FloatArray:
 
 
 def _without_kernel(matrix: FloatArray, directions: FloatArray) -> FloatArray:
-    """Add a mean eigenvalue along directions that the matrix may annihilate; they are projected out later."""
+    """Add the mean eigenvalue along directions that the matrix may annihilate; they are projected out later."""
     if not directions.shape[1]:
         return matrix
     unit, _ = np.linalg.qr(directions)

@@ -1,4 +1,4 @@
-"""Conditions at the displacement nodes of a body: fixed, free or retained directions, forces and displacements."""
+"""Conditions at the displacement nodes of a body: fixed, free and retained directions, forces and displacements."""
 
 from __future__ import annotations
 
@@ -16,21 +16,21 @@ from bemkit.geometry.vectors import norms, turned_right
 from bemkit.operators.rigid_modes import admissible_modes, rigid_motions
 
 SMOOTH_SIDE_RATIO = 0.07
-"""Two directions of one support that differ by less than 30 degrees are one smooth side: the eigenvalues of
-their sum then differ by the factor tan(15 deg)^2."""
+"""Two directions of one support that differ by less than 30 degrees count as one: the eigenvalues of the sum of their
+projectors then have a ratio below tan(15 deg)^2."""
 CONFLICT_TOLERANCE = 1e-9
-"""Relative difference of two prescribed displacements at one node that round-off may explain."""
+"""Largest relative difference of two prescribed displacements at one node; round-off causes no larger one."""
 FREE_MOTION_TOLERANCE = 1e-6
-"""A rigid motion that moves the supports by less than this, relative to its size, is free of them. At 1e7 diameters
-from the origin numbers hold the normals along a straight side to about 1e-7; and a support that resists a motion only
-with a million times the load holds nothing."""
+"""A rigid motion is free if its relative displacements at the supports are below this. At 1e7 diameters from the origin
+the normals of a straight side have round-off of 1e-7. A support whose reaction is a million times the load holds
+nothing."""
 _LEAST_TURN = 1e-9
-"""Difference of a rigid motion between nodes, by its size, that is not round-off."""
+"""Smallest relative variation of a rigid motion that is a rotation; less is round-off."""
 _FACTOR_TOLERANCE = 4.0 * np.finfo(float).eps
-"""Relative difference of two loads that the product with a load factor may leave."""
+"""Round-off of the product of a load and a load factor."""
 
 TractionField = Callable[[FloatArray, FloatArray], FloatArray]
-"""Tractions on the boundary: (n, 2) points [m] and (n, 2) outward unit normals there -> (n, 2) values [Pa]."""
+"""Tractions on the boundary: (n, 2) points [m] and (n, 2) outward unit normals -> (n, 2) values [Pa]."""
 
 
 class ConflictingSupportsError(InputError):
@@ -48,7 +48,7 @@ class ConflictingSupportsError(InputError):
         x, y = point
         super().__init__(
             f"part {part!r} and a neighbour prescribe different displacements at their common point "
-            f"({x:.6g}, {y:.6g}): make them agree there, or leave a free element between them"
+            f"({x:.6g}, {y:.6g}): give the same displacement there, or leave a free element between the parts"
         )
 
     def __reduce__(self) -> tuple[type[ConflictingSupportsError], tuple[str, tuple[float, float]]]:
@@ -64,13 +64,13 @@ class Support:
     name : str
         The boundary part, for messages.
     elements : (m,) array
-        Element numbers.
+        Indices of elements.
     directions : (m, k, 2) or (m, n_local, k, 2) array
         k = 1 or 2 unit directions on each element (both axes of a clamp), or at each node of each element (the normal
-        of a roller, which turns along curved elements).
+        of a roller, which varies along curved elements).
     displacement : callable, optional
-        (n, 2) points [m] -> (n, 2) displacement [m]; its components along the directions are prescribed. By default
-        zero.
+        (n, 2) points [m] -> (n, 2) displacement [m], zero by default. Its components along the directions are
+        prescribed.
     """
 
     name: str
@@ -81,7 +81,7 @@ class Support:
 
 @dataclass(frozen=True, eq=False)
 class NodalConditions:
-    """The conditions at every displacement node, in a local frame.
+    """The conditions at all displacement nodes, in local frames.
 
     Parameters
     ----------
@@ -92,51 +92,50 @@ class NodalConditions:
     displacement : (n_nodes, 2) array [m]
         The prescribed values, zero elsewhere.
     is_retained : (n_nodes, 2) bool array
-        Directions that are kept as unknowns (contact); everything else is free: its force is known.
-    driven : tuple of int
-        Rigid motions (0 along x, 1 along y, 2 the turn) that a body at rest far away makes nevertheless, because forces
-        drive it there; none unless it is a half-plane.
+        Directions that are kept as unknowns (contact). All other directions are free: their force is given.
+    load_controlled : tuple of int
+        Load-controlled far motions of a half-plane: 0 along x, 1 along y, 2 the rotation.
     later : tuple of GivenData
-        What load steps after this one give.
+        Data of later load steps.
     connected : tuple of int arrays
-        Nodes of each rigid connection: all fixed, but to a rigid body whose three motions are unknown, and on which the
-        given forces at these nodes act; see `RigidlyConnected`.
+        Nodes of each rigid connection. They are fixed to a rigid body with three unknown motions, on which the given
+        forces at these nodes act; see `RigidlyConnected`.
     """
 
     frame: FloatArray
     is_fixed: BoolArray
     displacement: FloatArray
     is_retained: BoolArray
-    driven: tuple[int, ...] = ()
+    load_controlled: tuple[int, ...] = ()
     later: tuple[GivenData, ...] = ()
     connected: tuple[IntArray, ...] = ()
 
     @property
     def is_supported(self) -> BoolArray:
-        """Directions that supports hold, (n_nodes, 2): those that are fixed but for connections."""
-        supported = self.is_fixed.copy()
+        """Directions that supports hold, (n_nodes, 2): fixed directions without those of rigid connections."""
+        is_supported = self.is_fixed.copy()
         for nodes in self.connected:
-            supported[nodes] = False
-        return supported
+            is_supported[nodes] = False
+        return is_supported
 
     @property
     def is_free(self) -> BoolArray:
-        """Directions whose force is known, (n_nodes, 2)."""
-        free: BoolArray = ~(self.is_fixed | self.is_retained)
-        return free
+        """Directions with a given force, (n_nodes, 2)."""
+        is_free: BoolArray = ~(self.is_fixed | self.is_retained)
+        return is_free
 
     def in_frames(self, vectors: FloatArray) -> FloatArray:
-        """Return vectors (n_nodes, 2) in x and y by their components along the directions of the nodes."""
+        """Return the components of vectors (n_nodes, 2) along the directions of the nodes."""
         return np.asarray(np.einsum("nkc,nc->nk", self.frame, vectors))
 
     def in_plane(self, components: FloatArray) -> FloatArray:
-        """Return vectors in x and y, (n_nodes, 2) or flat, from their components along the directions of the nodes."""
+        """Return vectors (n_nodes, 2) in x and y from components along the directions of the nodes, flat or not."""
         return np.asarray(np.einsum("nkc,nk->nc", self.frame, components.reshape(-1, 2)))
 
 
 @dataclass(frozen=True, eq=False)
 class GivenData:
-    """Forces on free directions and displacements of fixed ones, in the frames of the nodes.
+    """Forces on free directions and displacements of fixed directions, in the frames of the nodes.
 
     Parameters
     ----------
@@ -166,13 +165,13 @@ class GivenData:
         return int(np.count_nonzero(self.displacement))
 
     def factor_of(self, base: GivenData) -> float | None:
-        """Return the factor by which these data are a multiple of others, None if they are none."""
-        own, other = (np.concatenate([data.force.ravel(), data.displacement.ravel()]) for data in (self, base))
-        if not own.any():
+        """Return the factor if these data are a multiple of others, else None."""
+        values, others = (np.concatenate([data.force.ravel(), data.displacement.ravel()]) for data in (self, base))
+        if not values.any():
             return 0.0
-        k = int(np.argmax(np.abs(other)))
-        factor = float(own[k] / other[k]) if other[k] else 0.0
-        return factor if np.all(np.abs(own - factor * other) <= _FACTOR_TOLERANCE * np.abs(own)) else None
+        k = int(np.argmax(np.abs(others)))
+        factor = float(values[k] / others[k]) if others[k] else 0.0
+        return factor if np.all(np.abs(values - factor * others) <= _FACTOR_TOLERANCE * np.abs(values)) else None
 
 
 def supporting_forces(conditions: NodalConditions, given: FloatArray, total: FloatArray) -> FloatArray:
@@ -182,8 +181,8 @@ def supporting_forces(conditions: NodalConditions, given: FloatArray, total: Flo
     ----------
     conditions : NodalConditions
     given, total : (n_nodes, 2) arrays [N/m]
-        The given forces, and all that act on the boundary of the body but those of contact: a support may hold a node
-        obliquely to what it touches.
+        The given forces, and all forces on the boundary except those of contact: a support may hold a node in a
+        direction oblique to the obstacle.
     """
     acting = np.where(conditions.is_fixed, conditions.in_frames(total), conditions.in_frames(given))
     return conditions.in_plane(acting).ravel()
@@ -195,28 +194,28 @@ def integrate_traction(space: BoundarySpace, elements: IntArray, field: Traction
     Parameters
     ----------
     space : BoundarySpace
-        Its scalar basis functions are what the tractions are integrated against.
+        Space of the test functions.
     elements : (m,) int array
     field : callable
         See `TractionField`.
     """
-    points, weights = gauss_legendre(space.degree + 5)  # exact for tractions up to the ninth power of the coordinates
-    places = space.mesh.points(elements, points)
-    outward = turned_right(space.mesh.derivatives(elements, points))
-    sizes = norms(outward)
-    normals = outward / sizes[..., None]
-    values = field(places.reshape(-1, 2), normals.reshape(-1, 2)).reshape(places.shape)
-    measure = sizes * weights
-    local = np.einsum("eq,pq,eqc->epc", measure, space.basis(points), values)
+    xi, weights = gauss_legendre(space.degree + 5)  # exact for tractions of degree nine in the coordinates
+    points = space.mesh.points(elements, xi)
+    outward = turned_right(space.mesh.derivatives(elements, xi))
+    jacobian = norms(outward)
+    normals = outward / jacobian[..., None]
+    values = field(points.reshape(-1, 2), normals.reshape(-1, 2)).reshape(points.shape)
+    measure = jacobian * weights
+    local = np.einsum("eq,pq,eqc->epc", measure, space.basis(xi), values)
     return summed_at_dofs(space, local, elements)
 
 
 def turn_columns(matrix: FloatArray, frame: FloatArray) -> None:
-    """Overwrite the columns (2 * node + component) of a matrix by those in the frames (n_nodes, 2, 2) of the nodes."""
+    """Express the columns 2 * node + component of a matrix in the frames (n_nodes, 2, 2) of the nodes, in place."""
     columns = matrix.reshape(len(matrix), len(frame), 2)  # a view in any memory order
     for _, nodes in consecutive_runs(np.flatnonzero(np.any(frame != np.eye(2), axis=(1, 2)))):
-        own, x, y = frame[nodes], columns[:, nodes, 0], columns[:, nodes, 1]
-        columns[:, nodes, 0], columns[:, nodes, 1] = [own[:, k, 0] * x + own[:, k, 1] * y for k in (0, 1)]
+        axes, x, y = frame[nodes], columns[:, nodes, 0], columns[:, nodes, 1]
+        columns[:, nodes, 0], columns[:, nodes, 1] = [axes[:, k, 0] * x + axes[:, k, 1] * y for k in (0, 1)]
 
 
 def rotated(matrix: FloatArray, frame: FloatArray) -> FloatArray:
@@ -230,7 +229,7 @@ def rotated(matrix: FloatArray, frame: FloatArray) -> FloatArray:
 
 
 def supported(space: BoundarySpace, supports: Sequence[Support]) -> NodalConditions:
-    """Collect the supports at the nodes of a space; every other direction is free.
+    """Return the conditions of supports at the nodes of a space; all other directions are free.
 
     Parameters
     ----------
@@ -241,29 +240,31 @@ def supported(space: BoundarySpace, supports: Sequence[Support]) -> NodalConditi
     Returns
     -------
     NodalConditions
-        Frames are the coordinate axes wherever the supports allow it.
+        Frames are the coordinate axes except at nodes held in one oblique direction.
 
     Raises
     ------
     ConflictingSupportsError
-        If parts prescribe different displacements at a node they share.
+        If parts prescribe different displacements at a common node.
     """
     n_nodes = space.n_dofs // 2
     points = dof_points(space)
     supports = [*supports, *_mirrors(space)]
-    directions = [_directions_of(space, support) for support in supports]
-    given = [_given_at(points, support, own) for support, own in zip(supports, directions, strict=True)]
+    projectors = [_projector_of(space, support) for support in supports]
+    prescribed = [_prescribed_at(points, each, projector) for each, projector in zip(supports, projectors, strict=True)]
+    # least squares for the displacement of each node: sum of P u = sum of P u_prescribed
     matrix, right = np.zeros((n_nodes, 2, 2)), np.zeros((n_nodes, 2))
-    for own, values in zip(directions, given, strict=True):
-        matrix += own
-        right += np.einsum("nij,nj->ni", own, values)
-    size, vectors = np.linalg.eigh(matrix)
-    rank = (size > 1e-9).sum(axis=1)
-    inverse = np.where(size > 1e-9, 1.0 / np.where(size > 1e-9, size, 1.0), 0.0)
+    for projector, values in zip(projectors, prescribed, strict=True):
+        matrix += projector
+        right += np.einsum("nij,nj->ni", projector, values)
+    eigenvalues, vectors = np.linalg.eigh(matrix)
+    rank = (eigenvalues > 1e-9).sum(axis=1)
+    inverse = np.where(eigenvalues > 1e-9, 1.0 / np.where(eigenvalues > 1e-9, eigenvalues, 1.0), 0.0)
     displacement = np.einsum("nij,nj,nkj,nk->ni", vectors, inverse, vectors, right)
-    for support, own, values in zip(supports, directions, given, strict=True):
-        _check_agreement(support, own, values, points, displacement)
+    for support, projector, values in zip(supports, projectors, prescribed, strict=True):
+        _check_agreement(support, projector, values, points, displacement)
 
+    # frames: the axis nearer to the one held direction becomes that direction
     direction = vectors[:, :, 1]
     is_x = np.abs(direction[:, 0]) >= np.abs(direction[:, 1])
     direction = direction * np.sign(np.where(is_x, direction[:, 0], direction[:, 1]))[:, None]
@@ -276,44 +277,44 @@ def supported(space: BoundarySpace, supports: Sequence[Support]) -> NodalConditi
 
 
 def _mirrors(space: BoundarySpace) -> list[Support]:
-    """Return the supports of symmetry lines: no displacement across them."""
+    """Return the supports of symmetry lines, which exclude displacements across them."""
     if space.mesh.symmetry is None:
         return []
     from bemkit.geometry.reflection import antisymmetric_dofs
 
-    held = antisymmetric_dofs(space).reshape(-1, 2)[space.element_dofs]
-    elements = np.flatnonzero(held.any(axis=(1, 2)))
+    is_held = antisymmetric_dofs(space).reshape(-1, 2)[space.element_dofs]
+    elements = np.flatnonzero(is_held.any(axis=(1, 2)))
     if not elements.size:
         return []
-    return [Support("symmetry line", elements, np.where(held[elements], 1.0, 0.0)[..., None] * np.eye(2))]
+    return [Support("symmetry line", elements, np.where(is_held[elements], 1.0, 0.0)[..., None] * np.eye(2))]
 
 
-def _given_at(points: FloatArray, support: Support, directions: FloatArray) -> FloatArray:
+def _prescribed_at(points: FloatArray, support: Support, projector: FloatArray) -> FloatArray:
     """Return the displacement (n_nodes, 2) of one support, zero at nodes that it does not fix."""
-    values, is_fixed = np.zeros_like(points), directions.any(axis=(1, 2))
+    values, is_fixed = np.zeros_like(points), projector.any(axis=(1, 2))
     if support.displacement is not None and is_fixed.any():
         values[is_fixed] = support.displacement(points[is_fixed])
     return values
 
 
-def _directions_of(space: BoundarySpace, support: Support) -> FloatArray:
-    """Return the projector (n_nodes, 2, 2) on the directions that one support fixes at each node."""
+def _projector_of(space: BoundarySpace, support: Support) -> FloatArray:
+    """Return the projectors (n_nodes, 2, 2) on the directions that one support fixes at each node."""
     outer = np.einsum("...ki,...kj->...ij", support.directions, support.directions)
     matrix = np.zeros((space.n_dofs // 2, 2, 2))
     np.add.at(matrix, space.element_dofs[support.elements], outer if outer.ndim == 4 else outer[:, None])
-    size, vectors = np.linalg.eigh(matrix)
-    keep = np.where(size > SMOOTH_SIDE_RATIO * size[:, 1:], 1.0, 0.0)
-    projector: FloatArray = np.einsum("nij,nj,nkj->nik", vectors, keep, vectors)
+    eigenvalues, vectors = np.linalg.eigh(matrix)
+    is_fixed = np.where(eigenvalues > SMOOTH_SIDE_RATIO * eigenvalues[:, 1:], 1.0, 0.0)
+    projector: FloatArray = np.einsum("nij,nj,nkj->nik", vectors, is_fixed, vectors)
     return projector
 
 
 def _check_agreement(
-    support: Support, directions: FloatArray, values: FloatArray, points: FloatArray, displacement: FloatArray
+    support: Support, projector: FloatArray, values: FloatArray, points: FloatArray, displacement: FloatArray
 ) -> None:
-    """Refuse displacements (n_nodes, 2) that are not the values of a support along its directions."""
-    miss = np.abs(np.einsum("nij,nj->ni", directions, values - displacement)).max(axis=1)
-    worst = int(np.argmax(miss))
-    if miss[worst] > CONFLICT_TOLERANCE * max(float(np.abs(values).max()), float(np.abs(displacement).max())):
+    """Refuse displacements (n_nodes, 2) that differ from those of a support along its directions."""
+    difference = np.abs(np.einsum("nij,nj->ni", projector, values - displacement)).max(axis=1)
+    worst = int(np.argmax(difference))
+    if difference[worst] > CONFLICT_TOLERANCE * max(float(np.abs(values).max()), float(np.abs(displacement).max())):
         x, y = points[worst].tolist()
         raise ConflictingSupportsError(support.name, (x, y))
 
@@ -329,20 +330,20 @@ def free_modes(space: BoundarySpace, conditions: NodalConditions) -> FloatArray:
     Returns
     -------
     (n_motions, n_nodes, 2) array
-        Linearly independent, of sizes about one; combinations of the `admissible_modes` and of those driven.
+        Linearly independent, of sizes about one; combinations of the `admissible_modes` and load-controlled motions.
     """
     points = dof_points(space)
     centre = 0.5 * (points.min(axis=0) + points.max(axis=0))
     motions = rigid_motions(points, centre, float(np.ptp(points, axis=0).max()))
-    motions = motions[:, :, [*admissible_modes(space.mesh), *conditions.driven]]
+    motions = motions[:, :, [*admissible_modes(space.mesh), *conditions.load_controlled]]
     fixed = np.einsum("nkc,ncm->nkm", conditions.frame, motions)[conditions.is_supported]
     if fixed.size:
-        _, sizes, directions = np.linalg.svd(np.linalg.qr(fixed, mode="r"), full_matrices=True)
-        n_held = int(np.count_nonzero(sizes >= FREE_MOTION_TOLERANCE * np.sqrt(len(fixed))))
+        _, singular_values, directions = np.linalg.svd(np.linalg.qr(fixed, mode="r"), full_matrices=True)
+        n_held = int(np.count_nonzero(singular_values >= FREE_MOTION_TOLERANCE * np.sqrt(len(fixed))))
         motions = motions @ directions[n_held:].T
     return motions.transpose(2, 0, 1)
 
 
 def turning(motions: FloatArray) -> BoolArray:
-    """Return which rigid motions (n_motions, n_nodes, 2) of unit size turn the body."""
+    """Return which rigid motions (n_motions, n_nodes, 2) of unit size rotate the body."""
     return np.asarray(np.ptp(motions, axis=1).max(axis=1, initial=0.0) > _LEAST_TURN)

@@ -18,8 +18,8 @@ class SteklovPoincareOperator(BoundaryOperator):
     Parameters
     ----------
     elastic : GalerkinElasticity or CollocationElasticity
-        Its stiffness is the matrix; rigid motions of a bounded body are the kernel. S holds an inverse, so that a
-        block needs all of it.
+        Map whose stiffness is the matrix. Rigid motions of a bounded body are its kernel. S contains an inverse, so
+        that each block requires the whole matrix.
     """
 
     def __init__(self, elastic: GalerkinElasticity | CollocationElasticity) -> None:

@@ -1,4 +1,4 @@
-"""Parts of a boundary that move as rigid bodies under given resultants, eliminated from a condensed map."""
+"""Rigid connections: boundary parts that move as rigid bodies under given resultants."""
 
 from __future__ import annotations
 
@@ -25,25 +25,25 @@ if TYPE_CHECKING:
 class RigidlyConnected(BoundaryMap):
     """An elastic map with rigid connections; fulfils `SteklovPoincare`.
 
-    The nodes of each connection are fixed for the map inside. Their three motions q are unknown, and the resultants of
-    the forces that the connection exerts are those of the given nodal forces there, however these are distributed.
+    The wrapped map takes the nodes of each connection as fixed. The three rigid motions q of a connection are unknown.
+    The forces of the connection have the resultants of the given nodal forces, however these are distributed.
 
     Parameters
     ----------
     elastic : SteklovPoincare
-        A symmetric map.
+        The wrapped map; symmetric.
     """
 
     elastic: SteklovPoincare
 
     @classmethod
     def of(cls, elastic: SteklovPoincare, method: str) -> RigidlyConnected:
-        """Return a map with rigid connections; `method` names its discretisation.
+        """Return a map with rigid connections; `method` names its discretisation in messages.
 
         Raises
         ------
         InputError
-            If it is not symmetric.
+            If the map is not symmetric.
         """
         if Tag.SYMMETRIC not in elastic.tags:
             raise InputError(
@@ -54,14 +54,14 @@ class RigidlyConnected(BoundaryMap):
 
     @property
     def tags(self) -> frozenset[Tag]:
-        """Promises of the map inside."""
+        """Tags of the wrapped map."""
         return self.elastic.tags
 
     def cost(self, case: BodyCase) -> BodyCost:
-        """Return what the map inside takes, and the responses to the motions of connections."""
-        needs = self.elastic.cost(case)
+        """Return the cost of the wrapped map and of the responses to motions of connections."""
+        cost = self.elastic.cost(case)
         responses = OperationCounts(right_hand_sides=3 * len(case.conditions.connected))
-        return replace(needs, work=needs.work + responses)
+        return replace(cost, work=cost.work + responses)
 
     @property
     def material(self) -> Material:
@@ -91,53 +91,53 @@ class RigidlyConnected(BoundaryMap):
 
 @dataclass(frozen=True, eq=False)
 class _Connections:
-    """The rigid connections of a condensed body, with the response to their k motions.
+    """Responses of a condensed body to the k rigid motions of its connections.
 
     Parameters
     ----------
     motions : (n_nodes, 2, k) array
-        Displacements of the nodes in x and y by unit motions; zero on other nodes.
+        Displacements of connected nodes in x and y under unit motions; zero at other nodes.
     displacement, force : (n_nodes, 2, k) arrays
-        Of all nodes under unit motions, with retained directions at rest.
-    moved : tuple of k CondensedMap
-        The body under each unit motion and nothing else.
+        Fields of all nodes under unit motions, with retained directions at rest.
+    unit_maps : tuple of k CondensedMap
+        The body under each unit motion without other loads.
     coupling : (n_retained, k) array
-        What unit motions press onto the retained directions.
+        L: forces of unit motions on the retained directions.
     influence : (k, k) array
-        Resultants of the connections under unit motions.
+        A: resultants of the connections under unit motions.
     stiffness : (n_retained, n_retained) array
-        With the motions eliminated: K - L A^-1 L^T for the coupling L and the influence A.
+        K - L A^-1 L^T, the stiffness with the motions eliminated.
     """
 
     motions: FloatArray
     displacement: FloatArray
     force: FloatArray
-    moved: tuple[CondensedMap, ...]
+    unit_maps: tuple[CondensedMap, ...]
     coupling: FloatArray
     influence: FloatArray
     stiffness: FloatArray
 
     @classmethod
     def of(cls, fixed: CondensedMap, conditions: NodalConditions, points: FloatArray) -> _Connections:
-        """Return the connections of a body whose nodes in them are fixed."""
+        """Return the connections of a body whose connected nodes are fixed."""
         motions = np.concatenate([_motions(nodes, points) for nodes in conditions.connected], axis=2)
-        nothing, rest = np.zeros_like(points), np.zeros(len(fixed.load))
-        moved = tuple(fixed.under(nothing, conditions.in_frames(motion)) for motion in np.moveaxis(motions, 2, 0))
-        fields = [each.recover(rest) for each in moved]
+        no_force, at_rest = np.zeros_like(points), np.zeros(len(fixed.load))
+        unit_maps = tuple(fixed.under(no_force, conditions.in_frames(motion)) for motion in np.moveaxis(motions, 2, 0))
+        fields = [unit_map.recover(at_rest) for unit_map in unit_maps]
         displacement, force = (np.stack([pair[k] for pair in fields], axis=2) for k in (0, 1))
-        coupling = np.stack([each.load for each in moved], axis=1)
+        coupling = np.stack([unit_map.load for unit_map in unit_maps], axis=1)
         influence = np.einsum("ncj,nck->jk", motions, force)
         influence = 0.5 * (influence + influence.T)
         stiffness = fixed.stiffness - coupling @ np.linalg.solve(influence, coupling.T)
-        return cls(motions, displacement, force, moved, coupling, influence, 0.5 * (stiffness + stiffness.T))
+        return cls(motions, displacement, force, unit_maps, coupling, influence, 0.5 * (stiffness + stiffness.T))
 
     @property
     def work(self) -> OperationCounts:
-        """Operation counts of the responses."""
-        return sum((each.work for each in self.moved), OperationCounts())
+        """Return the operation counts of the responses."""
+        return sum((unit_map.work for unit_map in self.unit_maps), OperationCounts())
 
     def under(self, fixed: CondensedMap, force: FloatArray, work: OperationCounts) -> CondensedMap:
-        """Return the body under the load of a map with fixed connections and given nodal forces (n_nodes, 2)."""
+        """Return the body under given nodal forces (n_nodes, 2), from the same body with fixed connections."""
         _, reaction = fixed.recover(np.zeros(len(fixed.load)))
         at_rest = np.linalg.solve(self.influence, np.einsum("nck,nc->k", self.motions, force - reaction))
         return _ConnectedMap(
@@ -160,10 +160,10 @@ class _ConnectedMap(CondensedMap):
     Parameters
     ----------
     fixed : CondensedMap
-        With the connections fixed.
+        The body with fixed connections.
     connections : _Connections
     at_rest : (k,) array
-        Motions with the retained directions at rest.
+        Motions of the connections while the retained directions are at rest.
     """
 
     fixed: CondensedMap
@@ -183,15 +183,15 @@ class _ConnectedMap(CondensedMap):
         return self.connections.under(fixed, force, fixed.work)
 
     def follow(self, directions: IntArray) -> tuple[FloatArray, FloatArray]:
-        """Return what free directions do."""
+        """Return response and displacement at rest of free directions."""
         connections, (response, at_rest) = self.connections, self.fixed.follow(directions)
-        by_motions = np.stack([each.follow(directions)[1] for each in connections.moved], axis=1)
+        by_motions = np.stack([unit_map.follow(directions)[1] for unit_map in connections.unit_maps], axis=1)
         by_retained = np.linalg.solve(connections.influence, connections.coupling.T)
         return response + by_motions @ by_retained, at_rest + by_motions @ self.at_rest
 
 
 def _motions(nodes: IntArray, points: FloatArray) -> FloatArray:
-    """Return the displacements (n_nodes, 2, 3) of some nodes by their rigid motions; zero elsewhere."""
-    own, motions = points[nodes], np.zeros((*points.shape, 3))
-    motions[nodes] = rigid_motions(own, own.mean(axis=0), float(np.ptp(own, axis=0).max()))
+    """Return the displacements (n_nodes, 2, 3) of some nodes under three rigid motions; zero elsewhere."""
+    connected, motions = points[nodes], np.zeros((*points.shape, 3))
+    motions[nodes] = rigid_motions(connected, connected.mean(axis=0), float(np.ptp(connected, axis=0).max()))
     return motions

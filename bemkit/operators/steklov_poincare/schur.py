@@ -1,4 +1,4 @@
-"""Condensation of a Galerkin map whose matrix has been formed: a Schur complement."""
+"""Condensation of a Galerkin map by a Schur complement of its matrix."""
 
 from __future__ import annotations
 
@@ -20,23 +20,23 @@ _ROWS = 128
 
 @dataclass(eq=False)
 class SchurCondensation:
-    """A body reduced to its retained directions by eliminating the free ones from S.
+    """A body reduced to its retained directions; the free ones are eliminated from S.
 
     Parameters
     ----------
     matrix : (n_dofs, n_dofs) array
         S in x and y, without the uniform pressure.
     volume : Volume
-        In x and y.
+        Change of volume per displacement in x and y.
     conditions : NodalConditions
     solver : LinearSolver
     name : str
-        What is singular if the free block is.
+        Name of the free block in error messages.
 
     Raises
     ------
     SingularMatrixError
-        If the supports, and the retained directions held fast, leave the body free.
+        If the body can move while its supports and its retained directions are held.
     """
 
     matrix: FloatArray
@@ -56,17 +56,17 @@ class SchurCondensation:
         self._coupling = block_of(matrix, self._free, self._retained)
         self._of_fixed = matrix[:, self._fixed]
         self._volume = volume = self.volume.in_frames(conditions.frame).change
-        self._held = VolumeConstraint(self.factor, without_round_off(volume)[self._free], self.volume.compliance)
-        self._response, self._pressures = self._held.solve(-self._coupling, -volume[self._retained].T)
+        self._constrained = VolumeConstraint(self.factor, without_round_off(volume)[self._free], self.volume.compliance)
+        self._response, self._pressures = self._constrained.solve(-self._coupling, -volume[self._retained].T)
         stiffness = block_of(matrix, self._retained, self._retained) + multiply(self._coupling.T, self._response)
         stiffness += volume[self._retained] @ self._pressures
         self._stiffness = 0.5 * (stiffness + stiffness.T)
         rows = (self.matrix[first : first + _ROWS] for first in range(0, len(self.matrix), _ROWS))
-        self._sensitivity = sum(np.abs(each).sum(axis=0) for each in rows).reshape(-1, 2)
+        self._sensitivity = sum(np.abs(chunk).sum(axis=0) for chunk in rows).reshape(-1, 2)
 
     @property
     def work(self) -> OperationCounts:
-        """Operation counts of the elimination."""
+        """Return the operation counts of the elimination."""
         n_columns = self._retained.size + self._volume.shape[1]
         return OperationCounts(factorisations=self.factor.factorisations, right_hand_sides=n_columns)
 
@@ -74,7 +74,7 @@ class SchurCondensation:
         """Return the condensed map under given forces (n_nodes, 2), and displacements (n_nodes, 2) in the frames."""
         prescribed = displacement.ravel()[self._fixed]
         known = self.conditions.in_frames(force).ravel() - self._of_fixed @ prescribed
-        at_rest, pressure = self._held.solve(known[self._free], -self._volume[self._fixed].T @ prescribed)
+        at_rest, pressure = self._constrained.solve(known[self._free], -self._volume[self._fixed].T @ prescribed)
         load = known[self._retained] - self._coupling.T @ at_rest - self._volume[self._retained] @ pressure
         return _SchurMap(
             stiffness=self._stiffness,
@@ -88,7 +88,7 @@ class SchurCondensation:
         )
 
     def recovered(self, loaded: _SchurMap, retained: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return displacement and force of all nodes of a map under retained displacements (n_retained,)."""
+        """Return displacement and force of all nodes under retained displacements (n_retained,)."""
         local = np.empty(len(self.matrix))
         local[self._fixed], local[self._retained] = loaded.prescribed, retained
         local[self._free] = loaded.at_rest + self._response @ retained
@@ -98,7 +98,7 @@ class SchurCondensation:
         return displacement, force.reshape(-1, 2)
 
     def followed(self, loaded: _SchurMap, directions: IntArray) -> tuple[FloatArray, FloatArray]:
-        """Return what free directions of a map do; see `CondensedMap.follow`."""
+        """Return response and displacement at rest of free directions; see `CondensedMap.follow`."""
         rows = np.searchsorted(self._free, directions)
         return self._response[rows], loaded.at_rest[rows]
 
@@ -111,9 +111,9 @@ class _SchurMap(CondensedMap):
     ----------
     condensation : SchurCondensation
     prescribed, at_rest : (n_fixed,), (n_free,) arrays [m]
-        Displacements of fixed directions, and of free ones with the retained ones at rest.
+        Displacements of fixed directions, and of free directions while the retained ones are at rest.
     pressure : (n_pressures,) array
-        As `VolumeConstraint.solve` gives it.
+        Pressure from `VolumeConstraint.solve`.
     """
 
     condensation: SchurCondensation
@@ -130,5 +130,5 @@ class _SchurMap(CondensedMap):
         return self.condensation.under(force, displacement)
 
     def follow(self, directions: IntArray) -> tuple[FloatArray, FloatArray]:
-        """Return what free directions do."""
+        """Return response and displacement at rest of free directions."""
         return self.condensation.followed(self, directions)

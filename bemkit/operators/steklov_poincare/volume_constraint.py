@@ -1,4 +1,4 @@
-"""Solutions for the free displacements of a body under the uniform pressure that goes with its change of volume."""
+"""Free displacements of a body together with the uniform pressure that belongs to its change of volume."""
 
 from __future__ import annotations
 
@@ -15,22 +15,23 @@ from bemkit.operators.steklov_poincare.nodal_conditions import turn_columns
 
 @dataclass(frozen=True, eq=False)
 class Volume:
-    """How the volume of a body changes; the pressure is one more unknown: ``change.T @ u == compliance * pressure``.
+    """Change of volume of a body, with the uniform pressure as unknown: ``change.T @ u == compliance * pressure``.
 
     Parameters
     ----------
     change : (n_dofs, 0 or 1) array
-        By displacements; the pressure exerts the forces ``change * pressure``. No column for an exterior.
+        Change of volume per displacement; the pressure exerts the forces ``change * pressure``. An exterior has no
+        column.
     compliance : float
-        By a unit pressure; zero if the body is incompressible. Dividing by it instead would cost the digits of nearly
-        incompressible bodies.
+        Change of volume per pressure, zero for an incompressible body. Without the pressure as unknown, a division by
+        it would cost digits in nearly incompressible bodies.
     """
 
     change: FloatArray
     compliance: float
 
     def in_frames(self, frame: FloatArray) -> Volume:
-        """Return the same for displacements in the frames of the nodes."""
+        """Return the change of volume per displacement in the frames of the nodes."""
         change = self.change.copy()
         turn_columns(change.T, frame)
         return replace(self, change=change)
@@ -43,9 +44,9 @@ class VolumeConstraint:
     Parameters
     ----------
     stiffness : Factor
-        Of the free directions.
+        Factor of the free directions.
     volume : (n_free, 0 or 1) array
-        Their change of volume.
+        Change of volume per free displacement.
     compliance : float
         See `Volume`.
     """
@@ -56,14 +57,14 @@ class VolumeConstraint:
 
     @cached_property
     def _compliance(self) -> tuple[FloatArray, FloatArray]:
-        """Displacements under a unit pressure, and the volume that they yield."""
+        """Displacements under a unit pressure, and the total compliance."""
         displacement = self.stiffness.solve(self.volume)
         total_compliance = self.volume.T @ displacement + self.compliance
         if total_compliance.size and not total_compliance.min() > 0.0:
             raise SingularMatrixError(
-                "the incompressible body (poisson_ratio 0.5) has no free boundary to make room, as supports and "
-                "contact take all of it: leave a part free, end the contact part by `where` before the boundary that "
-                "never touches, or give a poisson_ratio of 0.4999"
+                "the incompressible body (poisson_ratio 0.5) has no free boundary, because supports and contact take "
+                "all of it: leave a part free, end the contact part by `where` before the boundary that never "
+                "touches, or give a poisson_ratio of 0.4999"
             )
         return displacement, total_compliance
 
@@ -78,8 +79,9 @@ class VolumeConstraint:
 
 
 def without_round_off(volume: FloatArray) -> FloatArray:
-    """Return the changes of volume (n_dofs, 0 or 1) without round-off.
+    """Return the changes of volume (n_dofs, 0 or 1) with round-off replaced by zero.
 
-    What tangential motions change the volume by is round-off, and no room for an incompressible body.
+    Tangential motions change the volume by round-off only, which must not appear as compliance of an incompressible
+    body.
     """
     return np.where(np.abs(volume) > 1e-14 * np.abs(volume).max(initial=0.0), volume, 0.0)

@@ -33,7 +33,7 @@ def bodies(far: bk.FarField | None, grading: float = 1.5) -> tuple[LargeStripBod
     )
     body = build_model(prepare(scene, scene.build_mesh())).body
     assert isinstance(body, StripBody)
-    elastic = LargeHalfPlane(body.elastic.mesh, body.elastic.material, body.elastic.drive)
+    elastic = LargeHalfPlane(body.elastic.mesh, body.elastic.material, body.elastic.far_motion)
     return LargeStripBody(elastic, body.conditions, body.nodes, body.force), body
 
 

@@ -91,7 +91,7 @@ def test_it_commutes_with_translations_and_is_positive() -> None:
     force = np.random.default_rng(3).normal(size=(64, 2))
     moved = elastic.strain_displacement(np.roll(force, 5, axis=0))
     np.testing.assert_allclose(moved, np.roll(elastic.strain_displacement(force), 5, axis=0), atol=1e-12)
-    held = elastic.held(elastic.displaced(elastic.to_complex(force)))
+    held = elastic.tractions_of(elastic.displaced(elastic.to_complex(force)))
     np.testing.assert_allclose(held, elastic.to_complex(force), atol=1e-12)
 
 

@@ -14,7 +14,7 @@ from bemkit.operators.collocation.curved_elements import CurvedElements
 from bemkit.operators.collocation.equations import NOWHERE, point_forces
 from bemkit.operators.collocation.images import collocation_equations
 from bemkit.operators.collocation.layers import Constants, Layer, Unknowns, straight_layer
-from bemkit.operators.integrals.panels import Panels
+from bemkit.operators.integrals.element_geometry import ElementGeometry
 from bemkit.operators.material import Material
 from tests.operators.collocation_matrices import collocation_matrices
 
@@ -143,10 +143,10 @@ def test_fields_anywhere_are_integrals_of_the_kernel(backend: str) -> None:
 
 def test_quadrature_gives_the_closed_forms_where_elements_are_straight(backend: str) -> None:
     mesh, order = straight(Rectangle(1.0, 1.0), 48), np.random.default_rng(2).permutation(48)
-    panels, constants = Panels(mesh), Constants.of(MATERIAL, mesh.diameter)
-    elements = CurvedElements.of(panels, MATERIAL, order, mesh.diameter)
+    geometry, constants = ElementGeometry(mesh), Constants.of(MATERIAL, mesh.diameter)
+    elements = CurvedElements.of(geometry, MATERIAL, order, mesh.diameter)
     chosen = np.array([3, 10, 47])
-    start, end, centre = (of[order[chosen]] for of in (panels.start, panels.end, panels.centre))
+    start, end, centre = (of[order[chosen]] for of in (geometry.start, geometry.end, geometry.centre))
     # close to the first of them, some half lengths away, far away, and in the middle of the last one
     x = np.append(centre[0] + np.array([1e-3, 0.03j, 0.06, 0.07j, 0.3 + 0.2j, 2.0]), centre[2])
     places = np.append(np.full(6, NOWHERE), 47)

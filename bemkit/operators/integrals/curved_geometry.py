@@ -1,13 +1,13 @@
 """Curved elements as complex polynomials of the local coordinate.
 
-A curved element of constant speed is y = c + l tau p(t) with a polynomial p of small degree, exact to round-off on
-[-1, 1]. What makes it as easy as a straight one: seen from a point x with the parameter t0 (the root of p(t0) = zeta;
-complex unless x lies on the curve) the distance factors,
+A curved element of constant speed is y = c + l tau p(t) with a polynomial p of low degree, exact to round-off on [-1,
+1]. Let t0 be the parameter of a point x, the root of p(t0) = zeta, which is complex unless x lies on the curve. The
+distance factors,
 
     zeta - p(t) = (t0 - t) g(t),    g the divided difference of p, without zeros near [-1, 1],
 
-so that every integral is the closed form of the straight element seen from t0 plus a smooth remainder: singularity swap
-quadrature [AfKlintebergBarnett2021], with remainders instead of swapped densities.
+so that every integral is the closed form of the straight element for the point t0 plus the integral of a smooth
+remainder. This is singularity swap quadrature [AfKlintebergBarnett2021], with remainders instead of swapped densities.
 """
 
 from __future__ import annotations
@@ -28,23 +28,23 @@ from bemkit.geometry.errors import GeometryError
 from bemkit.geometry.mesh import BoundaryMesh
 
 MAX_DEGREE = 20
-"""Elements that need more are refused; a circular element of half a turn needs 18."""
+"""Highest degree of an element; a half circle has degree 18."""
 N_SAMPLES = 29
 MAX_BEND = 1.6
-"""Largest product of curvature and half length: elements that turn by more than about half a turn are refused."""
+"""Largest product of curvature and half length, about that of a half circle."""
 ROUND_OFF = 4.0 * float(np.finfo(float).eps)
 UNRESOLVED = 1e3
-"""Elements whose series goes on beyond MAX_DEGREE with this many times the round-off are refused."""
+"""Largest coefficient beyond MAX_DEGREE, relative to round-off, on analytic curves."""
 MAX_NEWTON = 30
 FOLLOWED = 1e-5
-"""Share of their half length to which elements follow curves that are not analytic, such as splines."""
+"""Largest coefficient beyond MAX_DEGREE, relative to the half length, on other curves such as splines."""
 ELLIPSE = 1.8
-"""Points with a parameter in the ellipse with foci -1, 1 and this semi-axis are near; Gauss rules serve the others."""
+"""Semi-axis of the ellipse with foci -1 and 1; points with a parameter inside are near, others take a Gauss rule."""
 
 
 @dataclass(frozen=True, eq=False)
-class CurvedPanels:
-    """The polynomials of all elements of a mesh; straight ones are p(t) = t.
+class CurvedGeometry:
+    """The polynomials of all elements of a mesh; straight elements have p(t) = t.
 
     Parameters
     ----------
@@ -60,32 +60,34 @@ class CurvedPanels:
     bend: FloatArray
 
 
-def fit(mesh: BoundaryMesh, tangent: ComplexArray, half: FloatArray, centre: ComplexArray) -> CurvedPanels:
-    """Interpolate the curved elements of a mesh, up to the round-off of their coordinates.
+def fit(mesh: BoundaryMesh, tangent: ComplexArray, half: FloatArray, centre: ComplexArray) -> CurvedGeometry:
+    """Interpolate the curved elements of a mesh up to the round-off of their coordinates.
 
     Raises
     ------
     GeometryError
-        If an element turns too far, or is too far from a polynomial.
+        If an element bends too much, or no polynomial represents it.
     """
     curved = np.flatnonzero(~mesh.is_straight)
+    # Chebyshev series of the local coordinates
     angles, to_series = _interpolation()
-    places = mesh.points(curved, np.cos(angles))
-    places[:, 0], places[:, -1] = mesh.end[curved], mesh.start[curved]  # neighbours meet in the very same node
-    local = ((places @ np.array([1.0, 1j])) - centre[curved, None]) * (tangent[curved].conj() / half[curved])[:, None]
+    points = mesh.points(curved, np.cos(angles))
+    points[:, 0], points[:, -1] = mesh.end[curved], mesh.start[curved]  # neighbours share exactly the same node
+    local = ((points @ np.array([1.0, 1j])) - centre[curved, None]) * (tangent[curved].conj() / half[curved])[:, None]
     series = local @ to_series.T
-    # a short element is known to the round-off of its coordinates where they were evaluated: what is below is noise
+    # coefficients below the round-off of the coordinates, relative to the half length, are noise: cut the series there
     noise = ROUND_OFF * (1.0 + _of_curves(mesh, lambda curve: curve.magnitude)[curved] / half[curved])
     is_noise = np.logical_and.accumulate((np.abs(series) <= noise[:, None])[:, ::-1], axis=1)[:, ::-1]
     degree = np.clip(series.shape[1] - 1 - is_noise.sum(axis=1), 1, MAX_DEGREE)
     allowed = np.where(_of_curves(mesh, lambda curve: curve.is_analytic)[curved], UNRESOLVED * noise, FOLLOWED)
     is_unresolved = (np.abs(series[:, MAX_DEGREE + 1 :]) > allowed[:, None]).any(axis=1)
     series[np.arange(series.shape[1]) > degree[:, None]] = 0.0
-    # what is left of a series meets the nodes again: between tiny elements a gap of the noise would be a crack
+    # shift the cut series to the nodes: otherwise tiny elements would have gaps of the size of the noise
     ends = np.column_stack([series.sum(axis=1), series @ (-1.0) ** np.arange(series.shape[1])])
     mismatch = local[:, [0, -1]] - ends
     series[:, 0] += 0.5 * (mismatch[:, 0] + mismatch[:, 1])
     series[:, 1] += 0.5 * (mismatch[:, 0] - mismatch[:, 1])
+    # powers of t
     n_powers = int(degree.max()) + 1
     about_centre = np.zeros((n_powers, mesh.n_elements), complex)
     about_centre[1] = 1.0
@@ -93,6 +95,7 @@ def fit(mesh: BoundaryMesh, tangent: ComplexArray, half: FloatArray, centre: Com
     for k, unit in enumerate(np.eye(n_powers)):
         to_powers[: k + 1, k] = chebyshev.cheb2poly(unit[: k + 1])
     about_centre[:, curved] = to_powers @ series.T[:n_powers]
+    # largest curvature
     bend = np.zeros(mesh.n_elements)
     second = about_centre[2:] * (np.arange(2, n_powers) * np.arange(1, n_powers - 1))[:, None]
     if n_powers > 2:
@@ -100,13 +103,13 @@ def fit(mesh: BoundaryMesh, tangent: ComplexArray, half: FloatArray, centre: Com
             np.vander(np.linspace(-1.0, 1.0, 9), n_powers - 2, increasing=True) @ second[:, curved]
         ).max(axis=0)
     _check(mesh, curved, bend, is_unresolved)
-    return CurvedPanels(about_centre, _shifted(about_centre, -1.0), _shifted(about_centre, 1.0), bend)
+    return CurvedGeometry(about_centre, _shifted(about_centre, -1.0), _shifted(about_centre, 1.0), bend)
 
 
 def _of_curves(mesh: BoundaryMesh, ask: Callable[[Curve], Any]) -> NDArray[Any]:
-    """Return for each element (n_elements,) what its curve answers; of straight ones the answer means nothing."""
-    answers = np.array([ask(curve) for curve in mesh.curves])
-    return answers[mesh.element_curve]
+    """Return a property of the curve of each element, (n_elements,); values of straight elements are meaningless."""
+    values = np.array([ask(curve) for curve in mesh.curves])
+    return values[mesh.element_curve]
 
 
 def _check(mesh: BoundaryMesh, curved: IntArray, bend: FloatArray, is_unresolved: BoolArray) -> None:
@@ -140,15 +143,15 @@ def _shifted(coefficients: ComplexArray, centre: float) -> ComplexArray:
 
 
 def stretched(bend: FloatArray, distance: float) -> FloatArray:
-    """Return how many half lengths outside of a circular element the parameter is `distance` away from its centre."""
-    exponent = np.minimum(bend * distance, 300.0)  # beyond, no point is far enough
+    """Return the distance, in half lengths, at which the parameter of circular elements is `distance`."""
+    exponent = np.minimum(bend * distance, 300.0)  # to avoid overflow
     ratio = np.where(exponent > 1e-8, np.expm1(exponent) / np.maximum(exponent, 1e-8), 1.0)
     result: FloatArray = distance * ratio
     return result
 
 
 def evaluate(coefficients: ComplexArray, t: ComplexArray) -> ComplexArray:
-    """Evaluate polynomials (n_powers, n) at (n,) points, one each."""
+    """Evaluate n polynomials (n_powers, n), each at one of n points."""
     value: ComplexArray = coefficients[-1] + np.zeros_like(t)
     for coefficient in coefficients[-2::-1]:
         value *= t
@@ -163,7 +166,7 @@ def derivative(coefficients: ComplexArray) -> ComplexArray:
 
 
 def divided_difference(coefficients: ComplexArray, root: ComplexArray) -> ComplexArray:
-    """Return the coefficients of (p(root) - p(t)) / (root - t), which are those of p divided by its linear factor."""
+    """Return the coefficients of (p(root) - p(t)) / (root - t)."""
     quotient = np.empty((coefficients.shape[0] - 1, root.size), complex)
     quotient[-1] = coefficients[-1]
     for m in range(quotient.shape[0] - 1, 0, -1):
@@ -172,27 +175,27 @@ def divided_difference(coefficients: ComplexArray, root: ComplexArray) -> Comple
 
 
 def find_parameters(
-    panels: CurvedPanels, elements: IntArray, from_start: ComplexArray, from_end: ComplexArray
+    geometry: CurvedGeometry, elements: IntArray, from_start: ComplexArray, from_end: ComplexArray
 ) -> tuple[ComplexArray, ComplexArray, BoolArray]:
-    """Find the complex parameters t0 of points by Newton's method, each measured from the nearer end.
+    """Find the complex parameters t0 of points by Newton's method, relative to the nearer end.
 
     Parameters
     ----------
-    panels : CurvedPanels
+    geometry : CurvedGeometry
     elements : (n,) int array
     from_start, from_end : (n,) complex arrays
-        Local coordinates of the points relative to either end of the element.
+        Local coordinates of the points relative to both ends of the element.
 
     Returns
     -------
     plus, minus : (n,) complex arrays
-        t0 + 1 and t0 - 1, each with full relative accuracy near its own end.
+        t0 + 1 and t0 - 1, each with full relative accuracy near its end.
     is_near : (n,) bool array
-        Whether a root was found close to the element; all others are far in the sense of the parameter.
+        Whether a root was found inside the ellipse `ELLIPSE`.
     """
     at_start = np.abs(from_start) < np.abs(from_end)
     target = np.where(at_start, from_start, from_end)
-    coefficients = np.where(at_start, panels.about_start[1:, elements], panels.about_end[1:, elements])
+    coefficients = np.where(at_start, geometry.about_start[1:, elements], geometry.about_end[1:, elements])
     guesses = np.linspace(0.0, 2.0, 5)
     starts: ComplexArray = np.where(at_start, 1.0, -1.0) * guesses[:, None].astype(complex)
     distance = np.stack([np.abs(start * evaluate(coefficients, start) - target) for start in starts])
@@ -200,11 +203,11 @@ def find_parameters(
     slopes = coefficients * np.arange(1, coefficients.shape[0] + 1)[:, None]
     change = np.full(u.shape, np.inf)
     active = np.arange(u.size)
-    with np.errstate(all="ignore"):  # runaways end as not-a-number and are not near
+    with np.errstate(all="ignore"):  # diverging iterates become nan and do not count as near
         for _ in range(MAX_NEWTON):
             here = u[active]
-            own = coefficients[:, active]
-            step = (here * evaluate(own, here) - target[active]) / evaluate(slopes[:, active], here)
+            value = here * evaluate(coefficients[:, active], here)
+            step = (value - target[active]) / evaluate(slopes[:, active], here)
             u[active] = here - step
             change[active] = np.abs(step)
             active = active[(change[active] > 1e-15 * np.abs(u[active])) & (np.abs(u[active]) < 10.0)]

@@ -1,4 +1,4 @@
-"""How a half-plane moves far away: by given motions, or driven by forces."""
+"""Motion of a half-plane far away: prescribed, or controlled by loads."""
 
 from __future__ import annotations
 
@@ -12,35 +12,35 @@ from bemkit.operators.rigid_modes import rigid_motions
 
 @dataclass(frozen=True)
 class FarMotion:
-    """Motion of a half-plane far away along x, along y and as a turn: given, or driven by a load.
+    """Far motion of a half-plane along x, along y and as a rotation; each is prescribed or load-controlled.
 
     Parameters
     ----------
-    driven : tuple of int
-        Which of the three motions (0, 1, 2) loads drive.
+    load_controlled : tuple of int
+        Load-controlled motions: 0 along x, 1 along y, 2 the rotation.
     motion : tuple of float [m, m, rad]
-        Zero where driven.
+        Prescribed motions; zero for load-controlled ones.
     load : tuple of float [N/m, N/m, N m/m]
-        On the half-plane; zero where not driven.
+        Loads on the half-plane; zero for prescribed motions.
     centre : tuple of float [m]
-        About which it turns and is strained, and where its forces act.
+        Centre of rotation and strain, and point of action of the forces.
     strain : float [-]
-        Along the surface, of the whole half-plane; no traction acts on the surface then.
+        Uniform strain of the half-plane along its surface; it causes no tractions on the surface.
     """
 
-    driven: tuple[int, ...] = ()
+    load_controlled: tuple[int, ...] = ()
     motion: tuple[float, float, float] = (0.0, 0.0, 0.0)
     load: tuple[float, float, float] = (0.0, 0.0, 0.0)
     centre: tuple[float, float] = (0.0, 0.0)
     strain: float = 0.0
 
     def blended(self, other: FarMotion, share: float) -> FarMotion:
-        """Return the drive a share of the way to another one."""
+        """Return the interpolation (1 - share) self + share other."""
         pairs = ((self.motion, other.motion), (self.load, other.load))
-        motion, load = (blended(np.array(one), np.array(two), share).tolist() for one, two in pairs)
+        motion, load = (blended(np.array(start), np.array(end), share).tolist() for start, end in pairs)
         strain = (1.0 - share) * self.strain + share * other.strain
         return replace(other, motion=tuple(motion), load=tuple(load), strain=strain)
 
     def motions_at(self, points: FloatArray) -> FloatArray:
-        """Return the displacements (n, 2, 3) of points (n, 2) [m] by the three unit motions."""
+        """Return the displacements (n, 2, 3) of points (n, 2) [m] under the three unit motions."""
         return rigid_motions(points, np.array(self.centre), 1.0)

@@ -1,4 +1,4 @@
-"""The elements of a mesh in complex notation, as the integrals want them."""
+"""The elements of a mesh in complex notation."""
 
 from __future__ import annotations
 
@@ -6,27 +6,27 @@ import numpy as np
 
 from bemkit.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from bemkit.geometry.mesh import BoundaryMesh
-from bemkit.operators.integrals import curved_panels
+from bemkit.operators.integrals import curved_geometry
 
 
-class Panels:
-    """Elements as arrays: end nodes, half lengths, tangents, centres (complex numbers x + i y).
+class ElementGeometry:
+    """Arrays of end nodes, half lengths, tangents and centres of elements, as complex numbers x + i y.
 
     Parameters
     ----------
     mesh : BoundaryMesh
-        Its coordinates should be relative to a point near the body, so that differences keep their digits.
+        Coordinates should be relative to a point near the body, so that differences keep their digits.
 
     Raises
     ------
     GeometryError
-        If a curved element turns too far to be a polynomial of its arc length.
+        If a curved element bends too much to be a polynomial of its arc length.
 
     Notes
     -----
-    In the local coordinate (x - centre) / (half tangent) a straight element is the interval [-1, 1], and a curved one
-    the image of that interval under a polynomial p of low degree with |p'| = 1 (see `curved_panels`): `half` is half
-    the arc length, `tangent` the direction of the chord and `centre` the point in the middle.
+    In the local coordinate (x - centre) / (half tangent) a straight element is the interval [-1, 1]. A curved element
+    is the image of that interval under a polynomial p of low degree with |p'| = 1, see `curved_geometry`; `half` is
+    half the arc length, `tangent` the direction of the chord and `centre` the midpoint of the arc.
     """
 
     def __init__(self, mesh: BoundaryMesh) -> None:
@@ -40,12 +40,12 @@ class Panels:
         self.tangent: ComplexArray = span / (2.0 * self.half)
         self.centre: ComplexArray = self.start + 0.5 * span
         self.is_straight = mesh.is_straight
-        self.curved: curved_panels.CurvedPanels | None = None
+        self.curved: curved_geometry.CurvedGeometry | None = None
         if not self.is_straight.all():
             curved = np.flatnonzero(~self.is_straight)
             self.half[curved] = 0.5 * mesh.lengths[curved]
             self.centre[curved] = mesh.centres[curved] @ np.array([1.0, 1j])
-            self.curved = curved_panels.fit(mesh, self.tangent, self.half, self.centre)
+            self.curved = curved_geometry.fit(mesh, self.tangent, self.half, self.centre)
         self.to_local: ComplexArray = self.tangent.conj() / self.half
 
     def polynomials(self, elements: IntArray) -> ComplexArray:
@@ -58,40 +58,40 @@ class Panels:
         """Return the points of some elements at one local coordinate in [-1, 1]."""
         if self.curved is None:
             return self.centre[elements] + (xi * self.half * self.tangent)[elements]
-        local = curved_panels.evaluate(self.polynomials(elements), np.full(elements.size, xi + 0j))
+        local = curved_geometry.evaluate(self.polynomials(elements), np.full(elements.size, xi + 0j))
         return self.centre[elements] + (self.half * self.tangent)[elements] * local
 
     def offset(self, elements: IntArray, fraction: FloatArray, at_start: BoolArray) -> ComplexArray:
-        """Return how far points lie from one end node, accurate however close they are to it.
+        """Return points relative to one end node, with full relative accuracy at any distance from it.
 
         Parameters
         ----------
         elements : (n,) int array
         fraction : (n,) array
-            Distances along the elements, in their lengths, from the start node or from the end node.
+            Distances along the elements from that end node, in lengths of the element.
         at_start : (n,) bool array
-            Which end.
+            Whether distances are measured from the start node.
         """
         shift = np.where(at_start, 2.0, -2.0) * fraction
         offset = self.tangent[elements] * (self.half[elements] * shift)
         if self.curved is None:
             return offset
         about = np.where(at_start, self.curved.about_start[1:, elements], self.curved.about_end[1:, elements])
-        return offset * curved_panels.evaluate(about, shift.astype(complex))
+        return offset * curved_geometry.evaluate(about, shift.astype(complex))
 
-    def reach(self, distance: float) -> FloatArray:
-        """Return how many half lengths from the centre of each element the parameter is `distance` away from it.
+    def distance_at(self, distance: float) -> FloatArray:
+        """Return the distance from the centre, in half lengths, at which the parameter of each element is `distance`.
 
-        Outside of a circle the parameter grows with the logarithm of the distance only; on straight elements both are
-        the same.
+        On straight elements both are equal; outside of a circular element the parameter grows like the logarithm of
+        the distance.
         """
         if self.curved is None:
             return np.full(self.half.size, distance)
-        return curved_panels.stretched(self.curved.bend, distance)
+        return curved_geometry.stretched(self.curved.bend, distance)
 
 
 def squared_distance(x: ComplexArray, y: ComplexArray) -> FloatArray:
-    """Return |x - y|**2, broadcast."""
+    """Return |x - y|**2 of arrays that broadcast."""
     difference = x - y
     result: FloatArray = np.square(difference.real)
     result += np.square(difference.imag)
