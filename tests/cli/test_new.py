@@ -25,13 +25,17 @@ def test_these_are_all_kinds_and_the_help_lists_them() -> None:
     assert all(kind in text for kind in KINDS)
 
 
-@pytest.mark.parametrize("kind", slow_except(KINDS, "block", "rough-surface"))
+ONE_PICTURE = "rough-surface --what contacts"
+
+
+@pytest.mark.parametrize("words", slow_except([*KINDS, ONE_PICTURE], "block", ONE_PICTURE))
 @pytest.mark.usefixtures("here")
-def test_two_commands_from_nothing_to_a_picture(kind: str, capsys) -> None:
+def test_two_commands_from_nothing_to_a_picture(words: str, capsys) -> None:
+    kind, *what = words.split()
     assert _run_to_end(["new", kind]) == 0
     second = capsys.readouterr().out.split("bemkit ")[-1].split()
     assert second[:2] == ["run", f"{kind}.toml"]
-    assert _run_to_end([*second, "--json", "result.json", "-q"]) == 0
+    assert _run_to_end([*second, "--json", "result.json", "-q", *what]) == 0
     assert json.loads(Path("result.json").read_text())["certified"]
     assert [path for path in Path("figures").iterdir() if path.stat().st_size > 5000]
 

@@ -25,6 +25,7 @@ SLOW = [
         *("pictures.md", "reports.md", "error-against-run-time.md", "large-scenes.md"),
         *("tutorials/load-histories.md", "tutorials/a-matrix-free-body.md", "tutorials/rough-surfaces.md"),
         "tutorials/adding-a-driver.md",
+        "tutorials/property-tests.md",
     )
 ]
 

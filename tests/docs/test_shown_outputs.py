@@ -42,7 +42,11 @@ def test_the_comparison_can_fail() -> None:
     assert not matches("a\nb\n", "a\nx\nb\n")
 
 
-@pytest.mark.parametrize(("page", "fewest"), slow_only(OUTPUTS_SHOWN.items(), ("paper-tables.md", 1)))
+# what these run has quick tests of its own
+SLOW = [(page, OUTPUTS_SHOWN[page]) for page in ("paper-tables.md", "tutorials/first-steps.md", "command-line.md")]
+
+
+@pytest.mark.parametrize(("page", "fewest"), slow_only(OUTPUTS_SHOWN.items(), *SLOW))
 @pytest.mark.usefixtures("here")
 def test_shown_output(
     page: str, fewest: int, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]

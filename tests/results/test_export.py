@@ -149,7 +149,7 @@ def test_triangles_end_at_the_boundary_and_hold_the_largest_stress(is_biaxial: b
     assert area.sum() == pytest.approx(solution.mesh.area, rel=2e-4)  # chords of the circles
 
 
-@pytest.mark.parametrize("name", ["pin-in-plate", "clamped-angle", "two-cylinders"])
+@pytest.mark.parametrize("name", slow_only(["pin-in-plate", "clamped-angle", "two-cylinders"], "two-cylinders"))
 def test_triangles_fill_every_body(name: str) -> None:
     solution = bk.run(bk.load_scene(name))
     for body in solution.bodies.values():

@@ -139,6 +139,11 @@ def test_a_killed_run_with_an_accuracy_goes_on_on_its_mesh(scene: bk.Scene | bk.
 
 
 @pytest.fixture(scope="module")
+def whole() -> bk.Solution:
+    return bk.run(LOOP)
+
+
+@pytest.fixture(scope="module")
 def growing(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return a file of a run that was killed after four steps."""
     file = tmp_path_factory.mktemp("growing") / "killed.h5"
@@ -148,7 +153,9 @@ def growing(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.mark.parametrize("share", [0.3, 0.6, 0.9, 0.99])
-def test_a_write_that_was_cut_off_loses_no_earlier_step(growing: Path, tmp_path: Path, share: float) -> None:
+def test_a_write_that_was_cut_off_loses_no_earlier_step(
+    growing: Path, whole: bk.Solution, tmp_path: Path, share: float
+) -> None:
     content, file = growing.read_bytes(), tmp_path / "cut.h5"
     n_first = USER_BLOCK + int(content[:USER_BLOCK].rstrip(b"\0").rpartition(b"\n")[2])
     file.write_bytes(content[: n_first + int(share * (len(content) - n_first))])
@@ -158,7 +165,7 @@ def test_a_write_that_was_cut_off_loses_no_earlier_step(growing: Path, tmp_path:
     assert len(steps) == 1 + int(3 * share)  # each of the last three steps takes about as many bytes
     for one, two in zip(steps, loading_of(bk.read_result(growing)).steps, strict=False):
         np.testing.assert_array_equal(one.contact.sigma_n, two.contact.sigma_n)
-    assert bk.run(LOOP, file=file).history == bk.run(LOOP).history
+    assert bk.run(LOOP, file=file).history == whole.history
 
 
 def test_a_damaged_step_and_those_after_it_are_not_read(growing: Path, tmp_path: Path) -> None:
@@ -237,9 +244,9 @@ def test_histories_are_written_in_every_format(scene: bk.Scene | bk.Scene, endin
     export_result(tmp_path / f"b.{ending}", bk.run(short))
 
 
-def test_the_command_line_shows_steps(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_command_line_shows_steps(whole: bk.Solution, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file = tmp_path / "loop.h5"
-    bk.write_result(file, bk.run(LOOP))
+    bk.write_result(file, whole)
     for arguments in (
         ["--csv", "-", "--table", "steps"],
         ["--scene"],

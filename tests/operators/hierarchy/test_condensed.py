@@ -128,12 +128,12 @@ def test_equations_that_are_less_accurate_than_promised_are_named(monkeypatch: p
     prepared_scene = prepared(paper(1))
     given, material = prepared_scene.only, prepared_scene.material_of(prepared_scene.only)
     tree = HierarchicalCollocation(given.own_mesh.unit, material, Hierarchical(TOLERANCE))
-    exact = HierarchicalSystem.everywhere
+    exact = HierarchicalSystem.full_state
 
     def wrong(system: HierarchicalSystem) -> tuple[np.ndarray, np.ndarray]:
         traction, displacement = exact(system)
         return traction, displacement * (1.0 + 1e-5 * np.cos(np.arange(len(displacement))))[:, None]
 
-    monkeypatch.setattr(HierarchicalSystem, "everywhere", wrong)
+    monkeypatch.setattr(HierarchicalSystem, "full_state", wrong)
     with pytest.raises(InexactEquationsError, match="choose the linear solver 'direct'"):
         tree.condense(given.conditions, given.force)
