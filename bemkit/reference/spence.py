@@ -10,6 +10,7 @@ a parabola in a much smaller one.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 
@@ -59,6 +60,7 @@ def static_cylinder_stick_ratio(friction: float, material: Material) -> float:
     return _ratio(friction, material, is_parabola=True)
 
 
+@cache
 def _ratio(friction: float, material: Material, *, is_parabola: bool) -> float:
     from scipy.optimize import brentq
 

@@ -14,6 +14,7 @@ import bemkit as bk
 from bemkit.cli.main import main
 from bemkit.hdf5 import ResultFileError
 from bemkit.pictures import figures as pictures_of
+from bemkit.pictures.catalogue import default_pictures
 from bemkit.plan import make_plan
 from bemkit.results.solution import Solution
 from bemkit.results.tables import to_csv, to_json
@@ -114,14 +115,13 @@ def test_tables_name_the_body(solution: Solution) -> None:
 
 
 def test_pictures_show_all_bodies_and_each_contact_once(solution: Solution, arch: Solution) -> None:
-    figures = pictures_of(solution)
-    assert list(figures) == ["deformation", "zoom", "contacts", "displacement", "traction", "status", "von-mises"]
-    (axes,) = figures["contacts"].axes
+    names = [[picture.name for picture in default_pictures(each)] for each in (solution, arch)]
+    assert names[0] == ["deformation", "zoom", "contacts", "displacement", "traction", "status", "von-mises"]
+    (axes,) = pictures_of(solution, ["contacts"])["contacts"].axes
     drawn = sum(len(collection.get_offsets()) for collection in axes.collections if hasattr(collection, "get_sizes"))
     assert drawn == solution.contact.n_contact
-    many = pictures_of(arch)
-    assert list(many) == ["deformation", "contacts", "von-mises"]  # too many contacts for figures of each
-    assert len(many["deformation"].axes[0].patches) >= len(arch.bodies)
+    assert names[1] == ["deformation", "contacts", "von-mises"]  # too many contacts for figures of each
+    assert len(pictures_of(arch, ["deformation"])["deformation"].axes[0].patches) >= len(arch.bodies)
 
 
 def test_fields_inside_are_those_of_a_body(solution: Solution) -> None:
