@@ -58,7 +58,8 @@ class ContactPlaces:
     def elements(self, name: str) -> IntArray:
         """Return the elements of a body that may touch others or obstacles, without those near `singular_points`."""
         mesh, elements = self.solution.bodies[name].mesh, self._touching(name)
-        return elements[~(self._is_near(mesh.start[elements]) | self._is_near(mesh.end[elements]))]
+        near = (self._is_near(ends[elements], with_ends=False) for ends in (mesh.start, mesh.end))
+        return elements[~np.logical_or(*near)]
 
     def _touching(self, name: str) -> IntArray:
         body = self.solution.bodies[name]
@@ -85,11 +86,11 @@ class ContactPlaces:
             points.append((point, reach, min(one.length, two.length)))
         return [(point, reach) for point, reach, length in points if reach <= LARGEST_REACH * length]
 
-    def _is_near(self, points: FloatArray) -> BoolArray:
-        """Return whether points (n, 2) are on the elements of a singular point, and no end of theirs."""
+    def _is_near(self, points: FloatArray, *, with_ends: bool) -> BoolArray:
+        """Return whether points (n, 2) are on the elements of a singular point, whose far ends may count."""
         is_near = np.zeros(len(points), bool)
         for point, reach in self.singular_points:
-            is_near |= norms(points - point) < (1.0 - LYING_AT) * reach
+            is_near |= norms(points - point) < (1.0 + (LYING_AT if with_ends else -LYING_AT)) * reach
         return is_near
 
     @cached_property
@@ -165,25 +166,55 @@ class ContactPlaces:
         By the coefficients of elements of degree 3 and more, if a body has lower degrees by the nodes, without those
         near `singular_points`. None if there are too few.
         """
-        from bemkit.results.error_indicators import nodal_error, transition_error
+        from bemkit.results.error_indicators import nodal_error
 
-        solution, squared = self.solution, 0.0
-        spaces = [body.scene.discretisation.displacement_space(body.mesh) for body in solution.bodies.values()]
-        if (degree := min(space.degree for space in spaces)) <= 2:
-            table = solution.contact
-            return nodal_error(table, degree, solution.n_sides, self._is_near(np.column_stack([table.x, table.y])))
-        elements = {name: self.elements(name) for name in solution.bodies}
+        solution, degree = self.solution, self.lowest_degree
+        if degree <= 2:
+            # the second difference at the far end of a linear element takes the node at the singular point
+            points = np.column_stack([solution.contact.x, solution.contact.y])
+            is_excluded = self._is_near(points, with_ends=degree == 1)
+            return nodal_error(solution.contact, degree, solution.n_sides, is_excluded)
+        elements = self._counted
         if not any(chosen.size for chosen in elements.values()):
             return None
+        squared, _ = self._transition_errors
         for name, body in solution.bodies.items():
             if body.coefficient_errors is not None:
                 squared += float(body.coefficient_errors.traction[elements[name]].sum())
+        return squared
+
+    def squared_energy_error(self) -> float:
+        """Return the squared error in the energy norm [J/m] where zones end inside elements of degree 3 and more."""
+        return self._transition_errors[1] if self.lowest_degree > 2 else 0.0
+
+    @cached_property
+    def lowest_degree(self) -> int:
+        """Lowest degree of the displacements of all bodies."""
+        bodies = self.solution.bodies.values()
+        return min(body.scene.discretisation.displacement_space(body.mesh).degree for body in bodies)
+
+    @cached_property
+    def _counted(self) -> dict[str, IntArray]:
+        """`elements` of all bodies."""
+        return {name: self.elements(name) for name in self.solution.bodies}
+
+    @cached_property
+    def _transition_errors(self) -> tuple[float, float]:
+        """Squared errors of tractions in L2 [Pa^2 m], and in the energy norm [J/m], by `transition_error`.
+
+        The error has about the wave number 2 / d at the distance d of the transition from the end of its element.
+        """
+        from bemkit.results.error_indicators import transition_error
+
+        solution, traction, energy = self.solution, 0.0, 0.0
         for transition in solution.transitions:
             for side in self.sides(transition.part):
                 end = side.near(np.array([transition.x, transition.y]))
-                if end.element in elements[side.body]:
-                    squared += transition_error(solution.contact, transition, solution.transitions, end)
-        return squared
+                if end.element in self._counted[side.body]:
+                    squared = transition_error(solution.contact, transition, solution.transitions, end)
+                    plane_modulus = solution.bodies[side.body].scene.material.plane_modulus
+                    traction, energy = traction + squared, energy + 0.5 * squared * end.distance / plane_modulus
+        return traction, energy
 
 
 def _reach(mesh: BoundaryMesh, elements: IntArray, point: FloatArray) -> float:

@@ -137,7 +137,8 @@ class Solution(SolvedScene, Explorable):
             return None
         if max(sum(errors), unit) <= sum(body.energy_of_round_off for body in self.bodies.values()):
             return 0.0
-        return float(np.sqrt(sum(errors) / unit)) if unit > 0.0 else None
+        squared = sum(errors) + self.places.squared_energy_error()
+        return float(np.sqrt(squared / unit)) if unit > 0.0 else None
 
     @cached_property
     def places(self) -> ContactPlaces:
@@ -170,8 +171,8 @@ class Solution(SolvedScene, Explorable):
         squared = self.places.squared_traction_error()
         if squared is None:
             return None
-        degree = min(body.scene.discretisation.displacement_space(body.mesh).degree for body in bodies)
-        return float(np.hypot(np.sqrt(squared) / size, stiffness_error(self.estimated_error or 0.0, degree)))
+        stiffness = stiffness_error(self.estimated_error or 0.0, self.places.lowest_degree)
+        return float(np.hypot(np.sqrt(squared) / size, stiffness))
 
     @cached_property
     def estimated_local_traction_error(self) -> float | None:

@@ -16,6 +16,8 @@ from bemkit.solvers.active_sets import NodeStatus
 from checks.calibration.true_errors import true_errors
 from tests.slow import slow_except
 
+LAYERS = bk.MeshOptions(accuracy=1e-3, rising_degrees=True)
+
 
 def solved(name: str, degree: int, mesh: bk.MeshOptions) -> Solution:
     scene = bk.load_scene(name)
@@ -89,6 +91,40 @@ def test_errors_far_from_contact_make_the_body_too_stiff() -> None:
     assert 0.05 < error / coarse.estimated_error**2 < 1.0
     assert coarse.estimated_traction_error is not None
     assert 0.5 < coarse.estimated_traction_error / error < 3.0
+
+
+def test_estimates_of_linear_elements_exclude_the_neighbours_of_a_singular_corner() -> None:
+    """A block sticks to its floor: the second difference one element from the corner takes the node at the corner."""
+    parts = (
+        bk.Part("floor", bk.Contact(bk.RigidHalfPlane()), sides=("bottom",)),
+        bk.Part("top", bk.PrescribedDisplacement(0.0, -1e-3), sides=("top",)),
+    )
+    block = bk.Scene(
+        title="block", shape=bk.Rectangle(1.0, 1.15), material=bk.Material(1.0, 0.41), parts=parts,
+        law=bk.Coulomb(1.41), discretisation=bk.Galerkin(1), mesh=bk.MeshOptions(elements=56),
+    )  # fmt: skip
+    fine = bk.run(replace(block, discretisation=bk.Galerkin(2), mesh=LAYERS))
+    coarse = bk.run(block)
+    _, tractions = true_errors(coarse, fine)
+    assert coarse.estimated_traction_error is not None
+    assert 0.5 < coarse.estimated_traction_error / tractions < 2.0  # 3.6 with that node
+
+
+def test_ends_of_contact_inside_elements_count_in_the_energy() -> None:
+    """A single element of degree 6 touches, where pressures vanish like a root."""
+    parts = (
+        bk.Part("contact", bk.Contact(bk.RigidHalfPlane()), sides=("arc",), where=bk.Expression("y < 0.8")),
+        bk.Part("top", bk.PrescribedDisplacement(0.0, -6e-3), sides=("start", "end")),
+    )
+    disc = bk.Scene(
+        title="half disc", shape=bk.Sector(1.0, 180.0, 360.0, (0.0, 1.0)), material=bk.Material(1.0, 0.21), parts=parts,
+        law=bk.Frictionless(), discretisation=bk.Galerkin(6), mesh=bk.MeshOptions(elements=19, density={"arc": 4.0}),
+    )  # fmt: skip
+    fine = bk.run(replace(disc, discretisation=bk.Galerkin(2), mesh=LAYERS))
+    coarse = bk.run(disc)
+    energy, _ = true_errors(coarse, fine)
+    assert coarse.estimated_error is not None
+    assert 0.5 < coarse.estimated_error / energy < 3.0  # 0.26 without them
 
 
 def test_singular_corners_are_excluded() -> None:
