@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
 
 def contacts_between_bodies(solution: SolvedScene) -> Iterator[MeasuredContact]:
-    """Yield the contacts between elastic bodies, the tractions of both sides one after the other."""
+    """Yield the contacts between elastic bodies, first with the tractions of one side, then with those of the other."""
     scene, solved, sides = solution.scene, solution.bodies, solution.contact_sides
     placements = {body.name: body.placement for body in scene.placed_bodies}
     known: dict[Hashable, _Facing] = {}

@@ -24,26 +24,28 @@ from bemkit.results.solved_body import SolvedBody
 AddedGap: TypeAlias = Callable[[FloatArray], FloatArray]
 """Points (n, 2) [m] -> what is added to the distance there (n,) [m]."""
 _POINTS_PER_NODE = 4
-"""Points on an element for each of its nodes: a polynomial is larger between them by a few per cent at most."""
+"""Sample points for each node of an element. Between them a polynomial exceeds its largest sample by a few per cent at
+most."""
 _NOWHERE = (float("nan"), float("nan"))
 _NUMBERS = ("penetration", "tension", "complementarity", "cone_excess", "penetration_depth")
 _ROUND_OFF = 64.0 * float(np.finfo(float).eps)
 """Round-off of clearances, which are differences of coordinates, relative to the largest coordinate."""
 LARGEST_MISSED = 0.05
-"""Overlap at points without traction, relative to the displacement that contact forces cause, up to which it belongs to
-the end of a contact zone inside an element."""
+"""Largest overlap at the end of a contact zone inside an element, at points without traction, relative to the
+displacement by contact forces."""
 LARGEST_OVERLAP = 3.0
-"""Overlap anywhere, relative to the same, above which the nodes do not find the contact. Two constant elements beside
-the lowest point of a coarse ring overlap by 1.2 times that displacement, and their force is right to 4 %."""
+"""A larger overlap anywhere, relative to the same displacement, shows that the nodes do not find the contact. Two
+constant elements beside the lowest point of a coarse ring overlap by 1.2 times that displacement, and their force is
+right to 4 %."""
 _FREE_ROUND_OFF = 1e-12
-"""Overlap of bodies without any contact force, relative to how far they move, that may be round-off."""
+"""Overlap that may be round-off, for bodies without any contact force, relative to their displacement."""
 
 
 @dataclass(frozen=True)
 class BetweenNodes:
-    """Largest violation of each contact condition at points between the nodes; zero is perfect.
+    """Largest violation of each contact condition at points between the nodes; zero without violation.
 
-    Names and signs are those of `bemkit.contact.certificate.Certificate`, which is about the nodes. These violations
+    Names and signs are those of `bemkit.contact.certificate.Certificate`, which measures the nodes. These violations
     are errors of the discretisation: they fall as elements become smaller or their degree higher. The opposition of
     slip is measured at nodes only.
 
@@ -255,8 +257,8 @@ def violations_at(values: PointsBetween, law: FrictionLaw, stress: float, length
 def missed_contacts(table: ContactTable, measured: Mapping[str, BetweenNodes]) -> dict[str, tuple[float, float]]:
     """Return the points where the nodes do not find the contact, by contact.
 
-    Of bodies that no contact force acts on every overlap above round-off counts; of others overlaps above a share of
-    the displacement that contact forces cause where there is no traction, and above a multiple of it where there is.
+    For bodies without contact force every overlap above round-off counts. For others an overlap counts above a share of
+    the displacement by contact forces where there is no traction, and above a multiple of it where there is.
     """
     free, missed = free_contacts(table), {}
     for name, each in measured.items():
@@ -270,7 +272,7 @@ def missed_contacts(table: ContactTable, measured: Mapping[str, BetweenNodes]) -
 
 
 def unfound_contacts(table: ContactTable, measured: Mapping[str, BetweenNodes]) -> dict[str, tuple[float, float]]:
-    """Return the missed contacts without any force, and those with a force that are much deeper than it moves them."""
+    """Return the missed contacts without force, and those that overlap by far more than their displacement."""
     free = free_contacts(table)
     return {
         name: place

@@ -34,7 +34,7 @@ class BoundaryStress:
     Parameters
     ----------
     mesh : BoundaryMesh
-        The whole boundary, images by symmetry included.
+        The whole boundary, with its images by symmetry.
     material : Material
     space : BoundarySpace
         Of the displacement.

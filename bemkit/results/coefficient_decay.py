@@ -23,11 +23,11 @@ from bemkit.geometry.spaces import BoundarySpace, dof_points, local_coefficients
 from bemkit.operators.rigid_modes import without_motion
 
 SLOWEST = 0.95
-"""Largest ratio of successive coefficients in the sum of those that are missing."""
+"""Upper limit of the ratio of successive missing coefficients."""
 _N_MISSING = 64
-"""Coefficients in that sum: at the largest ratio the rest is a thousandth."""
+"""Number of missing coefficients that are summed: at the largest ratio the rest is a thousandth."""
 FASTEST = 0.05
-"""Least factor of the error by a further degree."""
+"""Lower limit of the factor by which one more degree reduces the error."""
 _MORE_POINTS = 2
 
 
@@ -42,7 +42,7 @@ class CoefficientErrors:
     traction : (n_elements,) array [Pa^2 m]
         Squared errors of the tractions in L2.
     energy_decay, traction_decay : (n_elements,) arrays
-        Factors of their roots by one degree more; 1 where the field is singular.
+        Factors by which one more degree reduces the errors (not squared); 1 where the field is singular.
     """
 
     energy: FloatArray
@@ -59,7 +59,7 @@ class CoefficientErrors:
 
     @classmethod
     def at_worst(cls, copies: Sequence[CoefficientErrors]) -> CoefficientErrors:
-        """Return the largest errors of copies of a body on each element, as often as there are copies."""
+        """Return the largest error of all copies of a body on each element, multiplied by the number of copies."""
         columns = zip(*(vars(errors).values() for errors in copies), strict=True)
         energy, traction, *decays = (np.max(column, axis=0) for column in columns)
         return cls(len(copies) * energy, len(copies) * traction, *decays)
@@ -84,7 +84,8 @@ def coefficient_errors(
     Parameters
     ----------
     displacement_space, traction_space : BoundarySpace
-        Continuous of degree p, and of degree p - 1, p at least 2 on each element, and 3 on one.
+        Continuous displacements of degree p and tractions of degree p - 1; p is at least 2 on each element and 3 on
+        one.
     displacement : (n_scalar, 2) array [m]
     traction : (n_elements, p, 2) array [Pa]
         At the local nodes of the traction space, element by element.

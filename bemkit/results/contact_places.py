@@ -23,7 +23,8 @@ if TYPE_CHECKING:
     from bemkit.results.solved_scene import SolvedScene
 
 LARGEST_REACH = 0.15
-"""Share of a contact up to which the elements at a singular point count as near it: longer ones have estimates."""
+"""Largest length of the elements at a singular point that are excluded as near it, relative to the contact. Longer ones
+have estimates."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,8 +72,8 @@ class ContactPlaces:
     def singular_points(self) -> list[tuple[FloatArray, float]]:
         """Points (2,) at which tractions have no bound, singular corners and edges, and lengths [m] of elements there.
 
-        On both sides of a contact it is that of the longer elements: an error of one side is one of the other. No
-        points where that is more than `LARGEST_REACH`.
+        Both sides of a contact have the length of the longer elements, since an error of one side is one of the other.
+        Points with elements longer than `LARGEST_REACH` are excluded.
         """
         points = []
         for name, corners in self.corners.items():
@@ -157,14 +158,14 @@ class ContactPlaces:
 
     @property
     def facing_ends(self) -> tuple[ZoneEnd, ...]:
-        """Edges: ends of a side that lie inside the side that they face."""
+        """Ends of a side that lie inside the side that they face."""
         return tuple(place for _, _, _, place in self._edges)
 
     def squared_traction_error(self) -> float | None:
         """Return the estimated squared error of the contact tractions of all bodies in L2 [Pa^2 m].
 
-        By the coefficients of elements of degree 3 and more, if a body has lower degrees by the nodes, without those
-        near `singular_points`. None if there are too few.
+        Elements of degree 3 and more have estimates by their coefficients; if a body has lower degrees, nodes have.
+        Those near `singular_points` are excluded. None if too few are left.
         """
         from bemkit.results.error_indicators import nodal_error
 

@@ -42,12 +42,12 @@ CONTACT_COLUMNS = (
 """Columns of the contact table in results, tables and files."""
 FLICKER = 1e-8
 """Changes of status within this share of a side count as one. Clearances grow like d**1.5 with the distance d from the
-edge, so that they are round-off there, and the status may change from node to node."""
+edge: close to it they are round-off, and the status may change from node to node."""
 
 _STRAIGHT = 1e-9
-"""Distance of nodes from a horizontal line, by the length of the contact, that is round-off."""
+"""Distance of nodes from a horizontal line that is round-off, relative to the length of the contact."""
 FEW_NODES = 3
-"""Pressed nodes up to which the sides of a contact may meet elsewhere than at its nodes, or nowhere."""
+"""Largest number of pressed nodes at which the sides of a contact may meet between its nodes, or nowhere."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -230,7 +230,7 @@ _POWERS = (1.3, 1.7)
 _MOST_STEPS = 20
 """Newton steps of the fit."""
 _LEAST_ZONE = 0.5
-"""Least length of a zone, relative to its length if it ends halfway between its nodes and its neighbours'."""
+"""Least length of a zone, relative to the zone that ends halfway between its own and the neighbouring nodes."""
 
 
 def find_transitions(contact: ContactTable, slip: FloatArray | None = None) -> tuple[Transition, ...]:
@@ -253,9 +253,9 @@ def find_transitions(contact: ContactTable, slip: FloatArray | None = None) -> t
     end of a stick zone. Its power 2/3, extrapolated from the last two open (or slipping) nodes, therefore crosses zero
     at the transition; on the paper's examples this is within a quarter of the node distance. Sliding friction changes
     the power somewhat (to 1.44 and 1.56 on Example 1): on meshes that are fine there place and power are fitted to the
-    nodes of a tenth of the zone but the four next to the transition, where the computed solution is least true. Where
-    that says nothing, as at the edge of an obstacle, or where two of them would swallow a narrow zone between them, the
-    transition is put halfway between the two nodes that differ.
+    nodes of a tenth of the zone but the four next to the transition, where the computed solution has the largest
+    errors. If that fails, as at the edge of an obstacle, or if two transitions would remove the narrow zone between
+    them, the transition lies halfway between the two nodes that differ.
     """
     words = contact.status_words()
     slip = contact.u_t if slip is None else slip

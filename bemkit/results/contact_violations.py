@@ -30,17 +30,18 @@ if TYPE_CHECKING:
     from bemkit.scene.contacts import ContactPair
 
 _LIGHTEST = 1e-3
-"""A body that carries less than this share of what the others carry is measured by this share."""
+"""Smallest force that a body is measured by, relative to the forces on the others."""
 
 
 def violations_between_nodes(solution: SolvedScene, names: Collection[str] | None = None) -> dict[str, BetweenNodes]:
-    """Measure displacements and tractions of a solution along its contacts, without running anything again.
+    """Measure the displacements and tractions of a solution along its contacts.
 
     Parameters
     ----------
     solution : SolvedScene
     names : collection of str, optional
-        The contacts to measure; by default all. What they are relative to comes from all in either case.
+        The contacts to measure; by default all. The stress and the length to which violations are relative are those of
+        all contacts.
 
     Returns
     -------
@@ -53,7 +54,8 @@ def violations_between_nodes(solution: SolvedScene, names: Collection[str] | Non
     elements are steps. Between elastic bodies points lie on the pieces on which the functions of both sides are smooth,
     and face each other along the mean of both normals; tractions of both sides are measured, with one clearance.
     Tractions are relative to those on the body of the contact that carries less, and lengths to the displacement of the
-    softer one, so that a light block is not judged by the heaviest. Without any contact force lengths are relative to
+    softer one: the heaviest block does not hide the violations of a light
+    one. Without any contact force lengths are relative to
     the larger displacement of the two.
     """
     bodies, contact = solution.bodies, solution.contact

@@ -11,9 +11,9 @@ from bemkit.results.stress_measures import STRESSES
 from bemkit.results.stress_mesh import stress_mesh
 
 _ACROSS = 48
-"""Points along the longer side of the body between which the largest stress inside is sought."""
+"""Sample points along the longer side of the body in the search for the largest stress inside."""
 _STEPS = 16
-"""Times that the distance of nine points around the best one is halved."""
+"""Number of times that the spacing of the nine points around the best one is halved."""
 
 
 def largest_equivalent_stress(body: SolvedBody) -> LargestStress:

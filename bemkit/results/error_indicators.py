@@ -38,17 +38,17 @@ CONTACT_CALIBRATION = (1.0 / 8.0, 1.0 / 16.0)
 PAIR_CALIBRATION = (1.0, 2.0)
 """Further factors between two elastic bodies, where tractions follow the elements of both sides."""
 STIFFNESS_CALIBRATION = (4.0, 0.15)
-"""Factors between squared relative errors in the energy norm and errors of contact tractions, for degree 1 and higher
-ones: linear displacements along an arc also miss a part of a uniform radial one."""
+"""Factors between squared relative errors in the energy norm and relative errors of contact tractions, for degree 1 and
+for higher ones: linear displacements along an arc also miss a part of a uniform radial displacement."""
 MEAN_CALIBRATION = 1.25
 """Factor of the mean error of constant tractions on a half-plane. Without it estimates of cylinders, wedges and punches
 on uniform, graded and adaptive meshes are 0.85 to 1.6 times the error."""
 LOCAL_CALIBRATION = 1.6
-"""Further factor of the same error element by element: errors of single elements are larger by up to so much."""
+"""Further factor for the errors of single elements, which are up to that much larger."""
 TRANSITION_CALIBRATION = 0.024
 """The square of the 0.155 in the error of elements that end beside a place of change."""
 STEEPEST = 6.0
-"""Largest ratio of successive steps towards a corner: that of tractions like d**-0.5 on equal elements."""
+"""Largest ratio of successive steps towards a corner, as for tractions like d**-0.5 on equal elements."""
 
 
 def squared_errors(
@@ -103,8 +103,8 @@ def element_errors(space: BoundarySpace, displacement: FloatArray, plane_modulus
     -----
     At a node between elements of lengths a and b whose strains du/ds differ by j the estimate is E' h^2 |j|^2 / 64, on
     quadratic elements / 128, h = 2 a b / (a + b), half of it for either element. Corners and ends of boundary parts
-    are excluded: there strains may jump. So is the rigid motion of the body, which curved elements hold only as an
-    interpolant.
+    are excluded: there strains may jump. The rigid motion of the body is removed first, since curved elements only
+    interpolate it.
     """
     mesh = space.mesh
     before, after = mesh.node_elements.T
@@ -203,8 +203,8 @@ def nodal_error(
     Returns
     -------
     float or None
-        Of a contact with fewer than three nodes, which have no second difference, the tractions count as wrong; None if
-        all contacts are such.
+        Fewer than three nodes have no second difference: the whole tractions of such a contact count as their error.
+        None if all contacts are such.
     """
     errors, squared, has_estimate = contact_errors(contact, degree), 0.0, False
     errors[is_excluded] = 0.0
@@ -253,7 +253,7 @@ def mean_traction_errors(mesh: BoundaryMesh, traction: FloatArray) -> FloatArray
 
 
 def ky_fan_distance(errors: FloatArray, lengths: FloatArray) -> float:
-    """Return the smallest number that errors exceed only on that share of the length of elements with an error.
+    """Return the smallest number d such that errors exceed d only on the share d of the length.
 
     Parameters
     ----------
@@ -262,7 +262,7 @@ def ky_fan_distance(errors: FloatArray, lengths: FloatArray) -> float:
 
     Notes
     -----
-    That is Ky Fan's distance from zero: large errors count by the length on which they are made, if that is smaller.
+    This is Ky Fan's distance from zero: a large error on a short length counts only by that length.
     """
     order = np.argsort(-errors)
     worse = np.cumsum(np.append(0.0, lengths[order])) / max(float(lengths[errors > 0.0].sum()), 1e-300)

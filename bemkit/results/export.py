@@ -1,4 +1,4 @@
-"""Results in the format that the ending of a file name asks for: .h5, .json, .csv, .npz, .vtu."""
+"""Results in the format of the ending of a file name: .h5, .json, .csv, .npz, .vtu."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class Format:
 
 
 def format_of(path: str | Path, inside: int = 0) -> Format:
-    """Return the format that the ending of a file name asks for.
+    """Return the format of the ending of a file name.
 
     Parameters
     ----------

@@ -16,9 +16,9 @@ from bemkit.results.contact_table import ContactTable
 _CHANGE = 0.1
 """Change of the bound from node to node, relative to the larger one, above which it may be a jump."""
 _N_HALVINGS = 30
-"""Halvings of the way between two nodes, after which half of the change is left of a jump only."""
+"""Number of times that the interval between two nodes is halved: half of the change then remains for a jump only."""
 _AT_NODE = 1e-6
-"""Distance of a jump from a node, relative to the way between two, up to which it is at the node."""
+"""Distance from a node, relative to the node distance, within which a jump is at the node."""
 
 
 def law_jumps(contact: ContactTable, laws: Mapping[str, FrictionLaw]) -> Iterator[ResultWarning]:
@@ -50,7 +50,7 @@ def law_jumps(contact: ContactTable, laws: Mapping[str, FrictionLaw]) -> Iterato
 
 
 def _varies(law: FrictionLaw) -> bool:
-    """Whether a law has formulas or functions of the coordinates, and all else of it is numbers."""
+    """Whether a law has formulas or functions of the coordinates, and otherwise only numbers."""
     if not isinstance(law, LawOfCoefficients) or law.needs_history:
         return False
     values = law.coefficients.values()

@@ -1,4 +1,4 @@
-"""Points of a contact between its nodes, closer together where the clearance is least."""
+"""Sample points of a contact between its nodes, closer together where the clearance is least."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _SAME = 1e-13
 _SAME_POINT = 1e-9
 """Distance of neighbouring points, relative to the next one, below which they are one point: the end of an element."""
 FREE = 1e-6
-"""Traction, relative to the largest one, up to which a point carries none."""
+"""Largest traction that counts as none, relative to the largest of all."""
 
 
 class PointsBetween(NamedTuple):
@@ -33,7 +33,7 @@ class PointsBetween(NamedTuple):
     clearance : (n,) array [m]
     sigma_n, sigma_t : (n,) arrays [Pa]
     step : (n,) array [m]
-        Half of the jump of displacements to the next element, up to which the clearance of constant elements is known.
+        Half of the jump of displacements to the next element: the uncertainty of the clearance of constant elements.
     """
 
     points: FloatArray
@@ -55,9 +55,9 @@ class PointsBetween(NamedTuple):
         return np.asarray(size <= FREE * size.max(initial=0.0))
 
     def beyond_zones(self) -> PointsBetween:
-        """Return the points, infinitely far away but for those that an open point keeps apart from all with traction.
+        """Return the points, with infinite clearance at those that no open point separates from a traction.
 
-        The clearance is the largest that the step of constant elements allows. An overlap beside a contact zone
+        The clearance of constant elements is the largest that their step allows. An overlap beside a contact zone
         belongs to the end of that zone.
         """
         free, clearance = self.is_free, self.clearance + self.step
@@ -73,7 +73,7 @@ piece by piece."""
 
 
 def nearest_only(samples: Sequence[Sample], index: int) -> Sample:
-    """Return one of several functions of the same pieces, infinitely far away where another one is nearer."""
+    """Return one of several functions of the same pieces, with infinite clearance where another one is nearer."""
 
     def sample(pieces: IntArray, low: FloatArray, high: FloatArray) -> PointsBetween:
         rivals = [each(pieces, low, high) for each in samples]
@@ -98,13 +98,13 @@ def with_least_clearances(sample: Sample, n_pieces: int, xi: FloatArray) -> Poin
     Returns
     -------
     PointsBetween
-        In the order of the arc length, without those that face nothing, which are infinitely far away.
+        In the order of the arc length, without those that face nothing (their clearance is infinite).
 
     Notes
     -----
     A parabola falls below the least of three equidistant points by at most a quarter of the difference between them. An
-    interval about the least of the points is searched where that difference leads below zero: of pieces without
-    traction each one, because its contact may be missed, of the others the deepest.
+    interval about the least of the points is searched where that difference leads below zero: on every piece without
+    traction, because its contact may be missed, and on the deepest of the others.
     """
     pieces, low, high = np.arange(n_pieces), np.full(n_pieces, -1.0), np.ones(n_pieces)
     values = sample(pieces, low, high)

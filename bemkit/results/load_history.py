@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 class StepEnd(Protocol):
-    """Members of a solution that a step needs: `Solution` has them."""
+    """Members of a solution that a step needs, as `Solution` has them."""
 
     @property
     def energy(self) -> float:
@@ -46,18 +46,17 @@ class StepWork:
     Parameters
     ----------
     external_work : float [J/m]
-        Of loads, of the reactions of moving supports, and of obstacles that move towards the body. With body forces or
-        heat it is what the other entries leave.
+        Work of loads, of the reactions of moving supports, and of obstacles that move towards the body. With body
+        forces or heat it is the remainder of the balance.
     dissipation : float [J/m]
-        What friction takes up at nodes that are closed at both ends of an increment; never negative: what it would give
-        by the trapezoidal rule counts as `increment_work`.
+        Work dissipated by friction at nodes that are closed at both ends of an increment. It is never negative: a
+        negative value of the trapezoidal rule is part of `increment_work`.
     increment_work : float [J/m]
-        What the size of the increments leaves: the work of tractions where clearances open or close within one, or slip
-        turns back under a falling friction bound by so much that friction would seem to give work. It vanishes as
-        increments become smaller.
+        Error of the size of the increments: the work of tractions where clearances open or close within one, or where
+        slip reverses under a falling friction bound. It vanishes as increments become smaller.
     friction_gain : float [J/m]
-        What friction gives where it acts along the slip of an increment at its end; zero but for round-off wherever
-        friction opposes slip, and a part of no balance.
+        Work of friction where it acts along the slip of an increment at its end; round-off wherever friction opposes
+        slip. It is no part of the balance.
 
     Notes
     -----
@@ -84,7 +83,7 @@ class LoadStep:
     work : StepWork
         In this step.
     n_increments : int
-        One, or the increments in which the step was gone because one jump failed.
+        One, or the number of increments into which a failed step was divided.
     linear_solves : int
     end : Solution
         All fields at its end; see `Solution.at_step`.
@@ -118,7 +117,7 @@ class LoadStep:
 
     @property
     def slip(self) -> FloatArray:
-        """(n_contact,) array [m]: length of the path that each node has slipped so far."""
+        """(n_contact,) array [m]: accumulated slip of each node."""
         return self.motion.slip
 
     @property
@@ -165,7 +164,7 @@ class LoadHistory:
     asked : Scene
         With all steps; the scene of a solution is that of its own step.
     n_steps : int
-        Number of steps that were asked for.
+        Number of steps of the whole history.
     steps : tuple of LoadStep
     """
 
@@ -203,5 +202,5 @@ class LoadHistory:
         return abs(work.increment_work) > _COARSE * abs(work.external_work)
 
     def where(self) -> str:
-        """Say in words how far the history has come."""
+        """Describe how far the history has come."""
         return f"Finished: {len(self.steps)} of {self.n_steps} steps, up to t = {self.steps[-1].time:.6g}."

@@ -1,4 +1,4 @@
-"""Contact that the nodes do not find, because it lies between them."""
+"""Contact that no node detects, because it lies between them."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ if TYPE_CHECKING:
     from bemkit.results.solution import Solution
 
 LARGEST_APART = 1.0
-"""Least distance of sides with a contact force, relative to the displacement that contact forces cause, up to which
-they touch: mortar conditions hold in the mean, which curved sides of long elements meet apart."""
+"""Largest distance of sides that touch, relative to the displacement by contact forces. Mortar conditions hold in the
+mean: curved sides of long elements fulfil them at a distance."""
 
 
 def with_missed_contact_named(solution: Solution) -> Solution:

@@ -1,4 +1,4 @@
-"""How far contacts with rigid obstacles are from where the obstacles are, once the body has moved."""
+"""Errors of the distances from rigid obstacles after the body has moved."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from bemkit.results.solved_body import SolvedBody
 from bemkit.scene.conditions import Contact
 
 _PRESSED = 0.01
-"""Share of the largest pressure from which on a point counts as pressed."""
+"""Least pressure that counts, relative to the largest."""
 
 
 def distances_off(body: SolvedBody) -> dict[str, tuple[float, float]]:
-    """Return by how much distances from obstacles after the displacement differ from the clearances that were solved.
+    """Return the differences between distances from obstacles after the displacement and the solved clearances.
 
     Clearances are linear in the displacement, along the normal of the obstacle at its point nearest to the undeformed
-    body. A body that slides along a curved obstacle, or turns, leaves that.
+    body. This is wrong for a body that slides far along a curved obstacle, or turns.
 
     Returns
     -------

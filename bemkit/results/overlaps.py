@@ -18,8 +18,8 @@ if TYPE_CHECKING:
     from bemkit.results.solution import Solution
 
 LEAST_OVERLAP = 0.1
-"""Depth, relative to the largest displacement of both bodies, up to which it may be the error of small displacements
-beside a contact zone."""
+"""Depth that may be the error of small displacements beside a contact zone, relative to the largest displacement of
+both bodies."""
 
 
 def overlap_warnings(solution: Solution) -> Iterator[ResultWarning]:

@@ -20,7 +20,7 @@ from bemkit.solvers.active_sets import NodeStatus
 
 @dataclass(frozen=True)
 class PartForce:
-    """The resultant of what acts on a part of the boundary: contacts, the reactions of a support, or given tractions.
+    """Resultant of the contacts, reactions or loads on a part of the boundary.
 
     Parameters
     ----------
@@ -132,7 +132,7 @@ def support_forces(
 ) -> dict[str, PartForce]:
     """Sum up the reactions of supports at the nodes of each part.
 
-    The reaction at a node of several supports is divided as their tractions divide it; what these leave, equally.
+    Supports that share a node share its reaction in proportion to their tractions, and the remainder equally.
 
     Parameters
     ----------
@@ -169,7 +169,7 @@ def support_forces(
 def nodal_resultant(name: str, forces: FloatArray, acting_at: FloatArray) -> PartForce:
     """Sum up nodal forces (n, 2) [N/m] that act at points (n, 2) [m].
 
-    With such sums bodies are in equilibrium to round-off; the moment of tractions differs by the error of the mesh.
+    These sums are in equilibrium to round-off; the moment of the tractions differs by the error of the mesh.
     """
     moment = float(acting_at[:, 0] @ forces[:, 1] - acting_at[:, 1] @ forces[:, 0])
     return PartForce(name, float(forces[:, 0].sum()), float(forces[:, 1].sum()), moment)
@@ -203,7 +203,7 @@ def contact_forces(
 
 
 def forces_on_parts(on_sides: Iterable[tuple[tuple[str, str], PartForce]]) -> dict[str, dict[str, PartForce]]:
-    """Add up what contacts exert on sides of bodies, by the names of body and part."""
+    """Sum the forces of contacts on sides of bodies, by the names of body and part."""
     forces: dict[str, dict[str, PartForce]] = {}
     for (body, part), force in on_sides:
         own = forces.setdefault(body, {})

@@ -1,4 +1,4 @@
-"""Distribution of contact pressures: which share of a contact bears how much."""
+"""Distribution of contact pressures: the share of a contact in each interval of pressures."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from bemkit.results.contact_table import ContactTable
 from bemkit.table import column
 
 _FEWEST, _MOST, _NODES = 8, 32, 8
-"""Intervals of equal width from zero to the largest pressure, and nodes that each holds on average if there are more
-than the fewest."""
+"""Least number of intervals of equal width from zero to the largest pressure, and the mean number of nodes in each if
+there are more."""
 
 
 @dataclass(frozen=True)

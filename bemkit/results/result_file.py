@@ -85,7 +85,7 @@ _MAX_PLAN = 1_000_000
 
 
 def check_result_target(path: str | Path) -> Path:
-    """Find out, before any work is done, whether a result can be written to a file.
+    """Check, before any computation, that a result can be written to a file.
 
     Raises
     ------
@@ -103,7 +103,7 @@ def write_result(path: str | Path, solution: Solution) -> None:
     Parameters
     ----------
     path : str or Path
-        Of the file, usually ``.h5``.
+        Path of the file, usually ``.h5``.
     solution : Solution
 
     Raises
@@ -123,7 +123,7 @@ class ResultWriter:
     Parameters
     ----------
     path : str or Path
-        Of the file; a result that is there is replaced when the first step is written.
+        Path of the file. An existing result is replaced when the first step is written.
 
     Raises
     ------
@@ -144,7 +144,7 @@ class ResultWriter:
             self._growing.close()
 
     def append(self, solution: Solution) -> None:
-        """Bring the file on the disk up to the last step of the load history of a solution.
+        """Append the new steps of the load history of a solution to the file on the disk.
 
         Another history than before, on a finer mesh for example, begins the file anew.
 
@@ -184,7 +184,7 @@ class ResultWriter:
         return self._growing
 
     def _begun(self, solution: Solution) -> GrowingFile:
-        """Return a new file with all that steps have in common."""
+        """Return a new file with the data that all steps share."""
         texts = {"scene": scene_to_toml(solution.stated), "plan": json.dumps(unstructure(solution.plan))}
         if solution.stated.touching:
             texts["listed"] = scene_to_toml(solution.scene)

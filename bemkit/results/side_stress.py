@@ -27,7 +27,7 @@ SIDE_COLUMNS = (
 )
 HOOP = "hoop"
 _TOLERANCE = 1e-9
-"""Error of the local coordinate of the largest stress, whose value is flat there."""
+"""Tolerance of the local coordinate of the largest stress, which hardly changes the value."""
 
 
 def side_stress(boundary: BoundaryStress, mesh: BoundaryMesh, part: str) -> Table:
@@ -92,7 +92,7 @@ def largest_stress(boundary: BoundaryStress, measure: str = "von-mises", part: s
 
 
 def _refined(size: Callable[[float], float], xi: FloatArray, best: int) -> float:
-    """Return where a function on an element is largest, near the best of some local coordinates."""
+    """Return the local coordinate of the maximum of a function on an element, near the best sample."""
     from scipy.optimize import minimize_scalar
 
     low, high = xi[max(best - 1, 0)], xi[min(best + 1, len(xi) - 1)]

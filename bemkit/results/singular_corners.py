@@ -1,4 +1,4 @@
-"""Corners at which contact tractions grow without bound, so that no element there has a small error of them.
+"""Corners at which contact tractions are singular, so that the elements there have large errors of tractions.
 
 A block that slides on its whole side is the simplest case: towards its corners the pressure grows like a power of the
 distance that depends on the friction. The exponents are those of `bemkit.results.wedge`.
@@ -26,9 +26,9 @@ from bemkit.scene.conditions import Clamped, Contact, PrescribedDisplacement, Ro
 from bemkit.solvers.active_sets import NodeStatus
 
 _PARALLEL = 1e-6
-"""Component along the normal, or along the tangent, that is none."""
+"""Component along the normal or the tangent that counts as zero."""
 DIGITS = 6
-"""Digits of angles: round-off of short elements must not separate equal ones."""
+"""Digits to which angles are rounded: round-off of short elements must not separate equal ones."""
 BEFORE, AFTER = 0, 1
 """The element that ends at a node, and the one that starts there."""
 
@@ -43,8 +43,8 @@ class SingularCorner:
     exponent : float
         Tractions behave like ``r**(exponent - 1)``; see `bemkit.results.wedge.leading_exponent`.
     before, after : tuple of int
-        The elements in contact within `NEIGHBOURHOOD`, at least one, from the corner on: back along the boundary and
-        on along it. None where that side is not in contact.
+        The elements in contact within `NEIGHBOURHOOD` of the corner, at least one on each side in contact: before the
+        corner along the boundary, and after it. Empty for a side that is not in contact.
     partner : str
         The other elastic body; empty at a rigid obstacle.
     """
@@ -76,8 +76,8 @@ def singular_corners(
 ) -> tuple[SingularCorner, ...]:
     """Return the corners and ends of contact parts at which contact tractions grow without bound.
 
-    Contact reaches them, and what is given on their two sides lets tractions grow; contact nodes beside them show
-    whether they stick, and which way they slip. None on symmetry lines, where nothing is singular, and on half-planes.
+    Contact reaches them, and the conditions on their two sides admit singular tractions. The contact nodes beside them
+    show whether they stick, and the direction of slip. Symmetry lines and half-planes have none.
 
     Parameters
     ----------

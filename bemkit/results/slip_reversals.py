@@ -28,9 +28,8 @@ class SlipReversal(NamedTuple):
 def slip_reversals(contact: ContactTable) -> tuple[SlipReversal, ...]:
     """Return where the direction of slip changes along contacts, directly or at a single node that sticks.
 
-    Between opposite directions lies a stick zone, on which tangential tractions turn over; here the mesh does not
-    resolve it. Stick zones of several nodes have ends of their own, see `resolved_transitions`. Where there is no
-    friction, directions mean nothing.
+    Between opposite directions lies a stick zone, where the tangential traction changes sign; here the mesh does not
+    resolve it. For stick zones of several nodes see `resolved_transitions`. Parts without friction are skipped.
     """
     direction = np.where(contact.status == NodeStatus.SLIP_FORWARD, 1.0, 0.0)
     direction[contact.status == NodeStatus.SLIP_BACKWARD] = -1.0

@@ -50,7 +50,7 @@ class Solution(SolvedScene, Explorable):
     history : tuple of StepRecord
     linear_solves, outer_steps : int
     timings : mapping of str to float [s]
-        Of each stage of the run, and of all.
+        Times of each stage of the run, and of all.
     plan : Plan
     work : OperationCounts
         Counts of integrals, factorisations and solves; equal to ``plan.work`` if all load steps converged.
@@ -85,7 +85,7 @@ class Solution(SolvedScene, Explorable):
 
     @property
     def is_converged(self) -> bool:
-        """Whether the result is certified and, if an accuracy was asked for, as accurate."""
+        """Whether the result is certified and reaches the accuracy that the scene asks for, if any."""
         return self.status is Status.CONVERGED
 
     @property
@@ -124,8 +124,8 @@ class Solution(SolvedScene, Explorable):
     def estimated_error(self) -> float | None:
         """Estimated error of all bodies in the energy norm, sqrt(a(u - u_h, u - u_h) / a(u_h, u_h)).
 
-        None without an estimate, and where the energy is not positive, so that an error is measured against nothing;
-        zero of bodies at rest, or that only move as a whole. None, too, while contact is missed that no node meets.
+        Zero for bodies at rest or in rigid motion. None without an estimate, without a positive energy to which an
+        error is relative, and while contact between the nodes is missed.
         """
         if self.unfound_contacts:
             return None
@@ -142,7 +142,7 @@ class Solution(SolvedScene, Explorable):
 
     @cached_property
     def places(self) -> ContactPlaces:
-        """Places of contacts on the bodies, and what happens there."""
+        """Singular corners, edges and ends of zones of the contacts."""
         from bemkit.results.contact_places import ContactPlaces
 
         return ContactPlaces(self, lambda: self.missed_contacts)
@@ -156,9 +156,9 @@ class Solution(SolvedScene, Explorable):
     def estimated_traction_error(self) -> float | None:
         """Estimated error of the contact tractions of all bodies in L2, relative to their norm.
 
-        Without those at `singular_corners` and at edges that press into another side. Of a half-plane that of all
-        tractions but loads, in the mean. None without an estimate, without such tractions, and where fewer than three
-        nodes carry them.
+        Tractions at `singular_corners` and at edges that press into another side are excluded. For a half-plane, the
+        mean error of all tractions except loads. None without an estimate, without such tractions, and if fewer than
+        three nodes carry them.
         """
         bodies = tuple(self.bodies.values())
         if len(bodies) == 1 and bodies[0].surface_errors is not None:
@@ -216,10 +216,7 @@ class Solution(SolvedScene, Explorable):
 
     @cached_property
     def unfound_contacts(self) -> dict[str, tuple[float, float]]:
-        """The missed contacts without any force, and those of a few nodes that are much deeper than forces move them.
-
-        Contacts of more nodes are not measured for it.
-        """
+        """The missed contacts without force, and those of a few nodes that overlap deeply; see `unfound_contacts`."""
         return unfound_contacts(self.contact, self.narrow_contacts_between_nodes)
 
     @cached_property
@@ -229,7 +226,7 @@ class Solution(SolvedScene, Explorable):
 
     @property
     def unasked_warnings(self) -> Any:
-        """The warnings, or the function that will find them: what a solution that replaces this one takes over."""
+        """The warnings, or the function that finds them later, for a solution that replaces this one."""
         return WhenAsked.held(self, "warnings")
 
     def with_warnings(self, warnings: tuple[ResultWarning, ...] | Callable[[Any], tuple[ResultWarning, ...]]) -> Self:

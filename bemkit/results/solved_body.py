@@ -91,12 +91,12 @@ class SideName(NamedTuple):
 
 
 _FREE_SHARE = 1e-16
-"""Share of the energy of a heated body that cannot expand at all, up to which a body counts as free to expand."""
+"""Largest energy of a heated body that counts as free to expand, relative to the energy if it could not expand."""
 
 
 _ROUND_OFF = 1e-13
-"""Differences of displacements, relative to the largest one, that may be round-off: up to 2e-14 is measured of bodies
-that only move as a whole."""
+"""Differences of displacements that may be round-off, relative to the largest one: up to 2e-14 was measured on bodies
+in rigid motion."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,7 +108,7 @@ class SolvedBody:
     name : str
         Empty if the scene names no bodies.
     scene : BodyScene
-        The part of the scene that is about it, in the coordinates of its shape.
+        Its part of the scene, in the coordinates of its shape.
     mesh : BoundaryMesh
         In its place.
     boundary : BoundaryFields
@@ -116,7 +116,7 @@ class SolvedBody:
         Elastic energy: half the work of the stresses in the plane on the strains that they cause. In plane strain heat
         also compresses the body along its length, which costs E (alpha T)^2 / 2 per volume, not counted here.
     contact_forces : mapping of str to PartForce
-        What contacts exert on each part that is in contact; see `bemkit.results.part_forces.forces_on_parts`.
+        Forces of contacts on each part in contact; see `bemkit.results.part_forces.forces_on_parts`.
     """
 
     name: str
@@ -132,7 +132,7 @@ class SolvedBody:
 
     @cached_property
     def map_tags(self) -> frozenset[Tag]:
-        """Promises of its elastic map: whether it is symmetric, and which motions cause no forces."""
+        """Properties of its elastic map: whether it is symmetric, and which motions cause no forces."""
         return self.scene.discretisation.elastic_map(self.mesh, self.scene.material, DenseCholesky()).tags
 
     @cached_property
@@ -218,7 +218,7 @@ class SolvedBody:
 
     @cached_property
     def map_boundary(self) -> BoundaryFields:
-        """The fields on the boundary less the particular solution, which has no discretisation error."""
+        """The fields on the boundary without the particular solution, which has no discretisation error."""
         if self.particular is None:
             return self.boundary
         total, mesh = self.boundary, self.mesh.unit
@@ -312,6 +312,6 @@ class SolvedBody:
 
     @property
     def energy_of_round_off(self) -> float:
-        """Elastic energy [J/m] that round-off may leave of a body that only moves as a whole."""
+        """Elastic energy [J/m] of a rigid motion that may be round-off."""
         moved = float(np.abs(self.boundary.displacement).max(initial=0.0))
         return self.scene.material.plane_modulus * (_ROUND_OFF * moved) ** 2

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 class SolvedSteps(ShownInNotebooks, tuple[Solution, ...]):
-    """The solutions of load steps in their order, never none."""
+    """The solutions of load steps in their order, at least one."""
 
     __slots__ = ()
 
@@ -56,8 +56,8 @@ def with_times(result: Solution, solutions: Sequence[Solution]) -> Solution:
 def following(so_far: Solution | None, solution: Solution, stated: Scene, number: int, n_steps: int) -> Solution:
     """Return a step of a load history with the records, solves, times, memory and warnings of all before it.
 
-    Of each kind and subject of warnings the last one is kept, and names its step unless that is this one; `at_step` has
-    those of a step.
+    The last warning of each kind and subject is kept; it names its step if that is an earlier one. `at_step` has the
+    warnings of a single step.
 
     Parameters
     ----------
@@ -95,7 +95,7 @@ def continued(records: Sequence[StepRecord], further: Iterable[StepRecord], word
     records : sequence of StepRecord
         Of the solves before.
     further : iterable of StepRecord
-        Of the next one: its steps and linear solves go on where those of the solves before end.
+        Of the next one: its steps and linear solves are counted from the end of those before.
     words : str
         Begin the messages of the further records.
     """

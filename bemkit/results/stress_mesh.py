@@ -24,24 +24,25 @@ from bemkit.results.interior import interior_fields
 from bemkit.results.solved_body import SolvedBody
 
 _STEP = 1.4
-"""Distance of the first points inside from the boundary, in lengths of their elements: half as far from constant
-elements stresses are wrong by a thirtieth, there by two hundredths of that."""
+"""Distance of the first points inside from the boundary, in lengths of their elements. At half of it stresses beside
+constant elements are wrong by 3 %, at this distance by 0.07 %."""
 _NEAREST = 0.7
-"""Distance of points of a layer from all elements, by that from their own, below which others are closer."""
+"""Least distance of a point of a layer from all elements, relative to that from its own."""
 _SMALLEST = 1.0 / 8.0
-"""Distance of neighbours, by the spacing far from the boundary, below which points are not seen apart."""
+"""Least distance of neighbours, relative to the spacing far from the boundary."""
 _CROWDED = 0.25
-"""Distance of points of a layer, by that from the boundary, below which one of them represents all."""
+"""Least distance between points of a layer, relative to that from the boundary: one represents all that are closer."""
 _GROWTH = 2.0
 """Growth of the distances from the boundary, from one layer of points to the next."""
 _INTERVALS = (2, 2, 4, 8)
 """Intervals of straight elements of degrees 0, 1, 2 and more; curved elements have the most."""
 _MOST_DIVISIONS = 8
-"""Times that an edge of the boundary is halved until it is an edge of triangles: sharp corners go on for ever."""
+"""Largest number of times that an edge of the boundary is halved until triangles have it; sharp corners would need more
+and more."""
 _NODE = 1e-9
 """Distance from the start of an element, in its local coordinate, within which a place counts as the node."""
 _FLAT = 1e-12
-"""Area of a triangle, by the square of the size of the body, that is round-off."""
+"""Area of a triangle that is round-off, relative to the square of the size of the body."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,7 +138,7 @@ class _Ring:
 
     @classmethod
     def on(cls, boundary: BoundaryStress, loop: IntArray, spacing: float) -> _Ring:
-        """Return places on all elements; of those that are not seen apart the one of largest stress, and corners."""
+        """Return places on all elements and at corners; of close places only the one of largest stress."""
         mesh, degree = boundary.mesh, boundary.space.degree
         lengths = mesh.lengths[loop]
         counts = np.where(mesh.is_straight[loop], _INTERVALS[min(degree, 3)], _INTERVALS[-1])

@@ -37,7 +37,7 @@ def _lines(name: str, text: str) -> list[tuple[str, str]]:
 
 
 def summary_rows(solution: Solution) -> Iterator[tuple[str, str]]:
-    """Yield names and texts of all that a summary says of a result, numbers with their units."""
+    """Yield the names and texts of the rows of a summary, numbers with their units."""
     yield "status", _status(solution)
     if (thickness := solution.scene.thickness) is not None:
         yield "thickness", _amount(thickness, "length", solution.units)
@@ -84,7 +84,7 @@ def _bodies_rows(solution: Solution) -> Iterator[tuple[str, str]]:
 
 
 def _notes(shape: Shape) -> str:
-    """Return what was done to read the outline of a body, in lines."""
+    """Return notes on how the outline of a body was read, in lines."""
     drawing = shape.outline().drawing
     return "" if drawing is None else "\n".join(drawing.notes)
 
@@ -129,7 +129,7 @@ def _vector(x: float, y: float, quantity: str, units: UnitNames | None) -> str:
 
 
 def _part_rows(solution: Solution) -> Iterator[tuple[str, str]]:
-    """Yield resultants on the parts of the bodies, and how rigid bodies moved and what acts on them."""
+    """Yield the resultants on the parts of the bodies, and the motions and forces of rigid bodies."""
     units = solution.units
     forces = part_facts(solution)
     for fact in forces[:_MANY_CONTACTS]:

@@ -35,13 +35,13 @@ class SurfaceErrors:
 
     @classmethod
     def of(cls, mesh: BoundaryMesh, traction: FloatArray, is_loaded: BoolArray) -> SurfaceErrors:
-        """Estimate the errors of tractions (n_elements, 2), but those that loads give."""
+        """Estimate the errors of tractions (n_elements, 2) without loads."""
         sizes = np.where(is_loaded, 0.0, np.linalg.norm(traction, axis=1))
         errors = np.where(is_loaded, 0.0, mean_traction_errors(mesh, traction))
         return cls(mesh.lengths, sizes, errors, float(mesh.lengths @ sizes))
 
     def at_worst(self, others: Sequence[SurfaceErrors]) -> SurfaceErrors:
-        """Return the same tractions with the largest errors of several load steps, by the largest of their totals."""
+        """Return the largest errors of several load steps, relative to the largest of their totals."""
         largest = np.stack([other.errors for other in others]).max(axis=0)
         return replace(self, errors=largest, total=max(other.total for other in others))
 
@@ -54,7 +54,7 @@ class SurfaceErrors:
     def local(self) -> FloatArray:
         """(n_elements,) array [-]: errors by the length of their element, relative to its traction.
 
-        Tractions below the mean of those that there are count as that mean.
+        Tractions below their mean count as the mean.
         """
         carrying = float(self.lengths @ (self.sizes > 0.0))
         mean = self.total / carrying if carrying else 1.0
@@ -62,5 +62,5 @@ class SurfaceErrors:
 
     @property
     def largest(self) -> float | None:
-        """The largest local error but on an equally small share of the length that has one; None without tractions."""
+        """The largest local error, except on a share of the length no larger than itself; None without tractions."""
         return ky_fan_distance(self.local, self.lengths) if self.total > 0.0 else None

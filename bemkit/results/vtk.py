@@ -36,7 +36,7 @@ _CONTACT = ("u_n", "u_t", "sigma_n", "sigma_t", "gap", "clearance", "status", "w
 
 @dataclass(frozen=True)
 class Block:
-    """Points (n, 2), cells (m, k) of them, and values at both; what a block lacks is not a number.
+    """Points (n, 2), cells (m, k) of them, and values at both; missing values are not a number.
 
     Cells are of the kind vertex, line or triangle.
     """
@@ -54,7 +54,7 @@ def write_vtk_xml(path: Path, blocks: Sequence[Block]) -> None:
     Raises
     ------
     OutputFileError
-        If the system refuses.
+        If the file cannot be written.
     """
     blocks = [block for block in blocks if len(block.cells)]
     counts = [len(block.points) for block in blocks]

@@ -38,21 +38,21 @@ LARGEST_STRAIN = 0.1
 STRAINED_SHARE = 0.05
 """That share. In theory strains at corners and ends of parts have no bound, but on short lengths only."""
 LARGEST_PENETRATION = 0.2
-"""Penetration between the nodes, as `BetweenNodes` measures it, above which nodes do not feel the contact: a cylinder
-pressed by constant elements on a zone of six of them comes to that."""
+"""Largest penetration between the nodes without a warning, as `BetweenNodes` measures it: that of a cylinder on six
+constant elements."""
 LARGEST_FREE_PENETRATION = 5e-3
-"""The same of a contact without any force, which would be about as large a share of the forces on its bodies."""
+"""The same for a contact without force: the missing force would be about this share of the forces on its bodies."""
 LARGEST_DISTANCE_OFF = 0.2
-"""Difference between distances from an obstacle after the displacement and the clearances that were solved, relative to
-the displacement that the contact force causes, above which contact is no longer where it was solved."""
+"""Largest difference between distances from an obstacle after the displacement and the solved clearances without a
+warning, relative to the displacement by the contact force."""
 FEWEST_NODES = 4
-"""Contact nodes that resolve a zone: fewer show neither its size nor its largest traction."""
+"""Least number of contact nodes that resolve a zone, its size and its largest traction."""
 _CLOSED = 1e-9
 """Clearance, relative to the largest one, up to which a node counts as closed: round-off of zero."""
 
 
 def find_warnings(solution: Solution) -> tuple[ResultWarning, ...]:
-    """Return the warnings about a solution, first those of its plan, at most three of each kind and their number."""
+    """Return the warnings about a solution, first those of its plan; at most three of a kind, then their number."""
     if not solution.is_certified:
         return solution.plan.warnings
     remedy = _remedy(solution.bodies.values())
@@ -105,7 +105,7 @@ def _remedy(bodies: Iterable[SolvedBody]) -> str:
 
 
 def _unbounded_tractions(solution: Solution) -> Iterator[ResultWarning]:
-    """Warn of singular contact tractions, whose estimated error excludes the corner; once of one of two bodies."""
+    """Warn of singular contact tractions at corners, which the estimated error excludes; once for two bodies."""
     corners: dict[tuple[float, float, tuple[str, ...]], tuple[float, float]] = {}
     for name, body in solution.bodies.items():
         if not body.scene.discretisation.estimates_error:
@@ -160,7 +160,7 @@ def _error(solution: Solution, remedy: str) -> Iterator[ResultWarning]:
 
 
 def _without_estimate(body: SolvedBody) -> Iterator[ResultWarning]:
-    """Warn of elements without a neighbour on their piece, which have no jumps of strains; of degree 1 and 2."""
+    """Warn of linear and quadratic elements that have no estimate, because they have no neighbour on their part."""
     discretisation = body.scene.discretisation
     if not discretisation.estimates_error or body.coefficient_errors is not None:
         return  # elements of high degree are judged by themselves
@@ -191,7 +191,7 @@ def _without_estimate(body: SolvedBody) -> Iterator[ResultWarning]:
 
 
 def _turned(body: SolvedBody) -> Iterator[ResultWarning]:
-    """Warn of constant elements without slopes, which take rotation for strain, if the rotation is larger."""
+    """Warn of a rotation that exceeds the strain of constant elements, whose steps confuse both."""
     if Tag.KILLS_TRANSLATIONS not in body.map_tags:
         return
     mesh = body.mesh
@@ -210,7 +210,7 @@ def _turned(body: SolvedBody) -> Iterator[ResultWarning]:
 
 
 def _large_strains(body: SolvedBody) -> Iterator[ResultWarning]:
-    """Warn of displacements that vary too much along the boundary to be small, by strain or by rotation."""
+    """Warn of strains or rotations that are not small."""
     gradients, lengths = boundary_gradients(body)
     largest_first = np.argsort(gradients)[::-1]
     share = np.cumsum(lengths[largest_first]) / lengths.sum()
@@ -227,7 +227,7 @@ def _large_strains(body: SolvedBody) -> Iterator[ResultWarning]:
 
 
 def _moved_contacts(body: SolvedBody, units: UnitNames | None) -> Iterator[ResultWarning]:
-    """Warn of contacts with obstacles along which the body moves so far that their gaps have become others."""
+    """Warn of bodies that move so far along obstacles that their gaps change."""
     if not body.scene.contact_parts:
         return
     from bemkit.results.moved_contacts import distances_off
@@ -282,7 +282,7 @@ def _coarse_curves(mesh: BoundaryMesh) -> Iterator[ResultWarning]:
 
 
 def _narrow_zones(contact: ContactTable, smooth: Collection[str], remedy: str) -> Iterator[ResultWarning]:
-    """Warn of zones of contact, separation, stick and slip of few nodes; without friction not of stick and slip.
+    """Warn of zones of contact or separation, with friction also of stick or slip, that have few nodes.
 
     A contact-free state has no zones, only round-off.
     """
@@ -311,7 +311,7 @@ def _narrow_zones(contact: ContactTable, smooth: Collection[str], remedy: str) -
 def _hidden_overlaps(
     contacts: Mapping[str, BetweenNodes], table: ContactTable, units: UnitNames | None, remedy: str
 ) -> Iterator[ResultWarning]:
-    """Warn of contacts whose sides overlap between the nodes, by a share of the displacement by contact forces."""
+    """Warn of contacts whose sides overlap between the nodes, relative to the displacement by contact forces."""
     is_pressed = bool(table.sigma_n.any() or table.sigma_t.any())
     length = (
         "the displacement that contact forces cause" if is_pressed else "how far bodies move, without contact forces"
@@ -346,7 +346,7 @@ def _zones(contact: ContactTable, chosen: BoolArray) -> list[IntArray]:
 
 
 def _enclosed(contact: ContactTable, chosen: BoolArray) -> BoolArray:
-    """Return the chosen nodes (n_contact,) whose run has a neighbour on each side."""
+    """Return the chosen nodes (n_contact,) in runs that have other nodes on both sides."""
     joined = np.concatenate([[False], contact.is_joined, [False]])
     is_enclosed = np.zeros(chosen.size, bool)
     for zone in _zones(contact, chosen):

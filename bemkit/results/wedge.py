@@ -1,4 +1,4 @@
-"""How fast fields grow towards a corner of a body, by what is given on its two sides, after [Williams1952].
+"""Exponents of the fields at a corner of a body from the conditions on its two sides, after [Williams1952].
 
 Near a corner displacements without loads are sums of r^lambda times functions of the angle theta. With Airy's function
 r^(lambda + 1) F(theta), where F combines cosines and sines of (lambda + 1) theta and (lambda - 1) theta, the four
@@ -56,7 +56,7 @@ FREE, ROLLER, HELD = WedgeSide(), WedgeSide(holds_normal=True), WedgeSide(holds_
 
 @lru_cache(maxsize=256)
 def leading_exponent(angle: float, outgoing: WedgeSide, incoming: WedgeSide, kappa: float) -> float | None:
-    """Return the exponent of the displacements where tractions grow without bound like a power of the distance.
+    """Return the exponent of the displacements if tractions are singular like a power of the distance.
 
     Parameters
     ----------
@@ -70,9 +70,8 @@ def leading_exponent(angle: float, outgoing: WedgeSide, incoming: WedgeSide, kap
     Returns
     -------
     float or None
-        The smallest real part of all roots lambda between 0 and 1; None if there is none, so that tractions stay
-        bounded but for logarithms where loads jump. Roots closer to 1 than 0.005, which hardly let anything grow, may
-        be missed.
+        The smallest real part of all roots lambda between 0 and 1. None if there is none: tractions are then bounded,
+        or logarithmic where loads jump. Roots within 0.005 of 1, nearly regular, may be missed.
     """
 
     def conditions(exponent: ComplexArray) -> ComplexArray:
@@ -108,7 +107,7 @@ class JoinedWedge:
 def joined_exponent(first: JoinedWedge, second: JoinedWedge, contact: WedgeSide) -> float | None:
     """Return the exponent of the displacements at a corner where two elastic bodies touch along one side of each.
 
-    Both stick and are one wedge of two materials, or slide on each other.
+    The bodies stick and form one wedge of two materials, or slide on each other.
 
     Parameters
     ----------

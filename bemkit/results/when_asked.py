@@ -1,4 +1,4 @@
-"""An entry of a frozen value that is worked out when somebody asks for it."""
+"""A field of a frozen value that is computed on first access."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ Value = TypeVar("Value")
 
 
 class WhenAsked(Generic[Value]):
-    """A field of a dataclass that holds its value, or a function of the whole that returns it, called at most once.
+    """A dataclass field that holds its value, or a function of the instance that computes it once.
 
-    Type checkers see only the value. Where the field may be a function, a method of the class takes it.
+    Type checkers see only the value; a method of the class accepts a function.
 
     Parameters
     ----------
     default : Value
-        Nothing that is callable, as no other value either.
+        Must not be callable; nor must any other value.
     """
 
     def __init__(self, default: Value) -> None:
@@ -25,9 +25,9 @@ class WhenAsked(Generic[Value]):
 
     @staticmethod
     def held(instance: Any, name: str) -> Any:
-        """Return what a field holds, its value or the function that nobody has asked yet.
+        """Return the content of a field: its value, or the function that has not been called yet.
 
-        `dataclasses.replace` asks for every field that it is not given.
+        `dataclasses.replace` evaluates every field that it does not replace.
         """
         return instance.__dict__[_key_of(name)]
 

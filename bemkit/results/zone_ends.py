@@ -15,11 +15,11 @@ from bemkit.geometry.neighbours import along_boundary
 from bemkit.geometry.vectors import norms
 
 LYING_ON = 1e-2
-"""Distance, relative to the shorter of two sides, up to which one lies on the other."""
+"""Distance within which one side lies on another, relative to the shorter of both."""
 NEIGHBOURHOOD = 1e-3
-"""Share of the length of a part within which its elements belong to a place where tractions have no bound."""
+"""Distance from a singular point within which elements belong to it, relative to the length of the part."""
 LYING_AT = 1e-9
-"""Distance, relative to a side, within which an element ends at a point."""
+"""Distance within which an element ends at a point, relative to the side."""
 _MOST_STEPS = 20
 """Steps of Newton's method for the point on a curved element: two or three are enough."""
 
@@ -52,7 +52,7 @@ class Side:
     mesh : BoundaryMesh
     part : str
     zone_length : float, optional [m]
-        To which elements at ends of zones are compared; by default the length of the side.
+        Length to which elements at ends of zones are compared; by default that of the side.
     """
 
     body: str
