@@ -139,7 +139,7 @@ def space_of(body: SolvedBody) -> BoundarySpace:
 
 def values_at(space: BoundarySpace, at_nodes: FloatArray, places: Located) -> FloatArray:
     """Return the values (m, q, c) of a function with the values (n_elements, n_local, c) at the local nodes."""
-    basis = space.basis(places.xi.ravel()).T.reshape(*places.xi.shape, -1)
+    basis = space.basis(places.xi.ravel()).T.reshape(*places.xi.shape, at_nodes.shape[1])
     return np.asarray(np.einsum("mql,mqlc->mqc", basis, at_nodes[places.elements]))
 
 
