@@ -1,4 +1,4 @@
-"""The commands ``bemkit scenes``, ``schema`` and ``cite``: what there is to read, to write and to name."""
+"""The commands ``bemkit scenes``, ``schema`` and ``cite``: scenes, their schema, and references."""
 
 from __future__ import annotations
 

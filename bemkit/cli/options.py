@@ -85,7 +85,7 @@ def outputs_of(
     table: str = "contact",
     what: tuple[str, ...] | None = None,
 ) -> Outputs[Solution]:
-    """Return where the command line sends a solution, besides a result file."""
+    """Return the outputs of a solution that the command line asks for, besides a result file."""
     if what is not None and folder is None:
         raise click.UsageError("--what names figures: add --plot DIR")
     if json_file is csv_file is folder is None:
@@ -108,7 +108,7 @@ def outputs_of(
 
 
 def names_of_scenes(scenes: Sequence[str], *, writes: bool) -> list[str]:
-    """Return what the outputs of each scene are called after; empty for a single scene.
+    """Return the names for the outputs of each scene; empty for a single scene.
 
     Parameters
     ----------
@@ -157,7 +157,7 @@ def write_animation(solution: Solution, folder: str | None, what: tuple[str, ...
 
 
 def study_output(target: str | None, table: Callable[[Content], Table]) -> tuple[str | None, TableFile[Content]]:
-    """Return the file of ``-o`` that keeps rows as they are ready, .jsonl, and the one that gets the whole table."""
+    """Return the file of ``-o`` for finished rows, .jsonl, and that for the whole table."""
     keeps_rows = target is not None and target.lower().endswith(".jsonl")
     return (target, TableFile(None, table)) if keeps_rows else (None, TableFile(target, table))
 
@@ -176,7 +176,7 @@ def is_watched(quiet: bool) -> bool:
 
 
 def shown_progress(quiet: bool) -> AbstractContextManager[Callable[[StepRecord], None] | None]:
-    """Return what shows a person how far a command is; nothing where nobody looks."""
+    """Return the progress display of a command; nothing without a terminal."""
     if not is_watched(quiet):
         return nullcontext()
     from bemkit.cli.progress import live_progress
@@ -185,7 +185,7 @@ def shown_progress(quiet: bool) -> AbstractContextManager[Callable[[StepRecord],
 
 
 class StudyProgress(ExitStack):
-    """Shows that a study begins, in a ``with`` statement around what it loads and prepares, and then its tasks.
+    """Shows the preparation of a study in a ``with`` statement, and then its tasks.
 
     Parameters
     ----------

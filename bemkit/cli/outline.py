@@ -1,4 +1,4 @@
-"""The command ``bemkit outline``: what is read of a mesh, drawing or scene file, and a scene to start from."""
+"""The command ``bemkit outline``: the body in a mesh, drawing or scene file, and a scene to start from."""
 
 from __future__ import annotations
 

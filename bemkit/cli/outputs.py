@@ -44,7 +44,7 @@ class TextFile(Generic[Content]):
     text: Callable[[Content], str]
 
     def check(self) -> list[Path]:
-        """Find out, before any work is done, whether the text can be written; return the file, if it is one.
+        """Check, before any computation, that the text can be written; return the file, if any.
 
         Raises
         ------
@@ -79,7 +79,7 @@ class TableFile(Generic[Content]):
     table: Callable[[Content], Table]
 
     def check(self) -> list[Path]:
-        """Find out, before any work is done, whether the table can be written; return the file, if there is one.
+        """Check, before any computation, that the table can be written; return the file, if any.
 
         Raises
         ------
@@ -125,7 +125,7 @@ class Outputs(Generic[Content]):
     figures : callable (content) -> mapping of str to Figure
         By file names without ``.png``.
     figure : str
-        Name of one of them: if it can be written, any other can.
+        Name of one figure, to check that figures can be written.
     dots_per_inch : int
     """
 
@@ -141,7 +141,7 @@ class Outputs(Generic[Content]):
         return any(text.target == STDOUT for text in self.texts)
 
     def check(self, others: Sequence[Path] = ()) -> list[Path]:
-        """Find out, before any work is done, whether everything can be written, `others` besides; return all files.
+        """Check, before any computation, that these outputs and `others` can be written; return all files.
 
         Raises
         ------

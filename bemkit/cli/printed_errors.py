@@ -14,7 +14,7 @@ from bemkit.reference.compare import MEASURES, Reference
 from bemkit.studies.accuracy.records import ErrorRecord, by_series, fitted_rate, orders, pareto_front
 
 WIDE = 100
-"""Width of a terminal from which on stages, memory and estimates are shown; the files hold them in any case."""
+"""Least width of a terminal for stages, memory and estimates; files always have them."""
 SHORT = {name: name for name in MEASURES} | {
     "displacement": "displ.",
     "force_normal": "force_n",
@@ -24,7 +24,7 @@ SHORT = {name: name for name in MEASURES} | {
 
 
 def print_reference(title: str, reference: Reference, console: Console | None = None) -> None:
-    """Print what errors are measured against and how far that may be wrong itself."""
+    """Print the reference of the errors and its own uncertainty."""
     console = _console(console)
     console.print(Text(title, style="bold"))
     console.print(Text(f"reference: {reference.source}"))
@@ -35,7 +35,7 @@ def print_reference(title: str, reference: Reference, console: Console | None = 
 
 
 def print_study(records: Sequence[ErrorRecord], measures: Sequence[str], console: Console | None = None) -> None:
-    """Print all series, their fitted orders, and what is fastest for which error."""
+    """Print all series, their fitted orders, and the fastest run for each error."""
     console = _console(console)
     fronts = {measure: pareto_front(records, measure) for measure in measures}
     marked: dict[str, set[object]] = {measure: {record.key for record in front} for measure, front in fronts.items()}

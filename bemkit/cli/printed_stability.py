@@ -34,14 +34,14 @@ def print_axis(axis: Axis, records: Sequence[StabilityRecord]) -> None:
 
 
 def print_left_out(reasons: Mapping[str, str]) -> None:
-    """Print which axes say nothing of a scene, and why."""
+    """Print the axes that do not apply to a scene, and the reasons."""
     console = stdout_console()
     for name, reason in reasons.items():
         console.print(Text(f"{name}: skipped: {reason}", style="dim"))
 
 
 def print_verdicts(records: Sequence[StabilityRecord]) -> None:
-    """Print how many records got which verdict."""
+    """Print the number of records of each verdict."""
     console = stdout_console()
     counts = Counter(record.verdict for record in records)
     words = [f"{counts[verdict.value]} {verdict.value}" for verdict in Verdict if counts[verdict.value]]

@@ -14,7 +14,7 @@ from bemkit.studies.sweep.table import Sweep
 _SHOWN = ("force_normal", "force_tangential", "energy", "contact_length", "peak_pressure")
 _WIDE = ("largest_slip", "estimated_error", "n_elements", "linear_solves", "seconds")
 WIDE = 110
-"""Width of a terminal from which on all results are shown; the files hold them in any case."""
+"""Least width of a terminal for all results; files always have them."""
 MOST_PRINTED = 60
 SHORT = {
     "force_normal": "normal force",

@@ -14,7 +14,7 @@ _LINE = "  {:<27}{:>11}  {:<23} {:>5} {:>7}"
 
 
 def print_verification(verification: Verification, console: Console | None = None) -> None:
-    """Print the rows below the names of their cases, those that are missed in red, and how many there are."""
+    """Print the rows below the names of their cases, missed ones in red, and the number of both."""
     console = stdout_console(console)
     console.print(Text(_LINE.format(*HEAD[1:2], *HEAD[3:]).rstrip(), style="bold"))
     for name, rows in groupby(verification.rows, key=lambda row: row.name):

@@ -29,17 +29,17 @@ if TYPE_CHECKING:
     from bemkit.studies.row_file import R
 
 _ALMOST = 0.98
-"""Share of the bar at which it waits when a run takes longer than planned."""
+"""Share of the bar at which it waits if a run takes longer than planned."""
 
 
 @contextmanager
 def live_progress() -> Iterator[Callable[[StepRecord], None]]:
-    """Show on standard error, a terminal, what is going on inside a ``with`` statement.
+    """Show the progress of a ``with`` statement on standard error, a terminal.
 
     Yields
     ------
     callable
-        What to hand to a run as its callback: it prints a line for each step of the solver above the bar.
+        Callback for a run: it prints a line for each step of the solver above the bar.
     """
     console = Console(stderr=True, highlight=False)
     columns = TextColumn("{task.description}"), _PlannedBar(bar_width=24), TimeElapsedColumn(), _TimeLeft()
@@ -100,7 +100,7 @@ class _Display(logging.Handler):
         self._mesh, self._n_meshes = "", 0
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Show a stage; a plan contains the elements of the next mesh and the time for it."""
+        """Show a stage; a plan gives the number of elements of the next mesh and its time."""
         seconds: float | None = getattr(record, "seconds", None)
         if seconds is None:
             self._bar.update(self._row, description=f"{self._mesh}{record.getMessage()}")
@@ -121,7 +121,7 @@ class _Display(logging.Handler):
 
 
 class _PlannedBar(BarColumn):
-    """A bar that is as long as the time that has passed of the time that is planned."""
+    """A bar of the elapsed share of the planned time."""
 
     def render(self, task: Task) -> ProgressBar:
         """Return the bar; without a plan it pulses."""

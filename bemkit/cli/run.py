@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from bemkit.solvers.base import StepRecord
 
 _COARSEST = 40
-"""Elements of the coarsest mesh of `--cascade`, at least."""
+"""Least number of elements of the coarsest mesh of `--cascade`."""
 
 
 @dataclass(frozen=True)
@@ -172,7 +172,7 @@ def _solve(
 
 
 def _start_tracing() -> None:
-    """Trace memory from now on, with what every run loads on first use behind it."""
+    """Begin to trace memory, after loading the modules that every run uses."""
     import scipy.linalg  # noqa: F401
 
     import bemkit.results.error_indicators

@@ -1,4 +1,4 @@
-"""Standard streams of the process, which may be closed or full, or lack letters: failures with names."""
+"""Standard streams of the process with named errors: they may be closed or full, or lack letters."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class StreamError(BemkitError):
 
 
 class PipeClosedError(StreamError):
-    """The reader of standard output, such as ``head``, has seen enough."""
+    """The reader of standard output, such as ``head``, has closed it."""
 
 
 @contextmanager
@@ -63,7 +63,7 @@ class GuardedStream(io.TextIOBase):
     stream : TextIO or None
         None if it was closed before the program began.
     is_essential : bool
-        If not, what cannot be written is dropped: the exit code must do.
+        If not, unwritable text is dropped; the exit code still reports the failure.
     """
 
     def __init__(self, stream: TextIO | None, *, is_essential: bool = True) -> None:
@@ -140,7 +140,7 @@ class GuardedStream(io.TextIOBase):
             raise StreamError(f"standard output: cannot be written ({reason}): redirect it") from error
 
     def _drop_rest(self) -> None:
-        """Send what is still in the buffer nowhere, or the interpreter would fail on it at its end."""
+        """Discard the rest of the buffer, which the interpreter would fail to write at its end."""
         try:
             descriptor = self.fileno()
         except (OSError, ValueError):  # no file of the system

@@ -21,7 +21,7 @@ from bemkit.scene.unit_names import UnitNames
 GIF, MP4 = ".gif", ".mp4"
 _DOTS_PER_INCH = 80
 _MARGIN = 0.15
-"""Room for loads and supports around the bodies, in shares of the longer side."""
+"""Margin for loads and supports around the bodies, relative to the longer side."""
 
 
 def save_animation(
@@ -77,7 +77,7 @@ def save_animation(
 
 
 def check_animation(path: str | Path) -> Path:
-    """Find out whether a moving picture can be written, and return its path; OutputFileError if not."""
+    """Check that an animation can be written, and return its path; OutputFileError if not."""
     target = Path(path)
     if target.suffix not in (GIF, MP4):
         raise OutputFileError(f"{target}: unknown ending of a moving picture: choose .gif or .mp4")

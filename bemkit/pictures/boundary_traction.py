@@ -14,7 +14,7 @@ from bemkit.scene.unit_names import UnitNames, with_unit
 
 _FREE, _PARTS = "#F2F2F2", ("#C6DBEA", "#F3D9B1")
 _READABLE = 0.06
-"""Share of the boundary from which on a piece is long enough for its name."""
+"""Least length of a piece that has room for its name, relative to the boundary."""
 
 
 def draw_boundary_traction(solution: Solution, axes: Axes | None = None, *, units: UnitNames | None = None) -> Axes:

@@ -1,4 +1,4 @@
-"""All pictures by name: what each shows, of what, and which are drawn where none is named."""
+"""All pictures by name: their subject, their conditions, and which are drawn by default."""
 
 from __future__ import annotations
 
@@ -28,14 +28,14 @@ from bemkit.stopwatch import announce
 
 _FEW = 2048
 _MANY_ZONES = 20
-"""Changes of the status along a contact from which on it is rough."""
+"""Least number of changes of status along a rough contact."""
 MOST_CONTACTS = 6
-"""Contacts up to which each has pictures of its own where none is named."""
+"""Largest number of contacts that have default pictures of their own."""
 
 
 @dataclass(frozen=True)
 class Picture:
-    """A picture that can be asked for.
+    """A picture of the catalogue.
 
     Parameters
     ----------
@@ -48,7 +48,7 @@ class Picture:
     why_not : callable (result) -> str
         Why there is no such picture, empty if there is one.
     is_default : callable (result) -> bool
-        Whether it is drawn where no picture is named; asked only where there is one.
+        Whether it is drawn by default.
     is_along_contacts : bool
         Whether each contact has one.
     """
@@ -146,17 +146,17 @@ def _has_steps(result: Result) -> bool:
 
 
 def _is_loop(result: Result) -> bool:
-    """Whether friction is drawn over more than one way there and back."""
+    """Whether a load history of more than two steps has friction."""
     return result.loading is not None and len(result.loading.steps) > 2 and has_friction(result.loading)
 
 
 def _is_fast(result: Result) -> bool:
-    """Whether stress inside takes seconds: below a surface each point takes all elements."""
+    """Whether stress inside is fast: below a half-plane each point needs all elements."""
     return all(body.mesh.surface is None or body.mesh.n_elements <= _FEW for body in result.bodies.values())
 
 
 def _is_rough(result: Result) -> bool:
-    """Whether contact is in so many places that a distribution says more than a curve."""
+    """Whether contact has so many zones that a distribution is clearer than a curve."""
     return _has_few_contacts(result) and len(result.transitions) > _MANY_ZONES * len(result.contact.parts)
 
 

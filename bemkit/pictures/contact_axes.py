@@ -21,11 +21,11 @@ FIRST: Mapping[str, Any] = MappingProxyType({"color": BLUE, "linewidth": 1.6})
 SECOND: Mapping[str, Any] = MappingProxyType({"color": VERMILION, "linestyle": "--", "linewidth": 1.6})
 LIMIT: Mapping[str, Any] = MappingProxyType({"color": "black", "linestyle": ":", "linewidth": 1.2})
 _MOST_LINES = 40
-"""Places of change that lines mark; of a rough surface the strip of its status shows more than many lines."""
+"""Largest number of transitions that lines mark; more would hide the strip of the status."""
 _PEAKED, _SHORT = 2.5, 0.015
-"""How much larger the range of tractions must be than that on all but a short share of the length, and the share."""
+"""Peaks are cut if the range of tractions is larger by this factor than on all but this share of the length."""
 _NAMED = 0.12
-"""Share of the length of a contact from which on a zone has room for its name."""
+"""Least length of a zone that has room for its name, relative to the contact."""
 
 
 def contact_axes(
@@ -106,7 +106,7 @@ def cut_peaks(
         Tractions there.
     units : UnitNames or None
     note_on_top : bool
-        Whether what is cut is said at the upper end of the axes, not at the lower one.
+        Whether the note on the cut is at the upper end of the axes instead of the lower one.
     """
     weights = np.abs(np.gradient(s))
     low, high, least, largest = 0.0, 0.0, 0.0, 0.0
@@ -129,7 +129,7 @@ def cut_peaks(
 
 
 def near(distance: FloatArray, solution: Result, chosen: BoolArray) -> FloatArray:
-    """Blank out distances to the obstacle that would dwarf the displacements."""
+    """Blank out distances to the obstacle that are much larger than the displacements."""
     contact = solution.contact
     largest = max(float(np.abs(component[chosen]).max()) for component in (contact.u_n, contact.u_t))
     return np.where(np.abs(distance) <= 2.0 * largest, distance, np.nan)

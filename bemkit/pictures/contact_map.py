@@ -19,15 +19,16 @@ from bemkit.results.contact_table import ContactTable
 from bemkit.scene.unit_names import UnitNames, amount
 
 _TOOTH, _SHARE, _SHORTEST = 0.1, 1.0 / 3.0, 0.03
-"""Length of the longest tooth: share of the picture, or of the smallest body, down to another share of the picture."""
+"""Length of the longest tooth, relative to the picture or to the smallest body, and its lower limit, relative to the
+picture."""
 SHORT = 0.4
-"""Size of a zone of contact, relative to the bodies, below which it is worth a picture of its own."""
+"""Largest zone of contact that has a picture of its own, relative to the bodies."""
 _LONGEST, _LEAST = 0.25, 0.01
-"""Length of the longest arrow in sizes of the zone, and share of it below which there is none."""
+"""Length of the longest arrow, relative to the zone, and of the shortest, relative to the longest."""
 _ARROWS = 40
 """Arrows along a straight zone at most."""
 _NODES_AROUND = 3.0
-"""Distances of neighbouring nodes that the frame holds around a zone of a single node."""
+"""Size of the frame around a zone of a single node, in distances of neighbouring nodes."""
 
 
 def draw_contact_map(solution: Result, axes: Axes | None = None, *, units: UnitNames | None = None) -> Axes:

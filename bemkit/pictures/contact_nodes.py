@@ -17,7 +17,7 @@ from bemkit.results.contact_table import ContactTable
 from bemkit.solvers.active_sets import NodeStatus
 
 _AT = 1e-6
-"""Distance of a point from a node that it is, in sizes of the picture."""
+"""Distance within which a point is a node, relative to the picture."""
 
 
 class Nodes(NamedTuple):

@@ -1,4 +1,4 @@
-"""Which points of a crowd are drawn: more than can be seen apart would only hide each other."""
+"""Selection of the points to draw: those too close to each other would hide each other."""
 
 from __future__ import annotations
 
@@ -7,13 +7,13 @@ import numpy as np
 from bemkit.arrays import FloatArray, IntArray
 
 MANY = 300
-"""Nodes of a contact that are seen one by one at most."""
+"""Largest number of nodes of a contact that are drawn one by one."""
 _ACROSS = 80
 """Points of a crowd across a picture."""
 
 
 def seen_apart(points: FloatArray, sizes: FloatArray, distance: float) -> IntArray:
-    """Return of points (n, 2) that are closer to each other than a distance the one of the largest size (n,)."""
+    """Return the indices of points (n, 2), of those closer than a distance only the one of largest size (n,)."""
     largest = np.argsort(-sizes, kind="stable")
     _, first = np.unique(np.round(points[largest] / distance), axis=0, return_index=True)
     return np.sort(largest[first])

@@ -25,7 +25,8 @@ def draw_deformation(
     axes : Axes, optional
         Of matplotlib; those of a new figure by default.
     factor : float, optional
-        By which displacements are enlarged; by default so small that contacts are drawn closed. The picture states it.
+        Factor by which displacements are enlarged; by default so small that contacts are drawn closed. The picture
+        states it.
     units : UnitNames, optional
         Those of the scene by default.
 

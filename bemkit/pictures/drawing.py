@@ -19,12 +19,12 @@ else:
 BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY = "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9"
 GREY = "#9A9A9A"
 CLEAR: Mapping[str, Any] = MappingProxyType({"framealpha": 0.85, "edgecolor": "none", "borderpad": 0.2})
-"""Style of legends over curves, which stay readable where nothing is free."""
+"""Style of legends that stay readable over curves."""
 
 _NOISE = 1e-6
-"""Variation, relative to the scale of a quantity, that is drawn as none: round-off may grow to 1e-10."""
+"""Variation that is drawn as none, relative to the scale of a quantity: round-off may grow to 1e-10."""
 _FLAT = 0.05
-"""Half the range, in scales, of an axis along which nothing varies."""
+"""Half the range of an axis for a constant, relative to the scale of the quantity."""
 
 
 def new_figure(width: float, height: float) -> Figure:

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 FIGURE_FORMATS = {".png": "Software", ".svg": "Date", ".pdf": "CreationDate"}
-"""Formats by the ending of the file, with the stamp without which equal pictures are equal files."""
+"""Formats by the ending of the file, with metadata that make equal pictures equal files."""
 
 
 def write_figures(
@@ -70,7 +70,7 @@ def check_figure_folder(folder: Path | None, figure: str = "figure") -> None:
 
 
 def make_folder(folder: Path) -> None:
-    """Make a folder if need be; OutputFileError if that fails."""
+    """Make a folder if it does not exist; OutputFileError if that fails."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:

@@ -25,7 +25,7 @@ from bemkit.results.load_history import LoadHistory
 from bemkit.scene.unit_names import UnitNames, with_unit
 
 _NO_FRICTION = 1e-9
-"""Friction over pressing force that round-off explains."""
+"""Ratio of friction to pressing force that is round-off."""
 
 
 def history_of(solution: Result) -> LoadHistory:
@@ -79,9 +79,9 @@ def has_friction(loading: LoadHistory) -> bool:
 
 
 def draw_work(solution: Result, axes: Axes | None = None, *, units: UnitNames | None = None) -> Axes:
-    """Draw over time what loads have put in, what friction has taken, and the elastic energy.
+    """Draw the work of loads, the dissipation by friction and the elastic energy over time.
 
-    What the size of the increments leaves is drawn where it matters: the external work is the sum of the others.
+    The error of the increments is drawn where it is visible: the external work is the sum of the others.
     See `draw_friction_loop`.
     """
     loading, units = history_of(solution), units or solution.units

@@ -12,15 +12,15 @@ from bemkit.scene.body_forces import Gravity
 from bemkit.scene.conditions import Load
 
 _SPACING, _LONGEST = 0.04, 0.1
-"""Distance of arrows, and length of the longest, in sizes of the picture."""
+"""Distance of arrows, and length of the longest, relative to the picture."""
 _LEAST = 0.02
-"""Share of the largest load below which there is no arrow."""
+"""Least load that has an arrow, relative to the largest."""
 _MANY = 12
-"""Bodies from which on the weight is drawn once for all."""
+"""Least number of bodies whose weight is drawn once for all."""
 
 
 def draw_loads(axes: Axes, shown: DrawnScene, factor: float) -> FloatArray:
-    """Draw what acts on the bodies where they are drawn, moved by a factor times their displacements.
+    """Draw the loads on the bodies, moved by a factor times their displacements.
 
     Returns
     -------

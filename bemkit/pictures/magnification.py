@@ -1,4 +1,4 @@
-"""How much displacements are enlarged in pictures: so that they are seen, and that what touches seems to touch."""
+"""Magnification of displacements in pictures: they are visible, and bodies in contact are drawn in contact."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from bemkit.scene.conditions import Contact
 from bemkit.solvers.active_sets import NodeStatus
 
 _EXAGGERATION = 0.08
-"""The largest displacement is drawn about this long, in sizes of the picture."""
+"""Drawn length of the largest displacement, relative to the picture."""
 LINE = 0.003
-"""Thickness of a line, in sizes of the picture."""
+"""Thickness of a line, relative to the picture."""
 
 
 def magnification(shown: DrawnScene, size: float | None = None) -> float:

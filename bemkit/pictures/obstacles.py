@@ -30,9 +30,9 @@ _FILLED: dict[str, Any] = {"facecolor": "#EDEDED", "edgecolor": "#A8A8A8", "line
 _BEFORE: dict[str, Any] = {"fill": False, "edgecolor": GREY, "linewidth": 1.0, "linestyle": "--", "zorder": 0}
 _POINTS_OF_CIRCLE, _POINTS_OF_SPAN, _POINTS_OF_GRID, _POINTS_OF_ELEMENT = 181, 12, 301, 5
 _LEVEL, _RELIEF = 1e-9, 0.1
-"""Horizontal part of a normal that is round-off, and height of a relief, by its length, that is flat."""
+"""Horizontal part of a normal that is round-off, and height of a relief that is flat, relative to its length."""
 _BAND = 0.04
-"""Thickness of the hatched part of an obstacle along its surface, in sizes of the picture."""
+"""Thickness of the hatched part of an obstacle along its surface, relative to the picture."""
 
 
 def draw_obstacles(axes: Axes, shown: DrawnScene) -> None:

@@ -40,7 +40,7 @@ class DrawnBody:
     Parameters
     ----------
     scene : BodyScene
-        What is said of it, under its last load.
+        Its scene, under its last load.
     mesh : BoundaryMesh
         In its place.
     space : BoundarySpace

@@ -14,20 +14,20 @@ from bemkit.results.stress_mesh import StressMesh, stress_mesh
 from bemkit.scene.unit_names import UnitNames, amount, with_unit
 
 _ACROSS = 48
-"""Points of the picture far from the boundary, along its longer side."""
+"""Number of sample points far from the boundary, along the longer side of the picture."""
 _LEVELS = 18
 _SHOWN = 0.995
-"""Share of the picture whose stresses have colours of their own: corners of supports have infinite ones."""
+"""Share of the picture whose stresses are within the range of colours: corners of supports have infinite stresses."""
 _SEEN = 1e-3
-"""Displacement, in sizes of the picture, that is seen."""
+"""Least visible displacement, relative to the picture."""
 _FLAT = 1e-6
-"""Variation of stresses, relative to the largest, that is drawn as none."""
+"""Variation of stresses that is drawn as none, relative to the largest."""
 
 
 def draw_stress(
     solution: Result, axes: Axes | None = None, *, measure: str = "von-mises", units: UnitNames | None = None
 ) -> Axes:
-    """Draw a stress inside of all bodies, where they are in the end.
+    """Draw a stress inside all bodies in their final positions.
 
     Parameters
     ----------

@@ -11,9 +11,9 @@ from bemkit.pictures.shown import DrawnScene
 from bemkit.scene.conditions import Clamped, PrescribedDisplacement, Roller
 
 _SPACING, _SIZE = 0.035, 0.012
-"""Distance of symbols, and their radius, in sizes of the picture."""
+"""Distance of symbols, and their radius, relative to the picture."""
 _ARROW, _LEAST = 0.06, 1e-9
-"""Length of arrows in sizes of the picture, and share of the largest displacement below which one is none."""
+"""Length of arrows, relative to the picture, and the least displacement that has one, relative to the largest."""
 _COLOUR = "#333333"
 
 

@@ -12,7 +12,7 @@ from bemkit.scene.unit_names import with_unit
 
 _SEEN = np.linspace(0.0, 1.0, 33)
 _LONGEST = 0.12
-"""Longest arrow, as a share of the size of the picture."""
+"""Length of the longest arrow, relative to the picture."""
 
 
 def draw_thrust(scene: Scene, state: JointForces, axes: Axes | None = None) -> Axes:

@@ -147,7 +147,7 @@ def _traces(step: Result, bodies: DrawnScene, factor: float, parts: Sequence[str
 
 
 def _frame(steps: Sequence[DrawnScene], factor: float) -> FloatArray:
-    """Return the frame (2, 2) [m] of all bodies, elastic and rigid, in all steps; what has no end is cut."""
+    """Return the frame (2, 2) [m] of all bodies, elastic and rigid, in all steps; unbounded bodies are cut."""
     widest = steps[0].frame + 0.5 * np.ptp(steps[0].frame, axis=1).max() * np.array([-1.0, 1.0])
     loops = [loop for step in steps for body in step.bodies for loop in body.outlines(factor)]
     for step in steps:

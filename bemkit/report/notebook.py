@@ -26,7 +26,7 @@ _MOST_STEPS = 12
 
 
 def notebook_html(value: object) -> str:
-    """Return what a notebook shows of a value, its `repr` if nothing better is known."""
+    """Return the representation of a value in a notebook, by default its `repr`."""
     match value:
         case SolvedSteps():
             return _with_pictures(_steps(value), _pictures_of(value[-1]), value[-1].title)
@@ -90,7 +90,7 @@ def _scene_rows(scene: Scene) -> Iterable[tuple[str, str]]:
 
 
 def _with_pictures(content: Element, draw: Sequence[Callable[[], Axes]], title: str) -> str:
-    """Put pictures beside a table, or why there is none."""
+    """Put pictures beside a table, or the reason why there are none."""
     pictures = []
     try:
         for each in draw if has_pictures() else ():

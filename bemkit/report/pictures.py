@@ -1,4 +1,4 @@
-"""Pictures of results inside pages, with words for those who do not see them."""
+"""Pictures of results inside pages, with alternative texts."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def picture_elements(result: Result) -> Iterator[Element]:
 
 
 def _suits(picture: Picture, result: Result) -> bool:
-    """Whether a further picture says something: friction of few contacts, convergence of several steps."""
+    """Whether another picture is useful: friction of few contacts, convergence of several steps."""
     if picture.name == "convergence":
         return len(result.history) > 1
     return result.friction_bound is not None and find_picture("traction").is_default(result)

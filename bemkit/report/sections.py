@@ -32,7 +32,7 @@ def warnings_section(result: Result) -> list[Element]:
 
 
 def forces_section(result: Result) -> list[Element]:
-    """Return what contacts and parts carry, and where the status changes."""
+    """Return the forces of contacts and parts, and the transitions."""
     summary = result.summary()
     tables = {
         "What each contact transmits": summary["contacts"],
@@ -69,7 +69,7 @@ def convergence_section(result: Result) -> list[Element]:
 
 
 def plan_section(plan: Plan) -> list[Element]:
-    """Return what was needed and what was skipped, and why."""
+    """Return the plan: computed and skipped items, with reasons."""
     rows = [{"item": item.name, "needed": item.is_needed, "why": item.reason} for item in plan.items]
     size = f"{plan.memory / 1e6:.3g} MB of memory, about {plan.seconds:.2g} s on a common computer."
     return [element("p", size), table(rows, "What is computed, what is skipped, and why")]

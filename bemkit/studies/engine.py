@@ -23,15 +23,15 @@ REFUSED = "refused"
 
 
 MOST_TOGETHER = 16
-"""Tasks of a group that are computed elsewhere before the first of their records comes back."""
+"""Largest number of tasks of a group that go to another process together."""
 
 
 CONNECT_SECONDS = 10.0
-"""How long a scheduler may take to answer."""
+"""Time limit for the answer of a scheduler."""
 
 
 class StudyError(InputError):
-    """A study that cannot begin or cannot go on."""
+    """A study that cannot begin or continue."""
 
 
 class Attempt(NamedTuple):
@@ -48,12 +48,12 @@ class Attempt(NamedTuple):
 
     @property
     def is_converged(self) -> bool:
-        """Whether the solver vouches for a solution."""
+        """Whether a solution is certified by its solver."""
         return self.solution is not None and self.solution.is_converged
 
 
 def attempt(solve: Callable[[], Solution]) -> Attempt:
-    """Solve a scene; errors that bemkit names are answers too."""
+    """Solve a scene; a named error of bemkit is a result, too."""
     begin = time.perf_counter()
     try:
         solution = solve()
@@ -66,10 +66,10 @@ def attempt(solve: Callable[[], Solution]) -> Attempt:
 class Task(Generic[R]):
     """One record to compute: its key, a label for the progress bar, and what computes it.
 
-    To be sent to another process that must be picklable.
+    It must be picklable to be sent to another process.
 
-    Tasks of one group share something costly, which the objects they have in common keep: neighbours among them go to
-    another process together.
+    Tasks of one group share costly data, kept by their common objects: neighbouring tasks of a group go to another
+    process together.
     """
 
     key: Hashable
@@ -191,7 +191,7 @@ def _computed_elsewhere(tasks: Sequence[Task[R]], executor: Executor, n_workers:
 
 
 def _bundles(tasks: Sequence[Task[R]], n_workers: int) -> Iterator[list[Callable[[], R]]]:
-    """Yield what goes to another process at a time: a task, or neighbours of one group."""
+    """Yield bundles of tasks for another process: one task, or neighbours of one group."""
     most = min(MOST_TOGETHER, -(-len(tasks) // n_workers))
     for group, members in groupby(tasks, key=lambda task: task.group):
         size = 1 if group is None else most
@@ -204,13 +204,13 @@ def _all_computed(bundle: Sequence[Callable[[], R]]) -> list[R]:
 
 
 def _prepare_process() -> None:
-    """Let a worker end at once on Ctrl-C, and when the process that started it ends, however that is killed."""
+    """Make a worker end on Ctrl-C, and when its parent process ends, even if that is killed."""
     signal.signal(signal.SIGINT, signal.SIG_DFL)
     Thread(target=_end_after_parent, daemon=True).start()
 
 
 def _end_after_parent() -> None:
-    """Wait for the end of the parent: a worker holds both ends of its queue, and would wait for work for ever."""
+    """Exit when the parent ends; a worker that holds both ends of its queue would wait for ever."""
     parent = parent_process()
     if parent is not None:
         parent.join()

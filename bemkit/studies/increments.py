@@ -14,7 +14,7 @@ from bemkit.scene.scene import Scene
 
 @dataclass(frozen=True)
 class IncrementErrors:
-    """Changes when every increment is halved, on one mesh; a method of first order has about twice these errors.
+    """Changes of results when every increment is halved, about half the errors of a method of first order.
 
     Parameters
     ----------
@@ -23,10 +23,10 @@ class IncrementErrors:
     external_work : float or None [-]
         Relative change of the work of the loads.
     dissipation : float or None [-]
-        Relative change of what friction dissipates. None if there is none.
+        Relative change of the dissipation by friction. None without dissipation.
     tractions : float or None [-]
-        Largest change of contact tractions at the end of a stated increment, in L2, relative to the largest tractions
-        at the end of any.
+        Largest change of contact tractions in L2 at the end of an original increment, relative to the largest tractions
+        at the end of any increment.
     """
 
     n_increments: int
@@ -74,7 +74,7 @@ def increment_errors(scene: Scene) -> IncrementErrors:
 
 
 def with_halved_increments(scene: Scene) -> Any:
-    """Return a load history with twice as many increments, which meets every increment of the first one."""
+    """Return a load history with every increment divided into two."""
     given: Any = scene
     if given.steps:
         return replace(given, steps=tuple(replace(step, increments=2 * step.increments) for step in given.steps))

@@ -31,7 +31,7 @@ R = TypeVar("R", bound=Record)
 
 @dataclass(frozen=True)
 class RowFile(Generic[R]):
-    """A kind of file: a first line with labels that say what was studied, then a line for each row.
+    """A file format: a first line with labels of the study, then a line for each row.
 
     Parameters
     ----------
@@ -48,7 +48,7 @@ class RowFile(Generic[R]):
     labels: tuple[str, ...]
 
     def check(self, path: str | Path | None) -> list[Path]:
-        """Find out, before any work is done, whether rows can be written; return the file, if there is one to write.
+        """Check, before any computation, that rows can be written; return the file, if any.
 
         Raises
         ------
@@ -108,7 +108,7 @@ class RowFile(Generic[R]):
     def keep(
         self, path: str | Path | None, rows: Iterator[R], finished: dict[Hashable, R], labels: Mapping[str, str]
     ) -> Iterator[R]:
-        """Hand rows on after the new ones were added to the finished ones and to the file, if any.
+        """Pass rows on after adding the new ones to the finished ones and to the file, if any.
 
         Raises
         ------

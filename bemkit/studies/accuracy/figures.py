@@ -17,7 +17,7 @@ _FRONT, _DARK = "#D8D8D8", "#444444"
 _MARKERS = ("o", "^", "s", "D", "v", "P")
 _LINES: tuple[Any, ...] = ("-", (0, (5, 2)), (0, (1, 1.5)), (0, (5, 1, 1, 1)))
 _MESHES = ("adaptive", "uniform", "graded")
-"""Which line belongs to which meshes, so that figures of several studies agree; others follow."""
+"""Line style of each kind of meshes, the same in all figures; other kinds follow."""
 _ELEMENTS = ("constant", "linear", "quadratic")
 
 

@@ -24,9 +24,10 @@ Number = TypeVar("Number", int, float)
 
 DEFAULT_ELEMENTS = "constant,linear,quadratic"
 SUGGESTED = 600
-"""Elements of an over-resolved solution whose error is small against that of the default meshes."""
+"""Number of elements of an over-resolved solution: its error is small compared with those of the default meshes."""
 _MESHES_TOGETHER = 1.3
-"""Time of all adaptive meshes over that of the last one, which is at most 2.5 times as large as the one before."""
+"""Time of all adaptive meshes, relative to the last one, which has at most 2.5 times as many elements as the one
+before."""
 
 
 @dataclass(frozen=True)
@@ -82,7 +83,7 @@ class StudyOptions:
         return [word if word == RISING else Galerkin(_numbers(word, "degrees", int, "1,2,4,8,hp")[0]) for word in words]
 
     def labels(self, scene: Scene) -> dict[str, str]:
-        """Return what must be the same when records of an earlier study are taken over."""
+        """Return the options that must be the same to reuse records of an earlier study."""
         fine = self.over_resolve
         return {
             "scene": scene_to_toml(scene),
@@ -93,12 +94,12 @@ class StudyOptions:
         }
 
     def reference(self, scene: Scene) -> Reference:
-        """Return what errors are measured against; it is over-resolved only if that was asked for.
+        """Return the reference for the errors; over-resolved only on request.
 
         Raises
         ------
         StudyError
-            If nothing else is known; the message says what an over-resolved solution costs.
+            If the scene has no reference; the message gives the cost of an over-resolved solution.
         """
         if self.over_resolve is not None:
             return over_resolved(scene, self.over_resolve)

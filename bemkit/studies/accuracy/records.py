@@ -15,9 +15,9 @@ from bemkit.studies.row_file import RowFile
 from bemkit.table import Column, Table, column
 
 N_FITTED = 3
-"""Meshes, from the finest on, to which an order is fitted."""
+"""Number of meshes, the finest ones, to which an order is fitted."""
 N_EXPONENTIAL = 4
-"""Meshes to which an exponential rate is fitted: three lie on either curve nearly as well."""
+"""Number of meshes to which an exponential rate is fitted: three fit both curves nearly equally well."""
 EQUALITY_TOLERANCE = 1e-6
 """Relative difference below which errors are equal: solvers agree on a state to their tolerances only."""
 STAGES = ("mesh", "assemble", "condense", "solve", "recover")
@@ -57,12 +57,12 @@ class ErrorRecord:
 
     @property
     def is_certified(self) -> bool:
-        """Whether there is a result, be it as accurate as was asked for or not."""
+        """Whether there is a certified result, even if it misses the accuracy."""
         return self.status in ("converged", "accuracy_not_reached")
 
     @property
     def series(self) -> tuple[str, str, str]:
-        """Records that differ in nothing but the size of the mesh share this."""
+        """Key of the records that differ only in the size of the mesh."""
         return self.discretisation, self.meshes, self.solver
 
     @property
@@ -92,7 +92,7 @@ class Rate:
 def fitted_rate(records: Sequence[ErrorRecord], measure: str) -> Rate:
     """Return the rate of an error over the last meshes of a series, by least squares; nan without an estimate.
 
-    With degrees that rise it is exponential where that fits the last four meshes better.
+    For rising degrees it is exponential if that fits the last four meshes better.
     """
     last = records[-N_EXPONENTIAL:]
     n, errors = _sizes_and_errors(last, measure)

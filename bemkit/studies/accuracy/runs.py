@@ -72,8 +72,8 @@ def _given(name: str, grading: Grading, elements: tuple[int, ...]) -> MeshSequen
 def adaptive(accuracies: tuple[float, ...] = ACCURACIES, most_elements: int = MOST_ELEMENTS) -> MeshSequence:
     """Return meshes that follow the solution until an accuracy is reached.
 
-    None has more than the given elements; a run that ends there keeps the best result so far. A limit of time would not
-    do: what it leaves differs from run to run.
+    None has more than the given elements; a run that ends there keeps the best result so far. There is no limit of
+    time, which would make results differ from run to run.
     """
 
     def options(scene: Scene, size: float) -> MeshOptions:
@@ -99,7 +99,7 @@ class Run:
 
     @property
     def scene(self) -> Scene:
-        """Made ready to run; InputError if it does not allow the element type or the mesh."""
+        """The scene to run; InputError if it does not allow the element type or the mesh."""
         return replace(self.problem, **self.changes)
 
     @property
@@ -119,7 +119,7 @@ def all_runs(
     The word "hp" among the element types is for rising degrees. Constant elements have no error estimate and so no
     adaptive meshes, rising degrees no others.
 
-    The scene's own mesh, discretisation and solver do not matter. What it does not allow becomes a refused row.
+    Its mesh, discretisation and solver are replaced. A combination that the scene does not allow becomes a refused row.
 
     Raises
     ------
@@ -171,7 +171,7 @@ def _run(
 
 
 def _name_of(element: Discretisation) -> str:
-    """Return what names an element type in a study: its word in scene files, or its degree where that says more."""
+    """Return the name of an element type in a study: its word in scene files, or its degree."""
     word = DISCRETISATIONS.name_of(element)
     return f"degree {element.degree}" if word == "galerkin" and isinstance(element, Galerkin) else word
 

@@ -1,1 +1,1 @@
-"""Numerical stability: sweeps to the extremes, each row judged by two independent pieces of evidence."""
+"""Numerical stability: sweeps to extreme values; two independent checks judge each row."""

@@ -1,4 +1,4 @@
-"""The axes of the stability sweeps, and the cases they make."""
+"""The axes of the stability sweeps, and their cases."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ class Axis:
     reference : float, optional
         Value whose row the others are compared with; by default the given scene.
     reason_against : callable (scene) -> str
-        Why the axis says nothing of it; empty if it does.
+        Why the axis does not apply to a scene; empty if it does.
     """
 
     name: str
@@ -100,7 +100,7 @@ _REFERENCE_GRADING = 1e6  # as in axes.toml
 
 
 def changed(baseline: Solution, change: Callable[[Any], Any]) -> Scene:
-    """Return what was asked after a change of the scene, or of each step of several bodies with the contacts found."""
+    """Return a case after a change of its scene, or of each step of several bodies with their contacts."""
     if not baseline.scene.bodies:
         result: Scene = change(baseline.scene)
         return result
@@ -117,7 +117,7 @@ def _similar_case(baseline: Solution, value: float, similarity: Similarity, prec
 
 
 def _similar(*factors: str) -> Callable[[Solution, float], Case]:
-    """Return what makes a case in which some factors are the value."""
+    """Return a function that makes a case in which some factors have the given value."""
 
     def make(baseline: Solution, value: float) -> Case:
         numbers: dict[str, Any] = dict.fromkeys(factors, value)
@@ -127,7 +127,7 @@ def _similar(*factors: str) -> Callable[[Solution, float], Case]:
 
 
 def _moved(baseline: Solution, value: float) -> Case:
-    """Return the case as far from the origin as the value says, in diameters."""
+    """Return the case moved from the origin by the value, in diameters."""
     distance = value * max(body.mesh.diameter for body in baseline.bodies.values())
     similarity = Similarity(shift=(0.8 * distance, -0.6 * distance))
     return _similar_case(baseline, value, similarity, precision_elsewhere(baseline, distance))
@@ -280,7 +280,7 @@ def degenerate_diameters(mesh: BoundaryMesh, material: Material) -> FloatArray:
 
 
 def _of_half_planes(reason: str, *, only_periodic: bool = False) -> Callable[[Scene], str]:
-    """Return what gives a reason against half-planes, or against periodic ones."""
+    """Return a function that gives the reason to skip half-planes, or periodic ones."""
 
     def given(scene: Scene) -> str:
         surface = scene.only.shape.outline().surface
@@ -290,7 +290,7 @@ def _of_half_planes(reason: str, *, only_periodic: bool = False) -> Callable[[Sc
 
 
 def _of_one_body(reason: Callable[[Scene], str] = lambda scene: "") -> Callable[[Scene], str]:
-    """Return what gives a reason against several bodies, and another one against single bodies."""
+    """Return functions that give the reasons to skip several bodies, and single ones."""
     return lambda scene: "it is about one body" if scene.bodies else reason(scene)
 
 
@@ -312,7 +312,7 @@ def _of_bodies(similarity: Similarity, *, is_of_one: bool = False) -> Callable[[
 def _read_axes(
     kinds: Mapping[str, tuple[Callable[[Any, float], Case], Callable[[Any], str]]],
 ) -> tuple[Axis, ...]:
-    """Return the axes in ``axes.toml``, with what makes their cases and the reasons to skip them."""
+    """Return the axes of ``axes.toml`` with the functions that make their cases and give reasons to skip them."""
     text = (resources.files("bemkit") / "studies" / "stability" / "axes.toml").read_text("utf-8")
     return tuple(
         Axis(
@@ -365,4 +365,4 @@ AXES: tuple[Axis, ...] = _read_axes(
         "stiffness": (_stiffened, _of_bodies(Similarity())),
     }
 )
-"""Every axis, in the order of the report; those that are not about a scene give a reason against it."""
+"""Every axis, in the order of the report; an axis that does not apply to a scene gives the reason."""

@@ -16,11 +16,11 @@ from bemkit.scene.scene import Scene
 from bemkit.studies.stability.similarity import Similarity
 
 PRECISION = 1e-9
-"""Agreement, relative to the largest entry, that similar problems owe each other after scaling."""
+"""Required agreement of similar problems after scaling, relative to the largest entry."""
 
 
 def precision_elsewhere(solution: Solution, distance: float) -> float:
-    """Return the agreement that a scene owes when it is moved by a distance [m].
+    """Return the required agreement of a scene that is moved by a distance [m].
 
     Gaps are differences of coordinates, known to eps of the distance; displacements are a small part of the size, and
     rough gaps make tractions as rough as E' times the roughness over the length of an element.
@@ -59,11 +59,11 @@ class Case:
     similarity : Similarity
         Factors that lead from the reference of the axis to this scene, by which results are scaled back.
     levels : int
-        How often the elements at corners and ends of parts are halved, after the scene's own mesh is made.
+        Number of times that the elements at corners and ends of parts are halved, in the mesh of the scene.
     precision : float
-        Agreement owed by the scaled copy of this case.
+        Required agreement with the scaled copy of this case.
     deviation_limit : float
-        Agreement owed to the reference; infinite if the answer may change along the axis.
+        Required agreement with the reference; infinite if the solution may change along the axis.
     keeps_steps : bool
         Whether active sets and the number of linear solves must be those of the reference as well.
     is_solvable : bool or None

@@ -15,15 +15,16 @@ class Verdict(Enum):
     """Verdict on a record."""
 
     RIGHT = "right"
-    """Called converged; the independent check and the scaled copy agree, and so does the reference where it must."""
+    """Converged; the independent check and the scaled copy agree, and the reference where it applies."""
     COARSE = "coarse"
-    """The same, but the mesh is so coarse that tractions and displacements hardly belong together."""
+    """The same, on a mesh too coarse for tractions and displacements to agree."""
     AMBIGUOUS = "ambiguous"
     """The case and its scaled copy differ, and both pass the independent check: the problem has several solutions."""
     NAMED = "named"
-    """No answer, but a named status or error, and the same for the scaled copy."""
+    """No solution: a named status or error, the same for the scaled copy."""
     WRONG = "wrong"
-    """Called converged against the evidence, refused although solvable, or different from the scaled copy."""
+    """Converged to a solution that a check contradicts, refused although solvable, or different from the scaled
+    copy."""
 
 
 @dataclass(frozen=True)

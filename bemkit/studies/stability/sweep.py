@@ -1,4 +1,4 @@
-"""Run the cases of the axes and judge each by two independent pieces of evidence."""
+"""Run the cases of the axes and judge each by two independent checks."""
 
 from __future__ import annotations
 
@@ -210,7 +210,7 @@ def _judge(
     deviation: float,
     scaled_copy: float,
 ) -> tuple[Verdict, str]:
-    """Return the verdict and what speaks against the record, if anything does."""
+    """Return the verdict, and the reason if the record is not right."""
     if first.status != second.status:
         return Verdict.WRONG, f"{first.status}, but its scaled copy: {second.status} ({second.message})"
     if not first.is_converged or first.solution is None or second.solution is None or check is None:

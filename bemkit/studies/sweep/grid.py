@@ -18,7 +18,7 @@ _LAWS = ("law", "solver")
 _LOADS = ("parts", "body_forces", "load_factors", "steps", "contacts", "touching")
 MOST_ROWS = 100_000
 _DECIMAL = 12
-"""Characters of a number that somebody has written rather than computed."""
+"""Largest number of characters of a number that was typed rather than computed."""
 
 
 @dataclass(frozen=True)
@@ -124,12 +124,12 @@ def _number(text: str, whole: str) -> float:
 
 
 def with_values(scene: Scene, values: Mapping[SweepKey, float]) -> Scene:
-    """Return a scene with other numbers at some places.
+    """Return a scene with other numbers at some keys.
 
     Raises
     ------
     SceneKeyError
-        If a place does not exist in the scene, holds no number, or refuses a value; the message names the key.
+        If a key does not exist in the scene, has no number, or does not accept a value; the message names the key.
     """
     for key, value in values.items():
         check_number(scene, key)
@@ -139,7 +139,7 @@ def with_values(scene: Scene, values: Mapping[SweepKey, float]) -> Scene:
 
 
 def check_number(scene: Scene, key: SweepKey) -> None:
-    """Refuse a key that leads neither to a number nor to a formula that a number can replace; see `with_values`."""
+    """Check that a key leads to a number, or to a formula that a number can replace; see `with_values`."""
     value = value_at(scene, key)
     if isinstance(value, tuple | list | np.ndarray):
         raise SceneKeyError(f"{key.text} is a list: vary one number of it, such as {key.text}[0]")

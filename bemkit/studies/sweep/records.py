@@ -32,7 +32,7 @@ QUANTITIES: Mapping[str, str] = MappingProxyType(
 
 
 def unit_of_column(column: str, units: UnitNames | None) -> str:
-    """Return the name of the unit of a column; of what the scene has no name for, empty."""
+    """Return the name of the unit of a column; empty if the scene has no name for it."""
     quantity = QUANTITIES.get(column, "")
     return "s" if quantity == "time" else unit_of(quantity, units)
 
@@ -68,7 +68,7 @@ class SweepRow:
 
     @property
     def is_certified(self) -> bool:
-        """Whether there is a result, be it as accurate as was asked for or not."""
+        """Whether there is a certified result, even if it misses the accuracy."""
         return bool(self.certified)
 
 

@@ -1,4 +1,4 @@
-"""The table of a sweep: its columns, and what it can be turned into."""
+"""The table of a sweep: its columns and formats."""
 
 from __future__ import annotations
 
@@ -26,9 +26,9 @@ class Sweep:
     Parameters
     ----------
     scene : Scene
-        What is the same in all rows.
+        The scene that all rows share.
     keys : tuple of str
-        What is varied.
+        Keys of the varied numbers.
     rows : tuple of SweepRow
         All combinations of values, that of the first key changing last.
     """

@@ -82,7 +82,7 @@ class VerifiedRow:
 
     @property
     def is_met(self) -> bool:
-        """Whether all errors are within their bounds, and fall as fast as they must."""
+        """Whether all errors are within their bounds and fall at the required order."""
         if not self.records or not all(error <= bound for error, bound in zip(self.errors, self.bounds, strict=True)):
             return False
         return self.quantity.order is None or math.isnan(self.order) or self.order >= self.quantity.order

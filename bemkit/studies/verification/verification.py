@@ -52,9 +52,9 @@ def verify(
     run : callable (tasks) -> records
         `bemkit.studies.engine.compute`, or with a progress bar `compute_with_progress`.
     file : str or Path, optional
-        Where records are kept (JSON Lines, .jsonl) as soon as they exist; those already in it are not computed again.
+        File (JSON Lines, .jsonl) that gets each record as soon as it exists; its records are not computed again.
     cases : mapping of str to callable
-        What there is to verify, by default all of bemkit's own; each is made when it is needed.
+        The known cases, by default all of bemkit; each is made when it is needed.
 
     Returns
     -------
@@ -117,7 +117,7 @@ def compare(name: str, case: Case, resolution: float) -> Comparison:
 
 
 def _measured(quantity: Quantity, solution: Solution) -> tuple[float, str]:
-    """Return what came out, or nan and a message: a wrong solution may lack the zones that are compared."""
+    """Return the measured value, or nan and a message: a wrong solution may lack the zones that are compared."""
     try:
         return float(quantity.measure(solution)), ""
     except (LookupError, ArithmeticError, ValueError) as error:
