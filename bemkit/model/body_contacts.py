@@ -26,7 +26,7 @@ from bemkit.scene.scene import Scene
 from bemkit.scene.symmetry import check_law_symmetry
 
 _FACES_LINE = 0.5
-"""Component of a normal towards a symmetry line from which on an element faces it."""
+"""Least component of a normal towards a symmetry line of an element that faces it."""
 _DIGITS = 9
 """Decimals of lengths of contacts relative to the longest: round-off shall not decide which of two is longer."""
 
@@ -54,7 +54,7 @@ def touching_pairs(scene: Scene, bodies: Sequence[PlacedBody]) -> tuple[ContactP
 
 
 def _check_images(sides: Sequence[ContactSide], names: Sequence[str], symmetry: Symmetry, within: float) -> None:
-    """Refuse sides (n,) of which a part faces its own image at a symmetry line."""
+    """Refuse sides (n,) that face their own image at a symmetry line."""
     places = np.array([np.inf if place is None else place for place in (symmetry.x, symmetry.y)])
     for side, name in zip(sides, names, strict=True):
         normals = side.mesh.normals_at(side.elements, np.zeros(1))[:, 0]
@@ -78,8 +78,8 @@ def body_rows(
     -----
     Where two contact sides of one body meet in a corner, the node there carries a multiplier of only one contact: of
     that with a rigid obstacle, else of the longer one, the first of equally long ones. Three bodies that meet in a
-    point would otherwise be tied in a circle, and their tractions there would not be unique. The other contact
-    hands its share to its neighbours, as at crosspoints of mortar methods [Wohlmuth2000].
+    point would otherwise be tied in a circle, and their tractions there would not be unique. The neighbours receive the
+    share of the other contact, as at crosspoints of mortar methods [Wohlmuth2000].
     """
     numbers = {body.name: number for number, body in enumerate(bodies)}
     pairs = scene.elastic_contacts

@@ -20,8 +20,7 @@ from bemkit.scene.conditions import Contact
 SMOOTH_SIDE_COSINE = 0.866
 """Cosine of 30 degrees. Directions of contact at one node that differ by less belong to one smooth side."""
 GAP_TOLERANCE = 1e-9
-"""Difference of the gaps of two obstacles at one node, relative to the diameter of the body, up to which both are
-equally near."""
+"""Difference of the gaps of two obstacles that are equally near a node, relative to the diameter of the body."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,8 +40,8 @@ class ContactData:
     facing : (n_contact,) array [-]
         Cosine of the angle between the direction of contact and the body's normal; of the nearer side at a corner.
     points : (n_contact, 2) array [m]
-        As the mesh has them: by way of dimensionless points a node on an obstacle would lie beside it far from the
-        origin.
+        Coordinates of the mesh: far from the origin, conversion from dimensionless points would move a node off its
+        obstacle.
     """
 
     nodes: ContactNodes
@@ -204,7 +203,7 @@ class _Side:
 
 
 def _nearest_of_each_part(parts: Sequence[FacingPart], sides: Sequence[_Side]) -> tuple[list[FacingPart], list[_Side]]:
-    """Keep of each node of a part with several obstacles only the row of the nearest."""
+    """For each node of a part with several obstacles, keep only the row of the nearest."""
     kept = []
     for one, side in zip(parts, sides, strict=True):
         rivals = [number for number, other in enumerate(parts) if other.part == one.part]

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from bemkit.scene.contacts import ContactPair
 
 OVERLAP_TOLERANCE = 1e-6
-"""Share of the size of the smaller body by which shapes may overlap without anybody meaning it: round-off of curves."""
+"""Unintended overlap of shapes by round-off of curves, relative to the size of the smaller body."""
 _SAME_DIRECTION = 1e-12
 
 
@@ -101,9 +101,9 @@ class ContactRows:
         return np.asarray(values[self.nodes] if self.couplings is None else self.couplings[0] @ values)
 
     def acting_at(self, bodies: Sequence[PlacedBody]) -> list[FloatArray]:
-        """Return where the force of each row acts on the body, and on its partner if that is elastic: (n, 2) [m] each.
+        """Return the points (n, 2) [m] of the force of each row on the body, and on its partner if that is elastic.
 
-        That is beside the node if it takes a share of others.
+        A node that takes a share of others is not the point of its force.
         """
         points = [self.at_nodes(dof_points(bodies[self.body].space))]
         if self.couplings is not None:
@@ -141,7 +141,7 @@ class ContactRows:
 
 
 def check_overlap(pair: ContactPair, overlap: float, deepest: FloatArray, size: float) -> None:
-    """Refuse bodies that overlap, at the point `deepest`, by more than the interference of their contact.
+    """Check that bodies overlap, at the point `deepest`, by no more than the interference of their contact.
 
     Raises
     ------

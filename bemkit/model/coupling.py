@@ -1,4 +1,4 @@
-"""How the displacements of bodies move their contact nodes: the matrix and the vector that join them."""
+"""The relative displacements of contact nodes as a matrix times the displacements of bodies, plus a vector."""
 
 from __future__ import annotations
 

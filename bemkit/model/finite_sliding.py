@@ -24,17 +24,17 @@ from bemkit.scene.unit_names import amount
 from bemkit.solvers.base import ContactSolution, Status
 
 _BY_DEFORMATION = 5.0
-"""Displacements by contact forces, up to which a motion along a contact is one of deformation."""
+"""Largest motion along a contact that counts as deformation, in displacements by contact forces."""
 _OFF = 0.2
-"""Change of gaps beside the displacement by contact forces from which on pressures are wrong."""
+"""Change of gaps that makes pressures wrong, relative to the displacement by contact forces."""
 _LEAST_COSINE = 0.866
 """Cosine of the angle by which a direction of contact may turn: 30 degrees."""
 _LEAST_FACING = 0.5
 """Cosine of 60 degrees between the normal of a body and the direction of contact, below which contact is oblique."""
 _ROUND_OFF = 1e-9
-"""Displacement by contact forces, relative to the largest one, below which these forces are round-off."""
+"""Displacement by contact forces that is round-off, relative to the largest one."""
 _SHARE_OF_ZONE = 0.05
-"""Part of the length of contact that a motion may take where it is longer than an element."""
+"""Largest motion that is longer than an element, relative to the length of contact."""
 
 
 def with_sliding_checked(model: Model, result: ContactSolution) -> ContactSolution:
@@ -62,7 +62,7 @@ def with_sliding_checked(model: Model, result: ContactSolution) -> ContactSoluti
 def _moved(
     prepared: Prepared, rows: ContactRows, displacement: FloatArray, is_pressed: BoolArray, deformation: float
 ) -> str:
-    """Say how far the pressed nodes of a contact move along it; empty if gaps and directions still hold.
+    """Describe how far the pressed nodes of a contact move along it; empty if gaps and directions still hold.
 
     Parameters
     ----------
@@ -95,7 +95,7 @@ def _moved(
 
 
 def _is_off_side(rows: ContactRows, slide: FloatArray, is_pressed: BoolArray, deformation: float) -> bool:
-    """Whether another elastic body has moved (n,) [m] by more than its elements, or to where the gap is another one."""
+    """Whether another elastic body has moved (n,) [m] by more than its elements, or to a place with another gap."""
     longest = np.abs(slide[is_pressed]).max()
     zone = rows.weights[is_pressed]
     if longest > max(float(zone.mean()), _SHARE_OF_ZONE * float(zone.sum())):
@@ -110,7 +110,7 @@ def _is_off_side(rows: ContactRows, slide: FloatArray, is_pressed: BoolArray, de
 def _is_off_obstacle(
     rows: ContactRows, obstacle: Obstacle, displacement: FloatArray, is_pressed: BoolArray, deformation: float
 ) -> bool:
-    """Whether pressed nodes have come to where the obstacle is elsewhere, or faces them in another direction."""
+    """Whether pressed nodes have moved to places where the obstacle has another distance or direction."""
     if not is_in_the_plane(obstacle):
         return False
     points, frame, moved = rows.points[is_pressed], rows.frame[is_pressed], displacement[is_pressed]

@@ -19,7 +19,7 @@ _DIRECTIONS = (
 )
 _REMEDY = ": change the load or hold the body"
 _STRAIGHT = 1e-6
-"""Turning by less than this, relative to the shift at the size of the body, counts as none."""
+"""Largest rotation that counts as none, relative to the translation over the size of the body."""
 _ROUND_OFF = 1e-9
 """Round-off of a mode, and of coordinates relative to the size of the body."""
 
@@ -55,7 +55,7 @@ def check_held(prepared: Prepared) -> None:
 
 
 def _modes_in_words(modes: FloatArray, units: Units) -> str:
-    """Say how a body may move, by the shifts of its centre and the turns (n_modes, 3) of a basis of its motions."""
+    """Describe how a body may move, from a basis of its motions: shifts of its centre and turns (n_modes, 3)."""
     size = float(np.linalg.norm(modes[:, 2]))
     turns = size > _ROUND_OFF
     if turns:  # a basis in which only the first mode turns
@@ -83,7 +83,7 @@ def _pivot(mode: FloatArray, units: Units) -> str:
 
 
 def describe(prepared: Prepared, load: UnsolvableLoad) -> str:
-    """Say in one sentence how a load moves a body and that nothing holds it.
+    """Describe in one sentence how a load moves a body that nothing holds.
 
     Parameters
     ----------

@@ -132,7 +132,7 @@ def dimensionless_load(load: Load, units: Units) -> TractionField:
 
 
 def far_motion_of(scene: BodyScene, units: Units) -> FarMotion | None:
-    """Return how a half-plane moves far away, in the units given; None if it is at rest there, or ends somewhere."""
+    """Return the motion of a half-plane far away, in the units given; None at rest, and for other bodies."""
     far = scene.far
     if far is None:
         return None
@@ -148,7 +148,7 @@ def far_motion_of(scene: BodyScene, units: Units) -> FarMotion | None:
 
 
 def with_far_motion(elastic: SteklovPoincare, far_motion: FarMotion | None) -> SteklovPoincare:
-    """Return a half-plane that moves otherwise far away, by None not at all; any other body as it is."""
+    """Return a half-plane with another motion far away, None for rest; any other body unchanged."""
     if elastic.traction_space.mesh.surface is None:
         return elastic
     from bemkit.operators.half_plane.far_motion import FarMotion
@@ -177,7 +177,7 @@ def without_body_forces(elastic: SteklovPoincare, inside: ForcesInside | None) -
 
 
 def given_data(conditions: NodalConditions, force: FloatArray, inside: ForcesInside | None) -> GivenData:
-    """Return the forces and displacements under which an elastic map is solved, without what acts inside the body."""
+    """Return the forces and displacements under which an elastic map is solved, without body forces."""
     if inside is not None:
         conditions, force = inside.left_of(conditions, force)
     return GivenData.of(conditions, force, conditions.displacement)

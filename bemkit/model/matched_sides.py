@@ -11,9 +11,9 @@ from bemkit.scene.contacts import ContactPair
 from bemkit.scene.discretisation import Galerkin
 
 ALIKE = 1.02
-"""Ratio of the lengths of two sides up to which they may fit, and of element lengths up to which these match."""
+"""Largest ratio of the lengths of two sides that may fit, and of element lengths that match."""
 LEAST_REST = 0.5
-"""Least share of its elements that the rest of a boundary keeps."""
+"""Least share of the elements for the rest of a boundary."""
 
 
 def matching_densities(

@@ -1,8 +1,8 @@
 """From a prepared scene to a dimensionless contact problem, and back to physical fields of each body.
 
 Inside, lengths are measured by the diameter of the largest body, stresses of the material by E', loads by their largest
-value p and displacements by p L / E', so that nothing depends on the user's units, on where bodies sit, or on how stiff
-they are. A scene without contact is a contact problem without nodes.
+value p and displacements by p L / E', so that results do not depend on the user's units, or on the positions and
+stiffnesses of bodies. A scene without contact is a contact problem without nodes.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Model:
-    """A prepared scene with the maps of its bodies, the body that contact sees, and its contact problem.
+    """A prepared scene with the maps of its bodies, the body of the contact problem, and this problem.
 
     Parameters
     ----------
@@ -310,7 +310,7 @@ def _single(prepared: Prepared, elastic: SteklovPoincare, body: SingleBody) -> M
 
 
 def _single_of(prepared: Prepared, executor: Executor | None) -> tuple[SteklovPoincare, SingleBody]:
-    """Return the map of the only body, and the body as contact sees it."""
+    """Return the map of the only body, and the body of the contact problem."""
     if executor is None:
         (elastic,) = _loaded([prepared.elastic_map(prepared.only)], prepared.bodies)
         return elastic, single_body(prepared, elastic)

@@ -16,7 +16,7 @@ from bemkit.model.prepared import Prepared
 from bemkit.scene.conditions import Contact
 
 _ROUND_OFF = 1e-12
-"""Share of coordinates by which the points of an obstacle that is shifted may differ from it."""
+"""Largest difference of a shifted obstacle from another one, relative to the coordinates."""
 
 
 def obstacle_travel(before: Prepared, after: Prepared) -> FloatArray:

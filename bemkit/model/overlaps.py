@@ -14,7 +14,7 @@ from bemkit.scene.scene import Scene
 
 
 def check_apart(scene: Scene, bodies: Sequence[PlacedBody]) -> None:
-    """Refuse bodies that overlap anywhere by more than the interference of the contacts between them.
+    """Check that no two bodies overlap by more than the interference of the contacts between them.
 
     Elastic bodies are compared with each other but for half-planes, and with rigid bodies of finite size.
 

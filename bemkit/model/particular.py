@@ -40,7 +40,7 @@ _RADIUS = 1e-2
 """Radius of circles whose mean value is compared with that at their centre, relative to the size of the body."""
 _PLACES = np.array([-0.9, -0.5, 0.0, 0.5, 0.9])
 _ROUND_OFF = 64.0 * float(np.finfo(float).eps)
-"""Share of coordinates by which fields of them may be wrong."""
+"""Relative error of coordinates that fields may have."""
 
 
 class TemperatureError(InputError):
@@ -119,7 +119,7 @@ class _Ring(NamedTuple):
 
 
 def _ring_around_hole(mesh: BoundaryMesh) -> _Ring | None:
-    """Return that of the only hole; None of a body without holes or with several."""
+    """Return the ring around the only hole; None for a body without holes or with several."""
     whole = mesh.whole
     if len(whole.loops) != 2:
         return None
@@ -249,7 +249,7 @@ class ParticularFields:
 
     @classmethod
     def of(cls, scene: BodyScene, mesh: BoundaryMesh) -> ParticularFields | None:
-        """Return that of a scene with a single load; None without body forces."""
+        """Return the particular solution of a scene with a single load; None without body forces."""
         modulus = scene.material.plane_modulus
         solution = particular_solution(scene, mesh, modulus, modulus) if scene.body_forces else None
         return None if solution is None else cls(solution, mesh, modulus)

@@ -63,7 +63,7 @@ class PlacedBody:
         return cls(body, scene, mesh, own_mesh, space_on(mesh), own_space, in_place)
 
     def is_loaded_like(self, other: PlacedBody) -> bool:
-        """Whether its parts and body forces are the very objects that another one has, and it moves alike far away."""
+        """Whether another body has the identical parts and body forces, and the same motion far away."""
         own, others = ((*each.body.parts, *each.body.body_forces) for each in (self, other))
         is_alike = len(own) == len(others) and all(one is two for one, two in zip(own, others, strict=True))
         return is_alike and (self.scene.far, self.scene.depth) == (other.scene.far, other.scene.depth)

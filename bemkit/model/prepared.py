@@ -1,4 +1,4 @@
-"""A scene on meshes, made ready to plan and to solve: units, conditions at nodes, forces and contact rows, once.
+"""A scene on meshes, ready to plan and to solve: units, conditions at nodes, forces and contact rows.
 
 Inside, lengths are measured by the diameter of the largest body, stresses of the material by E' of the most compliant
 contact, loads by their largest value p and displacements by p L / E'.
@@ -125,7 +125,7 @@ class Prepared:
 
     @cached_property
     def is_condensed(self) -> bool:
-        """Whether contact sees the stiffness of bodies even if their equations are compressed over a tree.
+        """Whether the contact problem uses condensed stiffnesses even if the equations of bodies are compressed.
 
         Several bodies are joined by their stiffness. That of one body is needed to see whether the energy of elements
         that are too long can be negative, for rotations that no support holds and displacements do not contain, and for
@@ -148,7 +148,7 @@ class Prepared:
         return body.material.scaled(self.units.modulus)
 
     def linear_solver(self, body: PreparedBody) -> ChosenLinearSolver:
-        """Return the linear solver that the map of a body takes, and why."""
+        """Return the linear solver of the map of a body, and the reason."""
         elastic = self._map_of(body, DenseCholesky())
         data = (body.map_data,)
         case = BodyCase(body.own_mesh.unit, elastic.material, body.conditions, data, is_condensed=self.is_condensed)

@@ -27,7 +27,7 @@ def rigid_motions(body: RigidBody, units: Units) -> tuple[sparse.csr_array, Floa
 def rigid_members(prepared: Prepared) -> tuple[Member, ...]:
     """Return a member for each rigid body that loads drive.
 
-    What is rigid yields less than anything: its modulus is the largest of all bodies, so that its partners decide.
+    A rigid body takes the largest modulus of all bodies, so that its partners decide.
     """
     units = prepared.units
     modulus = max(body.material.plane_modulus for body in prepared.bodies) / units.modulus

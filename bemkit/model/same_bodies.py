@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 def listed_contacts(scene: Scene, bodies: Sequence[PlacedBody]) -> tuple[ContactPair, ...]:
-    """Return the contacts of bodies that are found touching, none if they are not asked for."""
+    """Return the contacts found between touching bodies; none unless the scene asks for them."""
     if scene.touching is None:
         return ()
     from bemkit.model.body_contacts import touching_pairs  # mortars, which single bodies lack

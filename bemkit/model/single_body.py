@@ -1,4 +1,4 @@
-"""The only body of a scene between fixed obstacles, or without contact nodes: what contact sees of it."""
+"""The only body of a scene, between fixed obstacles or without contact nodes, as the body of the contact problem."""
 
 from __future__ import annotations
 
@@ -42,14 +42,14 @@ def _check_without_nodes(prepared: Prepared) -> None:
 
 
 def is_direct(prepared: Prepared) -> bool:
-    """Whether contact sees the condensed stiffness of the only body."""
+    """Whether the contact problem uses the condensed stiffness of the only body."""
     if not prepared.n_contact or prepared.only.mesh.surface is not None:
         return False
     return prepared.is_condensed or prepared.linear_solver(prepared.only).hierarchical is None
 
 
 def single_body(prepared: Prepared, elastic: SteklovPoincare, condensed: CondensedMap | None = None) -> SingleBody:
-    """Return the only body as contact sees it, with its equations in the frames of contact.
+    """Return the only body as the body of the contact problem, with its equations in the frames of contact.
 
     Parameters
     ----------

@@ -39,13 +39,13 @@ a ring whose thickness is a hundredth of its radius has 1e-7 of the largest stif
 _OF_DIFFERENCES = 4.0
 """Rounding errors in a strain, of the size of the displacements: of these, of the motion, of their difference."""
 _ELIMINATION_TOLERANCE = 64.0 * float(np.finfo(float).eps)
-"""Share of the sensitivity of the whole body that elimination may leave in its condensed stiffness."""
+"""Round-off of the condensed stiffness, relative to the sensitivity of the whole body."""
 
 
 def contact_warnings(
     model: Model, displacements: Sequence[FloatArray], node_status: IntArray
 ) -> tuple[ResultWarning, ...]:
-    """Say where contact is closed at a large angle, and where supports push a body into an obstacle.
+    """Warn of contact closed at a large angle, and of supports that push a body into an obstacle.
 
     Parameters
     ----------
@@ -148,7 +148,7 @@ def _negative_energy_of(
     body: PreparedBody,
     fields: tuple[FloatArray, FloatArray],
 ) -> str:
-    """Say why the energy of a body is or can be negative; empty if it is not.
+    """Describe why the energy of a body is or can be negative; empty if it is not.
 
     Parameters
     ----------

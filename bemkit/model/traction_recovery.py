@@ -15,7 +15,7 @@ from bemkit.model.contacts import ContactRows
 from bemkit.model.placed import PlacedBody
 
 _REACHED = 1e-12
-"""Share of the largest coupling from which on a node takes part; less is round-off of places where meshes meet."""
+"""Least coupling of a node that takes part, relative to the largest; less is round-off at the ends of elements."""
 
 _Entries = tuple[FloatArray, IntArray, IntArray]
 
@@ -40,7 +40,7 @@ class TractionRecovery:
 
     @classmethod
     def of(cls, bodies: Sequence[PlacedBody], contacts: Sequence[ContactRows]) -> TractionRecovery:
-        """Work out what the couplings of contacts say."""
+        """Compute the recovery from the couplings of contacts."""
         sides: dict[tuple[int, bytes], _Side] = {}
         first = 0
         for rows in contacts:

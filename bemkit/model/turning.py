@@ -1,9 +1,9 @@
-"""Round bodies that nothing keeps from turning.
+"""Round bodies that no support or friction keeps from turning.
 
-A body whose contact sides are arcs around one point turns about it without changing them: without friction no contact
-resists, touching anything. So do several that friction joins, if those sides are round by which they touch others.
-Their elements do resist, since they interpolate the rotation: a load that turns such a body would be balanced by what
-its mesh differs from a circle, at any angle.
+A body whose contact sides are arcs about one point can turn about it; without friction no contact resists. The same
+holds for several bodies joined by friction, if their sides in contact with others are such arcs. Their elements do
+resist, because they only interpolate the rotation: the difference of the mesh from a circle would balance any load that
+turns such a body.
 """
 
 from __future__ import annotations
@@ -25,9 +25,9 @@ from bemkit.solvers.base import ContactSolution, Status
 
 _N_POINTS = 12
 _ROUND_OFF = 1e-9
-"""Distance, relative to the diameter, by which normals of arcs may miss their centre."""
+"""Distance by which normals of arcs may miss their centre, relative to the diameter."""
 _BALANCED = 1e-6
-"""Share of the moment of all loads, each taken by its size, that counts as none."""
+"""Moment that counts as none, relative to the sum of the sizes of the moments of all loads."""
 _UNSETTLED = (Status.STALLED, Status.CYCLING, Status.MAX_STEPS, Status.INNER_FAILED, Status.SINGULAR)
 """Failures of a solve whose cause may be a motion that nothing holds."""
 
@@ -37,7 +37,7 @@ _Side: TypeAlias = tuple[PlacedBody, IntArray]
 
 
 def with_turning_checked(model: Model, result: ContactSolution) -> ContactSolution:
-    """Return the outcome of a solve, named UNSOLVABLE_LOAD if nothing but meshes keeps a body from turning.
+    """Return the outcome of a solve, named UNSOLVABLE_LOAD if only its mesh keeps a body from turning.
 
     A failed solve is named SINGULAR if a body may turn under any load. Bodies that friction joins are
     judged together; the loads of those with forces inside are not.
@@ -76,7 +76,7 @@ def _joined_by_friction(prepared: Prepared) -> list[tuple[list[PlacedBody], list
 
 
 def _turned(prepared: Prepared, bodies: list[PlacedBody], sides: list[_Side]) -> str:
-    """Say how the load turns bodies that may turn by these sides; empty if it does not."""
+    """Describe how the load turns bodies that may turn by these sides; empty if it does not."""
     centre = _centre_of_turning(bodies, sides)
     if centre is None or any(body.scene.body_forces for body in bodies):
         return ""
@@ -92,7 +92,7 @@ def _turned(prepared: Prepared, bodies: list[PlacedBody], sides: list[_Side]) ->
 
 
 def _loose(bodies: list[PlacedBody], sides: list[_Side]) -> str:
-    """Say that bodies may turn by these sides; empty if they may not."""
+    """State that bodies may turn by these sides; empty if they may not."""
     centre = _centre_of_turning(bodies, sides)
     if centre is None:
         return ""
@@ -120,7 +120,7 @@ def _centre_of_turning(bodies: list[PlacedBody], sides: list[_Side]) -> FloatArr
 
 
 def _may_turn(body: PlacedBody) -> bool:
-    """Whether no support, symmetry or infinity keeps a body from turning."""
+    """Whether a body can turn: no support, no symmetry, no half-plane."""
     is_held = any(isinstance(part.condition, Clamped | Roller | PrescribedDisplacement) for part in body.scene.parts)
     mesh = body.mesh
     is_bounded = not mesh.is_exterior and mesh.surface is None

@@ -18,7 +18,7 @@ from bemkit.scene.registry import BODY_FORCES
 from bemkit.scene.scene import Scene
 
 _MOST_NAMED = 12
-"""Different bodies up to which each has a line of its own."""
+"""Largest number of different bodies that have a line each."""
 _DEGREES = ("constant", "linear", "quadratic")
 
 
@@ -86,10 +86,9 @@ def find_sizes(prepared: Prepared) -> Sizes:
 def items_of_one(
     scene: BodyScene, sizes: Sizes, of_body: tuple[PlanItem, ...], n_steps: int, proposal: Symmetry | None = None
 ) -> tuple[PlanItem, ...]:
-    """Say what a scene of one body needs and what it skips, in the order in which it is used.
+    """Return the needed and skipped items of a scene of one body, in the order of their use.
 
-    Besides the sizes that is what the discretisation says of its map, the number of load steps, and a symmetry that the
-    scene has but does not use.
+    They include items of the elastic map, the number of load steps, and a symmetry that the scene has but does not use.
     """
     return (
         *_mesh_items(scene, sizes, proposal),
@@ -101,7 +100,7 @@ def items_of_one(
 
 
 def _further_meshes(accuracy: float | None, given: str, first: str) -> PlanItem:
-    """Say whether meshes follow the solution, in words for what is given otherwise and for what is planned first."""
+    """Return the item on whether meshes follow the solution, with its reasons."""
     reason = given
     if accuracy is not None:
         reason = f"until the estimated error is below {accuracy:g}; this plan is for the {first}"
@@ -181,7 +180,7 @@ def _contact_items(scene: BodyScene, sizes: Sizes, n_steps: int) -> Iterator[Pla
 
 
 def items_of_several(prepared: Prepared, sizes: Sizes, n_steps: int, *, is_dense: bool) -> Iterator[PlanItem]:
-    """Say what several bodies, or one with rigid bodies or contacts of its own, need and skip."""
+    """Return the needed and skipped items of several bodies, or of one with rigid bodies or contacts of its own."""
     scene = prepared.scene
     shapes = [[prepared.bodies[number] for number in group] for group in groups(prepared.bodies)]
     n_bodies = len(prepared.bodies)

@@ -1,4 +1,4 @@
-"""The plan of a scene: what it needs, what it skips and why, counts, memory and time; refusal of what does not fit."""
+"""The plan of a scene: needed and skipped items with reasons, counts, memory and time; checks of memory."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ from bemkit.stopwatch import announce
 
 _BYTES = 8
 _FLOPS_PER_NUMBER = 30.0
-"""A number that is only moved through memory takes as long as so many flops of a factorisation."""
+"""Flops of a factorisation in the time that a number takes to move through memory."""
 LEAST_SECONDS = 0.1
 """Seconds of a common computer for a scene of any size."""
 _MANY = 10_000
@@ -44,7 +44,7 @@ _FEW = 4_000
 _OF_SIDE = 4
 """Elements of a side on a coarse mesh; no mesh has less than one between two ends of sides and parts."""
 _FILL = 6.0
-"""Numbers in the factors of a sparse contact system for each one in the matrix: of walls of 100 to 1000 blocks."""
+"""Entries of the factors of a sparse contact system for each entry of the matrix, from walls of 100 to 1000 blocks."""
 
 
 class TooLargeError(InputError):
@@ -95,7 +95,7 @@ class Plan(ShownInNotebooks):
 
 
 def make_plan(scene: Scene, meshes: Meshes = None, *, proposal: Symmetry | None = None) -> Plan:
-    """Return what a scene needs and what it skips, before anything expensive happens.
+    """Return the plan of a scene, before any expensive computation.
 
     Parameters
     ----------
@@ -114,7 +114,7 @@ def make_plan(scene: Scene, meshes: Meshes = None, *, proposal: Symmetry | None 
 
 
 def plan_steps(steps: Sequence[Prepared], proposal: Symmetry | None = None) -> Plan:
-    """Say what scenes that follow each other in time need: sums over bodies, and the contact system.
+    """Return the plan of the scenes of a load history: sums over bodies, and the contact system.
 
     The linear solver is that of the largest body.
     """
@@ -185,12 +185,12 @@ def _most_dense() -> int:
 
 
 def announce_plan(plan: Plan) -> None:
-    """Say how large the next mesh is and how long it will take, to those who listen."""
+    """Announce the size and the expected time of the next mesh to progress displays."""
     announce(f"{plan.sizes.n_elements} elements", plan.seconds)
 
 
 def check_memory(plan: Plan) -> None:
-    """Refuse a plan whose matrices cannot fit into this computer.
+    """Check that the matrices of a plan fit into this computer.
 
     Raises
     ------
@@ -201,7 +201,7 @@ def check_memory(plan: Plan) -> None:
 
 
 def check_elements(scene: Scene, *, few: int = _FEW, many: int = _MANY) -> None:
-    """Refuse a number of elements whose matrices cannot fit into this computer, before the mesh is made.
+    """Check, before the mesh is made, that the matrices for a number of elements fit into this computer.
 
     Memory grows with the square of that number, or linearly where the equations are compressed: the plans for small
     meshes predict the cost of a large one. Half-planes of many elements have no matrices.
@@ -235,7 +235,7 @@ def check_elements(scene: Scene, *, few: int = _FEW, many: int = _MANY) -> None:
 
 
 def few_on(outline: Outline) -> int:
-    """Return how many elements an outline takes at least, so that coarse meshes of it are possible."""
+    """Return the least number of elements for a coarse mesh of an outline."""
     return _OF_SIDE * len(outline.sides)
 
 

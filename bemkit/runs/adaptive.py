@@ -1,4 +1,4 @@
-"""Meshes of one body or of several that follow the solution until the accuracy asked for is reached."""
+"""Meshes of one or several bodies that follow the solution until the accuracy is reached."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from concurrent.futures import Executor
 
 _MOST_MISSED = 12
-"""Meshes whose nodes meet no contact, each of which has nodes where the one before missed it."""
+"""Largest number of meshes that miss contact; each has nodes where the one before missed it."""
 
 
 def run_adaptive(
@@ -102,7 +102,7 @@ class _Refinement:
     executor: Executor | None
 
     def solved(self, level: Level, start: Any) -> Any:
-        """Solve a single load from the solution before, and if that leads nowhere from the beginning."""
+        """Solve a single load from the solution before, and if that fails, from the beginning."""
         scene = level.scene
         if start is not None and start.contact.n_contact and scene.n_steps == 1:
             solution = run_on_mesh(scene, level.meshes, start, self.callback, self.executor)
@@ -133,7 +133,7 @@ class _Refinement:
         return following
 
     def excess(self, level: Level, most_elements: int) -> str:
-        """Say which number of elements a level exceeds; empty if it does not.
+        """Name the limit of elements that a level exceeds; empty if it does not.
 
         That of a body, on average; of high degree, of quadratic ones with as many nodes. Copies count as one.
         """
@@ -143,7 +143,7 @@ class _Refinement:
         return f"{most_elements} elements{of_each}" if n_elements * max(degree, 2) // 2 > most_elements else ""
 
     def expected_seconds(self, level: Level, solution: Any, spent: float) -> float:
-        """Return how long the next meshes will take: what the last ones took, in the proportion of their plans."""
+        """Return the expected time of the next meshes: the time of the last ones, in proportion to their plans."""
         return spent * make_plan(level.scene, level.meshes).seconds / float(solution.plan.seconds)
 
 
@@ -201,7 +201,7 @@ def _refined(first: Level, refinement: _Refinement, options: MeshOptions) -> tup
 def _best_last(
     solutions: Sequence[Solution], obstacle: str, accuracy: float, refinement: _Refinement
 ) -> tuple[Solution, ...]:
-    """Put the best solution last, with the totals of all and the reason why its accuracy is not what was asked for.
+    """Put the best solution last, with the totals of all and the reason why it misses the accuracy.
 
     The last one is the best if it is accurate enough.
     """

@@ -30,7 +30,7 @@ from bemkit.scene.scene import Scene
 
 _UNSOLVABLE = "no contact tractions can balance the constant load, at any load factor"
 _MOVES = 1e-9
-"""Share of the largest motion below which it is round-off."""
+"""Motion that is round-off, relative to the largest."""
 
 
 def largest_load_factor(scene: Scene, *, meshes: Meshes = None) -> float:

@@ -1,4 +1,4 @@
-"""Critical friction of a scene: the coefficient from which a sliding state need not be the only answer."""
+"""Critical friction of a scene: the coefficient above which a sliding solution may not be unique."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from bemkit.solvers.base import solve
 
 
 class NoSlidingStateError(NoResultError):
-    """A scene that has no state of contact to ask about."""
+    """A scene without a state of contact."""
 
 
 @dataclass(frozen=True)

@@ -18,19 +18,19 @@ from bemkit.runs.mesh_sequence import Level, zone_cuts
 from bemkit.runs.step_errors import StepErrors
 
 LARGEST_GROWTH = 2.5
-"""Factor between the numbers of elements of two meshes: the places where the status changes must keep up."""
+"""Factor between the numbers of elements of two meshes, so that the transitions can follow."""
 SMALLEST_GROWTH = 1.1
-"""A mesh that is hardly larger would hardly be better."""
+"""Least factor between the numbers of elements of two meshes."""
 TRANSITION = 3.0
-"""Length of the element in which the status changes, in units of the accuracy times the length of the zone."""
+"""Length of the element with a transition, in units of the accuracy times the length of the zone."""
 MOST_FOR_TRANSITIONS = 2
-"""Meshes whose estimated error is small enough, made only because of the elements in which the status changes."""
+"""Largest number of meshes made only to shorten the elements with transitions."""
 SAFETY = 0.8
-"""The next mesh is planned for this part of the error asked for."""
+"""The next mesh is planned for this share of the accuracy."""
 LEAST_LOCAL = 1e-3
-"""Smallest error that is asked of single elements of a half-plane: constant tractions take thousands for less."""
+"""Smallest tolerance for single elements of a half-plane: constant tractions take thousands of elements for less."""
 LOCAL_SAFETY = 0.6
-"""The same of errors that are to hold element by element: lengths turn out longer here and there."""
+"""The same for errors of single elements, since some lengths turn out longer."""
 HALF_PLANE_SPREAD = 0.15
 """`SPREAD` of half-planes, whose errors are known element by element."""
 LENGTH_GROWTH = 0.2

@@ -17,8 +17,7 @@ from bemkit.arrays import FloatArray, IntArray
 LEAST_DEGREE = 3
 """Lowest degree whose error follows from the decay of coefficients."""
 DEGREES_PER_LAYER = 1.5
-"""Degrees that elements lose from layer to layer: a square root at the tip of layers that shrink by 0.2 would allow
-1.7."""
+"""Decrease of the degree from layer to layer: a square root at the tip of layers that shrink by 0.2 would allow 1.7."""
 MOST_KINDS = 3
 """Different degrees of one mesh."""
 SWEEP, PRODUCT, ENTRY = 5e-3, 3e-7, 2e-9
@@ -27,7 +26,7 @@ third power of the number of nodes (measured)."""
 
 
 def sufficient_degrees(excess: Callable[[IntArray], FloatArray], n_elements: int, largest: int) -> IntArray:
-    """Return the least degrees (n_elements,) at which no error is above its share; the largest where none suffices.
+    """Return the lowest degrees (n_elements,) at which no error exceeds its share; the largest if none suffices.
 
     Parameters
     ----------

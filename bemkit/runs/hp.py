@@ -38,15 +38,15 @@ from bemkit.scene.discretisation import Discretisation
 from bemkit.solvers.base import Status
 
 SAFETY = 0.36
-"""The next mesh is planned for this part of the error asked for."""
+"""The next mesh is planned for this share of the accuracy."""
 FEWEST_LEVELS = 4
-"""Meshes in layers before the error may be found to fall no longer: the first ones are coarse on purpose."""
+"""Least number of meshes in layers before the error counts as stuck: the first ones are coarse on purpose."""
 GAIN = 6.0
-"""Factor by which a degree and the layers that come with it reduce the error."""
+"""Factor by which one more degree, with its layers, reduces the error."""
 LARGEST_RISE, LAST_RISE = 2, 3
-"""Degrees from mesh to mesh: the places where the status changes must keep up; and where that is the last mesh."""
+"""Largest rise of the degree from mesh to mesh, so that the transitions can follow; and for the last mesh."""
 LOOK_DEGREE = 2
-"""Degree of the first look, which only finds the places where the status changes."""
+"""Degree of the first mesh, which only locates the transitions."""
 FIRST_DEGREE = 4
 """Degree of the first mesh in layers: it finds the places where the status changes, and its own error, well enough for
 two digits more at once. Degree 3 takes hardly less time."""
@@ -60,12 +60,12 @@ LAST_TIPS = 10.0
 """Length of the elements beside places that have moved, relative to a piece and in units of the accuracy, from which
 the last mesh asks for no shorter ones. Shorter ones only locate the points of the next mesh."""
 SPREADING = 0.6
-"""Factor per degree from which an error of contact tractions beside a singular corner has spread from there. In layers
-that a power of the distance runs through it is 0.36."""
+"""Least factor per degree of an error of contact tractions that comes from a singular corner nearby. For a power of the
+distance in layers it is 0.36."""
 MOST_CUTS = 8
-"""Places of change at which the mesh of all copies of a body is cut: each cut costs all of them layers."""
+"""Largest number of transitions at which the mesh of all copies of a body is cut: each cut costs all of them layers."""
 MOST_LOOKS = 3
-"""Meshes to resolve zones of a single node; a zone that remains then is a node that a support holds."""
+"""Largest number of meshes to resolve zones of a single node; a zone that remains is a node held by a support."""
 
 
 @dataclass(frozen=True)
@@ -91,7 +91,7 @@ class LayeredMeshes:
         return np.inf if energy is None or tractions is None else max(energy, tractions)
 
     def is_enough(self, solutions: Sequence[Solution]) -> bool:
-        """Return whether the error is small enough; not after the first look, whose zones end inside of elements."""
+        """Return whether the error is small enough; never on the first mesh, whose zones end inside elements."""
         is_first = len(solutions) == 1 and bool(solutions[0].transitions)
         return not is_first and self.error(solutions[-1]) <= self.accuracy
 
@@ -195,7 +195,7 @@ class LayeredMeshes:
         return has_error and self.accuracy < COARSE and not self._moves_on(solution)
 
     def _moves_on(self, solution: Solution) -> bool:
-        """Whether the part of its error that the next mesh keeps, as places of change still move, is too large."""
+        """Whether the part of its error that remains on the next mesh, because transitions still move, is too large."""
         error = solution.estimated_traction_error
         return error is not None and NEXT_ERROR * error > self.accuracy
 
@@ -238,7 +238,7 @@ class _Rise(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class _Errors:
-    """Estimated errors on the elements of all partitions, one after the other, and what they are measured by.
+    """Estimated errors on the elements of all partitions, one after the other, and the sizes that they are relative to.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""From one load step to the next: slip from the last converged state, smaller increments where a jump fails, work."""
+"""From one load step to the next: slip from the last converged state, smaller increments if a jump fails, work."""
 
 from __future__ import annotations
 
@@ -24,19 +24,20 @@ if TYPE_CHECKING:
     from bemkit.results.load_history import StepWork
 
 MOST_HALVINGS = 6
-"""How often an increment is halved before a step is given up."""
+"""Number of times that an increment is halved before the step fails."""
 MOST_LAWS = 60
-"""Solves of one increment under a law that depends on its slip."""
+"""Largest number of solves of one increment under a law that depends on its slip."""
 _SETTLED = 1e-10
-"""Change of such a law, relative to the largest bound, up to which it has converged."""
+"""Change of a converged law, relative to the largest bound."""
 
 _FAST, _SLOW = 10, 20
-"""Steps of the solver in one increment up to which the next is twice as large, and above which it is half as large."""
+"""The next increment is twice as large after at most this number of steps of the solver, and half as large after more
+than the second number."""
 
 _NOT_RETRIED = (Status.UNSOLVABLE_LOAD, Status.TOO_FAR, Status.TOO_COSTLY)
-"""Failures that smaller increments do not change."""
+"""Failures that smaller increments cannot cure."""
 _RETRIED = (Status.MAX_STEPS, Status.STALLED, Status.CYCLING, Status.SINGULAR)
-"""Failures that may be the solver's, or a collapse."""
+"""Failures that may come from the solver or from a collapse."""
 
 Callback = Callable[[StepRecord], None] | None
 
@@ -194,7 +195,7 @@ class Path:
         return f"load factor {first + share * (last - first):.6g}"
 
     def obstacle_slip(self, start: IncrementEnd, share: float) -> FloatArray | float:
-        """Return how far obstacles travel from the end of an increment to a share of the way."""
+        """Return the travel of obstacles from the end of an increment to a share of the way."""
         return self.drag * (share if start is self.start else share - start.share)
 
     def end_of(self, attempt: _Attempt, share: float, start: IncrementEnd) -> IncrementEnd:

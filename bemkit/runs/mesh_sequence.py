@@ -68,7 +68,7 @@ class Level:
 
     @classmethod
     def first(cls, asked: Scene) -> Level:
-        """Divide outlines of whose solution nothing is known."""
+        """Divide outlines without a known solution."""
         keys, scenes, touching = _divided_bodies(asked)
         partitions = tuple(scene.first_partition(parts) for scene, parts in zip(scenes, touching, strict=True))
         return cls(asked, partitions, keys, touching, all(scene.takes_graded_layers for scene in scenes))
@@ -109,7 +109,7 @@ class Level:
         return {name: self.partitions[key].mesh for name, key in self.keys.items()}
 
     def members(self, solution: Solution) -> list[Member]:
-        """Return what a solution on this level found on each partition."""
+        """Return the results of a solution on each partition of this level."""
         members, places = [], solution.places
         for number, partition in enumerate(self.partitions):
             names = [name for name, key in self.keys.items() if key == number]
@@ -130,7 +130,7 @@ class Level:
 
 
 def _divided_bodies(asked: Scene) -> tuple[dict[str, int], list[BodyScene], tuple[tuple[str, ...], ...]]:
-    """Return by the name of each body which scene says what it is, these scenes, and their parts in contact."""
+    """Return the index of the scene of each body by name, these scenes, and their parts in contact."""
     keys: dict[str, int] = {}
     numbers: dict[int, int] = {}
     scenes: list[BodyScene] = []
@@ -153,7 +153,7 @@ class MeshSequence(Protocol):
         ...
 
     def is_enough(self, solutions: Sequence[Solution]) -> bool:
-        """Return whether the last of the solutions is as accurate as it shall be."""
+        """Return whether the last of the solutions is accurate enough."""
         ...
 
     def following(self, level: Level, solutions: Sequence[Solution]) -> Level | None:

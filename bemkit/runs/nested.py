@@ -45,7 +45,7 @@ def run_nested(
     coarsest : int
         The number of elements is halved as long as it stays at least this large.
     ratio : int
-        By what the number of elements is divided instead of two.
+        Factor by which the number of elements is divided.
     callback : callable, optional
         Receives a record of every step on every mesh.
     executor : Executor, optional

@@ -25,7 +25,7 @@ _COARSEST, _RATIO = 1024, 16
 _COARSEST_STRIP = 50
 """Elements of the coarsest mesh of a strip of a half-plane."""
 _LARGE = 5000
-"""Elements of the mesh whose plan decides whether the equations of such a body are compressed."""
+"""Number of elements of the mesh whose plan decides whether the equations of such a body are compressed."""
 
 
 class LoadHistoryError(InputError):

@@ -41,7 +41,7 @@ class SharedBody:
         self._lock = Lock()
 
     def __reduce__(self) -> tuple[object, ...]:
-        """Travel to another process without matrices."""
+        """Pickle without matrices."""
         return _shared_body, (self._base, self._starts_cold)
 
     def run(self, scene: Scene) -> Any:
@@ -64,7 +64,7 @@ class SharedBody:
             return self._bodies.run(scene, is_cold=True)
 
     def release(self) -> None:
-        """Let go of all matrices; they would be made again for another scene."""
+        """Free all matrices; another scene would assemble them again."""
         with self._lock:
             self._bodies = None
 
@@ -96,7 +96,7 @@ class _Bodies:
 
     @property
     def has_start(self) -> bool:
-        """Whether a scene has been solved from which others can start."""
+        """Whether there is a solution that others can start from."""
         return self._last is not None
 
     def run(self, scene: Scene, *, is_cold: bool) -> Any:

@@ -1,4 +1,4 @@
-"""From what the solver found to a solution: physical fields, contact table, forces, transitions and warnings."""
+"""From the state of a solver to a solution: physical fields, contact table, forces, transitions and warnings."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 def solution_of(
     model: Model, result: ContactSolution, plan: Plan, clock: StageClock, motion: SlipHistory | None = None
 ) -> Solution:
-    """Turn what the solver found into the physical fields of all bodies; the slip is for laws that depend on it."""
+    """Return the solution of a contact state; the slip is for laws that depend on it."""
     prepared = model.prepared
     state, node_status = result.state, result.node_status
     solved, reactions, depth = model.boundary_fields(state), model.reactions(state), model.depth
@@ -95,7 +95,7 @@ def solution_of(
 
 
 def _resultants(prepared: Prepared, table: ContactTable) -> list[list[PartForce]]:
-    """Return what each contact with nodes exerts on its elastic sides, first on the one with the nodes."""
+    """Return the resultants of each contact with nodes on its elastic sides, first on the one with the nodes."""
     traction = np.stack([table.sigma_n, table.sigma_t], axis=1)
     areas = prepared.scene.depth * table.weight
     forces = np.einsum("nk,nkc->nc", areas[:, None] * traction, prepared.frame)

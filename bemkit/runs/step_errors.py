@@ -1,4 +1,4 @@
-"""Estimated errors of all load steps on one mesh: what the next mesh follows."""
+"""Estimated errors of all load steps on one mesh, for the next mesh."""
 
 from __future__ import annotations
 
@@ -19,8 +19,7 @@ from bemkit.results.surface_errors import SurfaceErrors
 class StepErrors:
     """The largest errors of all steps on each element.
 
-    The largest energy among the steps measures all of them, so that those of an unloaded body are not measured by
-    nothing.
+    All are relative to the largest energy among the steps, since that of an unloaded body is zero.
 
     Parameters
     ----------
@@ -95,5 +94,5 @@ class StepErrors:
 
 
 def in_which_step(solution: Solution) -> str:
-    """Return what follows an error in words: nothing of a single load."""
+    """Return the name of the step after an error in a message; empty for a single load."""
     return "" if solution.stated.n_steps == 1 else " in one of the steps"

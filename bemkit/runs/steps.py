@@ -1,4 +1,4 @@
-"""Load histories: what is asked, the one loop over their steps, and what comes out."""
+"""Load histories: options, the loop over the steps, and results."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class UnsolvableSceneError(InputError):
 
 
 def planned(steps: Sequence[Scene], meshes: Meshes = None) -> tuple[tuple[Prepared, ...], Plan, StageClock]:
-    """Return load steps ready to solve, their plan, and the clock of their run; refuse what does not fit."""
+    """Return load steps ready to solve, their plan, and the clock of their run; check that they fit into memory."""
     clock = StageClock.start()
     if meshes is None:
         check_elements(steps[0])
@@ -61,7 +61,7 @@ def built(prepared: Prepared, clock: StageClock, executor: Executor | None = Non
 
 
 def checked(model: Model, result: ContactSolution) -> ContactSolution:
-    """Return the outcome of a solve, named otherwise if energies, turns that a mesh stops, or slides are wrong."""
+    """Return the outcome of a solve, with another status if checks of energy, free rotation or sliding fail."""
     result = _with_load_named(model, with_energies_checked(model, result))
     if any(rows.law.is_frictionless for rows in model.prepared.rows):
         from bemkit.model.turning import with_turning_checked
@@ -85,13 +85,13 @@ def _with_load_named(model: Model, result: ContactSolution) -> ContactSolution:
 
 
 def why_not(model: Model, result: ContactSolution) -> str:
-    """Say why a load cannot be balanced, or what the solver says of another failure."""
+    """Explain why a load cannot be balanced; for another failure return the message of the solver."""
     load = find_unsolvable_load(model.problem) if result.status is Status.UNSOLVABLE_LOAD else None
     return result.message if load is None else explained(model, load)
 
 
 def explained(model: Model, load: UnsolvableLoad) -> str:
-    """Say how a load moves bodies that nothing holds, and the remedy."""
+    """Describe how a load moves bodies that nothing holds, and the remedy."""
     from bemkit.model.free_motion import describe
 
     return describe(model.prepared, load)
@@ -107,7 +107,7 @@ class History:
     times : sequence of float [s]
         Of its steps.
     is_recorded : bool
-        Whether results say what the steps were.
+        Whether results contain the steps.
     done : Solution, optional
         Up to some step, with its `loading`: that is where to go on.
     finished : callable, optional
@@ -342,7 +342,7 @@ def run_on_mesh(
 
 
 def guess_from(scene: Scene, start: Any) -> Callable[[Model], ContactState] | None:
-    """Return what takes a solution to the contact nodes of a model, where one is given."""
+    """Return a function that interpolates a solution to the contact nodes of a model, if a solution is given."""
     if start is None:
         return None
     if not scene.has_contact:

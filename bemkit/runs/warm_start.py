@@ -40,7 +40,7 @@ def state_on(model: Model, solution: Solution) -> ContactState:
 
 
 def take_sticking_state(model: Model, coarse: Model) -> None:
-    """Measure the load of a model by the sticking state of a coarser mesh: its own costs more than a few steps."""
+    """Measure the load of a model by the sticking state of a coarser mesh, which is cheaper than its own."""
     state, units = coarse.problem.sticking_state, coarse.units
     displacement, traction = state.displacement * units.displacement, state.traction * units.stress
     names, arc_length = coarse.prepared.names, coarse.prepared.column("arc_length")

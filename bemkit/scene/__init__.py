@@ -1,1 +1,1 @@
-"""The statement of a problem: what a scene holds, its text form, its symmetry, its load steps."""
+"""Problems: scenes, their files, their symmetry, their load steps."""

@@ -1,4 +1,4 @@
-"""One of several elastic bodies: its position, what acts on it, and which symmetry lines cross it."""
+"""One of several elastic bodies: its position, its loads, and the symmetry lines that cross it."""
 
 from __future__ import annotations
 
@@ -24,11 +24,11 @@ from bemkit.scene.plane_motion import FarField
 from bemkit.scene.steps import check_names
 
 _ALONG = np.linspace(0.0, 1.0, 33)
-"""Parameters of curves at which the extent of a body is taken."""
+"""Parameters of curves at which the extent of a body is measured."""
 _NAME = "the body name {name!r} does not do: give printable text without a dot"
 _ALL_SIDES = "*"
 _ON_LINE = 1e-9
-"""Share of its size by which a body that ends on a symmetry line may cross it by round-off."""
+"""Distance by which a body that ends on a symmetry line may cross it by round-off, relative to its size."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -46,14 +46,14 @@ class Body:
         Supports, loads and rigid obstacles. `Part.where` is in the coordinates of the shape; loads, given displacements
         and obstacles are in those of the scene, where the body is placed.
     body_forces : tuple of BodyForce
-        What acts inside the body, in the coordinates of the scene.
+        Forces and heat inside the body, in the coordinates of the scene.
     far : FarField, optional
         Motion or load of a half-plane far away from its surface, in the coordinates of the scene. By default it is at
         rest there.
     placement : Placement
         Position of the body: turned, then shifted.
     copies : Copies, optional
-        Makes many of it, each named ``"name-..."``; copies that no support holds share one factorisation.
+        Makes copies of the body, each named ``"name-..."``; copies without supports share one factorisation.
     discretisation : Discretisation, optional
         By default that of the scene.
     mesh : MeshOptions, optional
@@ -138,7 +138,7 @@ def lines_across(body: Body, symmetry: Symmetry | None) -> Symmetry | None:
 
 
 def check_accuracy(mesh: MeshOptions, bodies: Sequence[Body]) -> None:
-    """Raise InputError if an accuracy of all bodies goes with a degree or a mesh of one of them."""
+    """Raise InputError if a scene has both an accuracy and a body with its own degree or mesh."""
     for body in bodies if mesh.accuracy is not None else ():
         if mesh.rising_degrees and body.discretisation is not None:
             raise InputError(

@@ -122,7 +122,7 @@ BodyForce: TypeAlias = Gravity | Rotation | Heating
 
 
 def seen_from(force: BodyForce, placement: Placement) -> BodyForce:
-    """Return a body force in the coordinates of the shape of a placed body; the same where it was not moved."""
+    """Return a body force in the coordinates of the shape of a placed body; the same object if it was not moved."""
     if placement == Placement():
         return force
     match force:

@@ -1,4 +1,4 @@
-"""One body of a scene in the coordinates of its shape: all that its mesh and its equations need."""
+"""One body of a scene in the coordinates of its shape: the input of its mesh and its equations."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class BodyScene:
     shape : Shape
     material : Material
     parts : tuple of Part
-        Those stated, and as free parts the sides that touch other bodies.
+        The parts of the scene, and as free parts the sides that touch other bodies.
     law : FrictionLaw
         On all parts at rigid obstacles that have no law of their own.
     steps : tuple of Step
@@ -63,7 +63,7 @@ class BodyScene:
     ------
     InputError
         If a part names an unknown side, a law needs slip or time without steps, body forces act in an exterior, an
-        accuracy is asked of collocation, or a half-plane has what only other bodies have.
+        collocation has an accuracy, or a half-plane has an option of other bodies.
     GeometryError
         If the outline of the shape is not a valid boundary.
     """
@@ -133,7 +133,7 @@ class BodyScene:
             )
 
     def check_among_others(self, name: str) -> None:
-        """Raise InputError, with the name of the body, if it has what only a single one may have."""
+        """Raise InputError, with the name of the body, if it has an option that only a single body may have."""
         if isinstance(self.discretisation, Galerkin) and isinstance(self.discretisation.degree, tuple):
             raise InputError(
                 f"degree is a list, of body {name!r}: elements have several degrees in scenes of one body only; give "
@@ -203,8 +203,8 @@ class BodyScene:
         Parameters
         ----------
         contact : collection of str
-            Names of the parts that may touch something. They are divided evenly; where the next mesh is made anew in
-            layers, this one only looks for places where their status changes.
+            Names of the parts that may touch something. They are divided evenly; if the next mesh is made anew in
+            layers, this one only locates the transitions.
         """
         outline = self.shape.outline()
         if self.takes_graded_layers and contact:
@@ -259,7 +259,7 @@ def _check_sides(part: Part, names: tuple[str, ...]) -> None:
 def _check_half_plane(
     outline: Outline, far: FarField | None, discretisation: Discretisation, mesh: MeshOptions, parts: Sequence[Part]
 ) -> None:
-    """Check that a half-plane has nothing that only other bodies have, and another body no far field.
+    """Check that a half-plane has no options of other bodies, and another body no far field.
 
     Raises
     ------

@@ -221,7 +221,7 @@ class Contact:
     Raises
     ------
     InputError
-        If one is a word or a class.
+        If one is a text or a class.
     """
 
     obstacle: Obstacle
@@ -237,7 +237,7 @@ Condition: TypeAlias = Clamped | Roller | PrescribedDisplacement | Traction | Pr
 def with_fields(
     condition: Condition, load: Callable[[ScalarField], ScalarField], motion: Callable[[ScalarField], ScalarField]
 ) -> Condition:
-    """Return a condition whose loads and prescribed displacements are functions of what they were."""
+    """Return a condition with functions applied to its loads and its prescribed displacements."""
     match condition:
         case Traction(x, y):
             return Traction(load(x), load(y))

@@ -44,7 +44,7 @@ class ContactPair:
         Added to the distance of the shapes, at points of the side with the multipliers; negative presses bodies
         together that are drawn touching.
     interference : float [m]
-        Largest overlap of the shapes as they are drawn that is meant; more is an error.
+        Largest intended overlap of the shapes as they are drawn; more is an error.
     multipliers_on : str, optional
         The side on whose nodes contact is decided; by default see `bemkit.contact.mortar`. Never a rigid body.
     reach : float [m], optional
@@ -151,7 +151,7 @@ SideNames = Callable[[Body], Sequence[tuple[str, str]]]
 def check_contacts(
     contacts: Sequence[ContactPair], rigid: Sequence[RigidBody], bodies: Mapping[str, Body], side_names: SideNames
 ) -> None:
-    """Raise InputError if a contact names what does not exist or is listed twice, or a rigid body touches nothing.
+    """Raise InputError if a contact names an unknown side or is listed twice, or a rigid body has no contact.
 
     Parameters
     ----------

@@ -16,7 +16,7 @@ class Copies(Protocol):
     """A rule for the places of copies; a frozen dataclass."""
 
     def placements(self) -> dict[str, Placement]:
-        """Return the place of each copy, by what its name adds to that of the body."""
+        """Return the placement of each copy, by the suffix of its name."""
         ...
 
 
@@ -94,7 +94,7 @@ class ListedCopies:
     Parameters
     ----------
     places : tuple of Placement
-        Each moves the body from where it is placed.
+        Each moves the body from its placement.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""How scene files write a declared type: by a word of a registry, in tables with headings, as one of several types."""
+"""The form of a declared type in scene files: a word of a registry, tables with headings, or one of several types."""
 
 from __future__ import annotations
 

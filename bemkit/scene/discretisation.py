@@ -57,7 +57,7 @@ class Discretisation(Protocol):
         mesh : BoundaryMesh
         material : Material
         linear_solver : LinearSolver
-            To be used if the map is symmetric.
+            For a symmetric map.
         """
 
 
@@ -72,8 +72,8 @@ class Galerkin(Discretisation):
     Parameters
     ----------
     degree : int or sequence of int
-        p, from 1 to 12, of all elements or of each one. High degrees pay on smooth fields, and on meshes whose elements
-        become shorter towards corners and towards places where contact changes, which an accuracy makes. Where degrees
+        p, from 1 to 12, of all elements or of each one. High degrees are efficient for smooth fields, and on meshes
+        that are graded towards corners and transitions, as for an accuracy. Where degrees
         differ, elements share the node between them, and tractions are of degree 1 where displacements are.
 
     Raises
@@ -176,9 +176,9 @@ class ConstantCollocation(Discretisation):
     Parameters
     ----------
     slopes : bool
-        Whether the double layer takes account of the slope of the displacement between neighbouring elements. Rotations
-        then cause no forces, and displacements and energies converge with the second order. Without slopes this is the
-        method of the paper, of the first order.
+        Whether the double layer includes the slope of the displacement between neighbouring elements. Rotations then
+        cause no forces, and displacements and energies converge with second order. Without slopes this is the method of
+        the paper, which has first order.
     """
 
     slopes: bool = True

@@ -107,7 +107,7 @@ def _at_time(scene: Scene, changes: Mapping[str, Any], factor: TimeValue, time: 
 
 
 def _value(value: Any, time: float) -> Any:
-    """Return a value at a time: functions and formulas of t are evaluated; those of x and y remain formulas."""
+    """Evaluate functions and formulas of the time t; formulas of x and y remain."""
     if isinstance(value, Expression) or not (callable(value) or isinstance(value, str)):
         return value
     if not isinstance(value, str):
@@ -145,7 +145,7 @@ def with_scaled_loads(scene: Scene, factor: float) -> Scene:
 def _scaled(loaded: Scene | Body, factor: float, known: dict[int, Any]) -> dict[str, Any]:
     """Return parts, body forces and the far field under scaled loads; those without loads are the same objects.
 
-    Objects that several bodies share stay shared: `known` maps the identity of each to its scaled copy.
+    Bodies continue to share objects: `known` maps the identity of each to its scaled copy.
     """
 
     def scaled(field: ScalarField) -> ScalarField:

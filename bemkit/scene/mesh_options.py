@@ -16,21 +16,22 @@ from bemkit.geometry.meshing.discretise import Grading, Uniform
 from bemkit.result_warning import ResultWarning
 
 DEFAULT_ELEMENTS = 320
-"""Elements where neither a number nor an accuracy is given."""
+"""Default number of elements."""
 FIRST_ELEMENTS = 40
-"""Elements of the first mesh, roughly, if an accuracy is given."""
+"""Approximate number of elements of the first mesh for an accuracy."""
 SMALLEST_ACCURACY = 1e-10
 """Smallest accuracy that round-off allows."""
 MOST_ELEMENTS = 1500
-"""Elements at which the search for an accuracy ends by default."""
+"""Default of the largest number of elements for an accuracy."""
 _LONGEST = 0.75
-"""Length of elements, in thicknesses, at which the energy of a pinched ring is 2 per cent off; it grows with the third
-power of the length."""
+"""Length of elements, in thicknesses, at which the energy of a pinched ring has an error of 2 per cent, which grows
+with the third power of the length."""
 _SHARE = 0.25
 """Share of the boundary that must be thin for a warning: more than the tip of a wedge or the strip beside a hole."""
 _FACING = -0.5
 _ROWS, _FEW = 4096, 1024
-"""Elements whose neighbours are found at a time; all distances of few take less time than loading a tree (measured)."""
+"""Number of elements whose neighbours are searched at a time. For few elements all distances take less time than
+loading a tree (measured)."""
 
 
 @dataclass(frozen=True)

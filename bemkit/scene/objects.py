@@ -31,7 +31,7 @@ _SEVERAL = ("parts", "steps", "load_factors", "body_forces", "bodies", "rigid", 
 
 
 def outline_of(shape: Shape) -> Outline:
-    """Return the outline of a shape; InputError if that of one's own takes arguments or returns anything else."""
+    """Return the outline of a shape; InputError if its method takes arguments or returns no outline."""
     outline: object = called(shape, "outline", (), "outline(self), which returns a bemkit.geometry.outline.Outline")
     if not isinstance(outline, Outline):
         raise InputError(
@@ -42,9 +42,9 @@ def outline_of(shape: Shape) -> Outline:
 
 
 def check_objects(owner: Any, name: str = "") -> None:
-    """Refuse words, numbers and classes where a part of a scene takes an object, and one thing where it takes several.
+    """Refuse texts, numbers and classes where a scene takes an object, and single values where it takes several.
 
-    They would be taken for objects of an unknown kind, and a condition that no code knows leaves the boundary free.
+    An unknown condition would leave the boundary free.
 
     Parameters
     ----------

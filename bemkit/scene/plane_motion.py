@@ -14,7 +14,7 @@ from bemkit.errors import InputError
 from bemkit.scene.objects import check_objects
 
 COMPONENTS = (("x", "force_x"), ("y", "force_y"), ("turn", "moment"))
-"""The three motions in the plane, each with the load that does work on it."""
+"""The three motions in the plane, each with its conjugate load."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -145,8 +145,8 @@ class FarField(PlaneMotion):
     centre : (float, float) [m]
         Where the forces act, and about which it turns and is strained.
     strain : float [-]
-        Strain of the whole half-plane along its surface, by a bulk stress of E' times as much; zero by default. That
-        of a specimen under tension or bending on which a pad is pressed.
+        Strain of the whole half-plane along its surface, from a bulk stress of E' times the strain, as in a specimen
+        under tension or bending below a pad. Zero by default.
 
     Raises
     ------

@@ -37,7 +37,7 @@ def profile_warnings(parts: Sequence[Part], units: UnitNames | None) -> Iterator
 
 
 def _other_obstacles(parts: Sequence[Part]) -> Iterator[tuple[Part, Obstacle]]:
-    """Yield parts with obstacles that may be profiles, whose modules the others do without."""
+    """Yield the parts whose obstacles may be profiles; only these load modules of profiles."""
     for part in parts:
         if isinstance(part.condition, Contact) and not isinstance(part.condition.obstacle, SIMPLE_OBSTACLES):
             yield part, part.condition.obstacle

@@ -17,7 +17,7 @@ def in_units_of_scene(text: str, owner: type, name: str, units: UnitNames | None
     Parameters
     ----------
     text : str
-        What is not a number with a unit, such as a formula, is returned as it is.
+        Any other value, such as a formula, is returned unchanged.
     owner : type
         The class of the field. Its docstring states the unit of the field in SI, such as ``[Pa]``.
     name : str
@@ -50,7 +50,7 @@ def in_units_of_scene(text: str, owner: type, name: str, units: UnitNames | None
 
 
 def _scale(unit: Unit, units: UnitNames | None, text: str) -> float:
-    """Return the size in SI units of what a scene counts a quantity in; of time it is the second."""
+    """Return the SI size of the unit of a quantity in a scene; the unit of time is the second."""
     mass, length, _, _, _ = unit.powers
     if mass == length == 0:
         return 1.0

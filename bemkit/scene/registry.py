@@ -13,7 +13,7 @@ from bemkit.formulas import closest, shorten
 
 
 def reference_of(declared: object) -> str:
-    """Return the import path of a class, as ``"module:Class"``; of another declared type a text that is none."""
+    """Return the import path of a class, as ``"module:Class"``; for another declared type its text."""
     return f"{getattr(declared, '__module__', '')}:{getattr(declared, '__qualname__', '')}"
 
 
@@ -24,7 +24,7 @@ class Registry:
     Parameters
     ----------
     role : str
-        What the classes are, for messages: "friction law".
+        Role of the classes in messages: "friction law".
     built_in : mapping of str to str
         Name to ``"module:Class"``; a module is imported when its name is first used.
     group : str
@@ -32,7 +32,7 @@ class Registry:
     presets : mapping of str to (str, mapping), optional
         Names of a class with options: the name of the class, and the values of its keys.
     hints : mapping of str to str, optional
-        Names without a class, and what to write instead.
+        Former names, and their replacements.
     protocol : str, optional
         The protocol of the classes, as ``"module:Class"``; none if nobody can add a class.
     listed : str, optional

@@ -37,15 +37,15 @@ from bemkit.solvers.base import ContactSolver
 from bemkit.solvers.fallbacks import Fallbacks
 
 _OF_COPY = ("name", "placement", "copies")
-"""Fields of a body in which its copies differ."""
+"""Fields of a body that differ between its copies."""
 OF_ONE_BODY = ("shape", "material", "parts", "body_forces", "far")
 """Fields of the short form."""
 OF_SEVERAL = ("bodies", "rigid", "contacts", "touching")
-"""Fields that the short form does without."""
+"""Fields that the short form lacks."""
 
 
 class NoContactError(InputError):
-    """Something that needs contact was asked of a scene without contact."""
+    """A method that needs contact, for a scene without contact."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -88,7 +88,7 @@ class Scene(ShownInNotebooks):
     discretisation : Discretisation
         Of all bodies that have none of their own.
     linear_solver : LinearSolver or Automatic
-        How the displacements of bodies away from the contacts are solved for.
+        Linear solver of the bodies.
     mesh : MeshOptions
         Of each body that has none of its own; `elements` are those of one body. An accuracy is that of all bodies.
     solver : ContactSolver
@@ -98,7 +98,7 @@ class Scene(ShownInNotebooks):
         Out of the plane. With it forces and moments, given and in results, are those on the whole thickness, and
         energies, too; without it all are per unit of thickness.
     description, reference : str
-        For the reader: what the scene shows and where it comes from.
+        Text: what the scene shows, and its source.
 
     Raises
     ------
@@ -182,7 +182,7 @@ class Scene(ShownInNotebooks):
                 check_place(body, self.symmetry)
 
     def __getstate__(self) -> dict[str, Any]:
-        """Pickle the fields only: what is cached is known by the identity of objects."""
+        """Pickle the fields only: caches use the identity of objects."""
         return {entry.name: getattr(self, entry.name) for entry in fields(self)}
 
     def _check_form(self) -> None:
@@ -322,10 +322,10 @@ class Scene(ShownInNotebooks):
         return {}
 
     def scene_of(self, body: Body) -> BodyScene:
-        """Return what the scene says of one placed body, in which sides in contact are free parts.
+        """Return the scene of one placed body, with the sides in contact as free parts.
 
         Its shape is in the coordinates of the body; loads, given displacements and obstacles are those in its place.
-        Copies without moments share one, and so do bodies that are made of the same objects.
+        Copies without moments share it, and so do bodies that consist of the same objects.
         """
         has_moment = any(isinstance(part.condition, Force) and part.condition.moment for part in body.parts)
         own = [getattr(body, each.name) for each in fields(body) if each.name not in _OF_COPY]
@@ -380,14 +380,14 @@ class Scene(ShownInNotebooks):
 
 
 def _identity(value: object) -> object:
-    """Return what values share that are taken for one: numbers are compared, other objects must be the same."""
+    """Return a key that equal values share: numbers are compared, other objects must be identical."""
     if isinstance(value, tuple):
         return tuple(id(entry) for entry in value)
     return value if isinstance(value, Material | FarField) else id(value)
 
 
 def check_scene(scene: object) -> None:
-    """Refuse what is not a scene, such as the name of one.
+    """Check that a value is a scene, not the name of one.
 
     Raises
     ------

@@ -1,7 +1,7 @@
-"""The JSON schema of scene files, by which editors complete keys and mark what is wrong while it is written.
+"""The JSON schema of scene files: editors use it to complete keys and mark mistakes.
 
-It is made of the same dataclasses, types and words that scene files are read by, of those that installed packages add,
-too; descriptions are those of the docstrings. Editors know draft 7 of JSON schema.
+It is generated from the dataclasses, types and words that the reader uses, including those of installed packages;
+descriptions come from the docstrings. Editors know draft 7 of JSON schema.
 """
 
 from __future__ import annotations
@@ -41,8 +41,8 @@ _PLAIN: tuple[tuple[Any, Schema], ...] = (
 def scene_schema() -> Schema:
     """Return the JSON schema (draft 7) of scene files of one body and of several.
 
-    What is no matter of keys, types and words, such as a Poisson ratio of 0.7 or a side that the shape lacks, is left
-    to `bemkit.load_scene`.
+    It covers keys, types and words. `bemkit.load_scene` finds other mistakes, such as a Poisson ratio of 0.7 or an
+    unknown side.
 
     Returns
     -------
@@ -185,7 +185,7 @@ def _is_of_kind(word: str) -> Schema:
 
 
 def _hints(tables: Mapping[str, Schema]) -> Schema:
-    """Return all keys of all kinds with their descriptions: editors look no further for what they propose."""
+    """Return all keys of all kinds with their descriptions, for the proposals of editors."""
     texts: dict[str, list[str]] = {}
     for word, table in tables.items():
         for key, schema in table["properties"].items():

@@ -111,7 +111,7 @@ def _structured(value: object, declared: Any, at: _Place) -> Any:
 
 
 def _made(at: _Place, function: Callable[..., Any], *arguments: Any, **values: Any) -> Any:
-    """Return what a function makes of the text of the user; its error becomes a mistake at the path."""
+    """Call a function on the input of the user; its error becomes a mistake at the path."""
     try:
         return function(*arguments, **values)
     except (StructureError, RecursionError):

@@ -1,4 +1,4 @@
-"""A scene to start from: the body of a file pressed onto a rigid floor, as text that its reader changes."""
+"""A scene to start from: the body of a file pressed onto a rigid floor, as text to edit."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from bemkit.scene.registry import SHAPES
 START = "# A scene to start from"
 """How such texts begin."""
 _SQUEEZE = 1e-3
-"""Share of its height by which the body is pressed together."""
+"""Compression of the body, relative to its height."""
 _LEAST_ELEMENTS, _ELEMENTS_OF_SIDE = 160, 6
 _FACING_UP, _FACING_FLOOR = 0.7, 0.3
-"""Upward component of the normals of sides that are held, in the mean, and downward one of those that may touch."""
+"""Least mean upward component of the normals of held sides, and downward component for sides that may touch."""
 _NEAR = 0.05
-"""Share of the height within which they are near the top or the floor."""
+"""Distance from the top or the floor within which they lie, relative to the height."""
 _STEEL: Mapping[str, tuple[float, str]] = MappingProxyType(
     {"mm": (210000.0, "MPa"), "cm": (2.1e7, "N/cm^2"), "m": (2.1e11, "Pa"), "in": (3.05e7, "psi")}
 )
@@ -71,7 +71,7 @@ def starting_scene(source: ShapeFile, file: str) -> str:
 
 
 def _options(source: ShapeFile) -> dict[str, str]:
-    """Return how the file is read, as TOML, where it is not by default."""
+    """Return the options of reading the file that are no defaults, as TOML."""
     chosen = ((entry, getattr(source, entry.name)) for entry in fields(source) if entry.name != "file")
     return {entry.name: json.dumps(value, ensure_ascii=False) for entry, value in chosen if value != entry.default}
 
@@ -81,7 +81,7 @@ def _text(text: str | list[str]) -> str:
 
 
 def _chosen(outline: Outline, low: float, high: float) -> tuple[str, str]:
-    """Return what may touch the floor and what is held at the top, as TOML; they share no piece of boundary."""
+    """Return the sides that may touch the floor and those held at the top, as TOML; they share no piece of boundary."""
     height = high - low
     touching, held = [], []
     for side in outline.sides:

@@ -19,7 +19,7 @@ TimeValue: TypeAlias = float | str | Callable[[float], float]
 
 @dataclass(frozen=True)
 class Step:
-    """One step of a load history: what changes in it. All else stays as it was at the end of the step before.
+    """One step of a load history, with its changes. Everything else stays as at the end of the step before.
 
     Parameters
     ----------

@@ -1,7 +1,7 @@
 """Whether a scene is symmetric about a line: its shape, conditions, loads, obstacles and friction laws.
 
-Points of the boundary are reflected; each image must lie on the boundary of the whole body, and what acts there must be
-the image of what acts at the point. Friction is symmetric where its bound is: slip is reflected with the body.
+Points of the boundary are reflected: each image must lie on the boundary of the whole body, and the conditions there
+must be the images of those at the point. Friction is symmetric where its bound is: slip is reflected with the body.
 """
 
 from __future__ import annotations
@@ -29,11 +29,11 @@ from bemkit.scene.conditions import Clamped, Contact, Load, Part, PrescribedDisp
 _PER_PIECE = 4
 """Elements of each piece of the boundary in the coarse mesh on which images are looked for."""
 _PLACES = np.array([-0.9, -0.37, 0.31, 0.8])
-"""Local coordinates of the points compared on each element: not its ends, where parts change, and not symmetric."""
+"""Local coordinates of the points compared on each element: asymmetric, and away from its ends, where parts change."""
 _TOLERANCE = 1e-9
-"""Difference, relative to the values compared, up to which they count as equal: round-off and omitted digits."""
+"""Relative difference of equal values: round-off and omitted digits."""
 _PRESSURES = (1e-6, 1e-4, 1e-2, 1.0)
-"""Pressures in units of E' at which the bounds of friction laws are compared."""
+"""Pressures, in units of E', at which friction bounds are compared."""
 
 
 class SymmetricScene(Protocol):
@@ -189,7 +189,7 @@ class _Whole:
         return cls(scene, division.mesh([piece.at(positions) for piece in division.pieces]))
 
     def difference(self, line: Symmetry, samples: _Samples) -> str | None:
-        """Say what is not symmetric about a line, or return None."""
+        """Describe a difference from symmetry about a line; None if there is none."""
         from bemkit.operators.somigliana.locate import Locator  # only scenes with a symmetry need it
 
         signs = line.images[1]
@@ -242,7 +242,7 @@ def _first_difference(
     signs: FloatArray,
     gap_size: float = 0.0,
 ) -> str | None:
-    """Say where values (n, 1), or vectors (n, 2), at points are not those at their images; None if they all are."""
+    """Describe the first difference of values (n, 1), or vectors (n, 2), at points from their images, or None."""
     points, images = places
     for name, at_points in values.items():
         at_images = image_values[name]

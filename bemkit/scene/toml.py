@@ -119,9 +119,9 @@ def scene_from_toml(text: str, *, name: str = "scene", folder: Path | None = Non
     ----------
     text : str
     name : str
-        Where the text comes from, for messages.
+        Source of the text, for messages.
     folder : Path, optional
-        Where names of mesh and drawing files begin. Without it the text may not name files.
+        Folder of mesh and drawing files. Without it the text may not name files.
 
     Raises
     ------
@@ -244,7 +244,7 @@ def with_overrides(
     solver: str | None = None,
     rho: float | None = None,
 ) -> Scene:
-    """Change a scene by the words and numbers of the command line; what is None stays.
+    """Change a scene by the words and numbers of the command line; None changes nothing.
 
     Parameters
     ----------

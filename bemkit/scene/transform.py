@@ -211,7 +211,7 @@ def with_gap_offset(scene: Scene, offset: float) -> Scene:
 def with_turned_loads(scene: Scene, angle: float) -> Scene:
     """Return a scene whose tractions, pressures and weight are turned anticlockwise by an angle [rad].
 
-    So are forces far away, of which motions that are given there hold what is left along them.
+    Forces far away turn, too; given motions there resist their components along them.
     """
     cosine, sine = float(np.cos(angle)), float(np.sin(angle))
 

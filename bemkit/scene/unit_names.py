@@ -1,4 +1,4 @@
-"""Units of measurement: their sizes and dimensions, and the names of those that a scene is stated in."""
+"""Units of measurement: their sizes and dimensions, and the names of the units of a scene."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _LONGEST = 24
 QUANTITIES: Mapping[str, str] = MappingProxyType(
     {"m": "length", "Pa": "stress", "N/m": "force", "N m/m": "energy", "J/m": "energy"}
 )
-"""Quantities of the SI units that columns of tables state, by whose names units are called."""
+"""Quantities of the SI units of table columns, which select the names of units."""
 _FACTOR = re.compile(r"([^\W\d_]+|°)(?:\^?(-?\d))?")
 
 
