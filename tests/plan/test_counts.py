@@ -114,13 +114,13 @@ LEFT_OUT = {
         "operators.forms.DoubleLayerForm.terms",
         "operators.linear.dense.Cholesky.__init__",
         "operators.integrals.inner.far_inner",
-        "operators.integrals.curved_panels.fit",
+        "operators.integrals.curved_geometry.fit",
     ),
     "linear": (
         "operators.steklov_poincare.collocation.MixedSystem._sweep",
         "operators.linear.dense.DenseLU.__init__",
         "operators.integrals.inner.far_inner",
-        "operators.integrals.curved_panels.fit",
+        "operators.integrals.curved_geometry.fit",
     ),
     "no contact": (
         "contact.condensation.dense_body.DenseBody.__init__",
