@@ -46,7 +46,7 @@ def run(
     """Solve a scene, or scenes that follow each other in time.
 
     Every body is factored once for all load steps; slip counts from the end of the step before. Where the jump to a
-    load fails, the step is halved; see `bemkit.runs.load_path.reach`.
+    load fails, the step is halved; see `bemkit.runs.load_path.advance`.
 
     Parameters
     ----------
