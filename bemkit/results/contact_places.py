@@ -11,6 +11,7 @@ import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray, IntArray
 from bemkit.contact.body import SlipHistory
+from bemkit.geometry.local_values import element_degrees
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.vectors import norms
 from bemkit.results.contact_table import resolved_transitions, unresolved_contacts
@@ -25,6 +26,9 @@ if TYPE_CHECKING:
 LARGEST_REACH = 0.15
 """Largest length of the elements at a singular point that are excluded as near it, relative to the contact. Longer ones
 have estimates."""
+
+SPREADING = 0.15
+"""Share of the error of an excluded element, by its degree, that the tractions of its neighbour have, too."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -182,7 +186,18 @@ class ContactPlaces:
         for name, body in solution.bodies.items():
             if body.coefficient_errors is not None:
                 squared += float(body.coefficient_errors.traction[elements[name]].sum())
+                squared += self._squared_spreading_error(name)
         return squared
+
+    def _squared_spreading_error(self, name: str) -> float:
+        """Return the squared error [Pa^2 m] that spreads from excluded elements of a body to their neighbours."""
+        body, counted = self.solution.bodies[name], self._counted[name]
+        assert body.coefficient_errors is not None
+        pairs = np.concatenate([body.mesh.node_elements, body.mesh.node_elements[:, ::-1]])
+        excluded = np.setdiff1d(self._touching(name), counted)
+        source = pairs[np.isin(pairs[:, 0], excluded) & np.isin(pairs[:, 1], counted), 0]
+        degrees = element_degrees(body.scene.discretisation.displacement_space(body.mesh))[source]
+        return float((SPREADING / degrees) ** 2 @ body.coefficient_errors.traction[source])
 
     def squared_energy_error(self) -> float:
         """Return the squared error in the energy norm [J/m] where zones end inside elements of degree 3 and more."""

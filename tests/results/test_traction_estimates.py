@@ -127,6 +127,27 @@ def test_ends_of_contact_inside_elements_count_in_the_energy() -> None:
     assert 0.5 < coarse.estimated_error / energy < 3.0  # 0.26 without them
 
 
+def test_errors_at_a_singular_corner_spread_to_its_neighbour() -> None:
+    """Four elements of degree 6 touch: the corner's is excluded, and causes the error of the next one."""
+    shape = bk.Polygon(((-0.5, 0.0), (0.5, 0.0), (0.88, 0.8), (-0.36, 0.8)), ("bottom", "right", "top", "left"))
+    parts = (
+        bk.Part("floor", bk.Contact(bk.RigidHalfPlane()), sides=("bottom",)),
+        bk.Part("top", bk.PrescribedDisplacement(-1.1e-3, -1.2e-3), sides=("top",)),
+    )
+    scene = bk.Scene(
+        title="leaning", shape=shape, material=bk.Material(1.0, 0.3), parts=parts, law=bk.Coulomb(0.2),
+        discretisation=bk.Galerkin(6), mesh=bk.MeshOptions(elements=17, grading=bk.Algebraic(2.0)),
+    )  # fmt: skip
+    fine = bk.run(
+        replace(scene, discretisation=bk.Galerkin(2), mesh=bk.MeshOptions(accuracy=1e-4, rising_degrees=True))
+    )
+    coarse = bk.run(scene)
+    _, tractions = true_errors(coarse, fine)
+    assert coarse.singular_corners
+    assert coarse.estimated_traction_error is not None
+    assert 0.5 < coarse.estimated_traction_error / tractions < 3.0  # 0.07 without that
+
+
 def test_singular_corners_are_excluded() -> None:
     """Beside an acute corner the pressure grows like r^-0.36: the last element is off by more than all others."""
     shape = bk.Polygon(((-0.5, 0.0), (0.5, 0.0), (0.9, 0.8), (-0.5, 0.8)), ("bottom", "right", "top", "left"))
