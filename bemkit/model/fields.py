@@ -1,16 +1,19 @@
-"""From nodal displacements and forces of a body to its energy, and to tractions where they are given."""
+"""From nodal displacements and forces of bodies to energies and tractions, those in contact and those given."""
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
-from bemkit.arrays import FloatArray
-from bemkit.geometry.local_values import projector
+from bemkit.arrays import FloatArray, IntArray
+from bemkit.geometry.local_values import from_own_nodes, projector
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.quadrature import gauss_legendre
 from bemkit.geometry.spaces import BoundarySpace, dof_points
+from bemkit.model.contacts import ContactRows
+from bemkit.model.placed import PlacedBody
 from bemkit.operators.rigid_modes import without_motion
 from bemkit.operators.steklov_poincare import SteklovPoincare
 from bemkit.scene.body_scene import BodyScene
@@ -18,6 +21,10 @@ from bemkit.scene.conditions import DistributedLoad, Free
 
 _MORE_POINTS = 4
 """Gauss points of an element at which given loads are evaluated, beyond the degree of the tractions."""
+_REACHED = 1e-12
+"""Least coupling of a node that takes part, relative to the largest; less is round-off at the ends of elements."""
+
+_Entries = tuple[FloatArray, IntArray, IntArray]
 
 
 def elastic_energy(
@@ -57,3 +64,139 @@ def insert_loads(
             values = part.condition.at(points.reshape(-1, 2), normals.reshape(-1, 2)).reshape(points.shape)
             traction[elements] = np.einsum("lq,eqc->elc", projection, values)
     traction[is_free] = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class TractionRecovery:
+    """How the forces of contact nodes are spread over the elements of all contact sides.
+
+    Parameters
+    ----------
+    sides : tuple of RecoveredSide
+
+    Notes
+    -----
+    The nodal forces of a side over the integrals of its basis functions: with Gauss-Lobatto nodes that is exact for
+    tractions of a degree less than the displacements, for any meshes. The integrals are those over all elements
+    that the partner covers at least in part: an element where a partner ends carries its whole force, spread over its
+    length. Forces of all contacts of a side are added up first.
+    """
+
+    sides: tuple[RecoveredSide, ...]
+
+    @classmethod
+    def of(cls, bodies: Sequence[PlacedBody], contacts: Sequence[ContactRows]) -> TractionRecovery:
+        """Compute the recovery from the couplings of contacts."""
+        sides: dict[tuple[int, bytes], _Side] = {}
+        first = 0
+        for rows in contacts:
+            for number, elements, side_of_rows in _sides(rows, first):
+                key = number, elements.tobytes()
+                if key not in sides:
+                    sides[key] = _Side(number, elements, bodies[number])
+                sides[key].add(rows, first, *side_of_rows)
+            first += rows.n_contact
+        return cls(tuple(side.recovered() for side in sides.values()))
+
+    def tractions(self, forces: FloatArray) -> list[tuple[int, IntArray, FloatArray]]:
+        """Return body, elements (m,) and tractions (m, n_local, 2) [Pa] in x and y of each side.
+
+        Parameters
+        ----------
+        forces : (n_contact, 2) array [N/m]
+            On the bodies with the contact nodes, in x and y.
+        """
+        return [(side.body, side.elements, side.tractions(forces)) for side in self.sides]
+
+
+@dataclass(frozen=True, eq=False)
+class RecoveredSide:
+    """Elements (m,) of a body in contact, and their tractions under the forces of contact nodes.
+
+    Parameters
+    ----------
+    body : int
+    elements : (m,) array
+    shares : (n,) array [-]
+    contact_nodes, nodes : (n,) arrays
+        The force of a contact node times a share acts on a node of the side.
+    by_force : (m, n_values, n_local) array [1/m]
+        Tractions at the local nodes of the traction space by forces on the nodes of an element.
+    local : (m, n_local) array
+        The nodes of each element.
+    """
+
+    body: int
+    elements: IntArray
+    shares: FloatArray
+    contact_nodes: IntArray
+    nodes: IntArray
+    by_force: FloatArray
+    local: IntArray
+
+    def tractions(self, forces: FloatArray) -> FloatArray:
+        """Return the tractions (m, n_values, 2) [Pa] under forces (n_contact, 2) [N/m] of contact nodes."""
+        on_side = np.zeros((int(self.local.max()) + 1, 2))
+        np.add.at(on_side, self.nodes, self.shares[:, None] * forces[self.contact_nodes])
+        return np.asarray(self.by_force @ on_side[self.local])
+
+
+class _Side:
+    """Collects which contact nodes act on the nodes of elements (m,) of a body."""
+
+    def __init__(self, body: int, elements: IntArray, placed: PlacedBody) -> None:
+        self.body, self.elements, self.space = body, elements, placed.space
+        self.projection = _projection(placed.space, placed.traction_space)
+        nodes, local = np.unique(placed.space.element_dofs[elements], return_inverse=True)
+        self.local, self.reached = local.reshape(elements.size, -1), np.zeros(nodes.size)
+        self.position = np.zeros(placed.space.n_dofs // 2, np.intp)
+        self.position[nodes] = np.arange(nodes.size)
+        self.entries: list[_Entries] = []
+
+    def add(self, rows: ContactRows, first: int, shares: FloatArray, contact_nodes: IntArray, nodes: IntArray) -> None:
+        """Take a contact whose nodes count on from the given one."""
+        nodes = self.position[nodes]
+        self.entries.append((shares, contact_nodes, nodes))
+        np.add.at(self.reached, nodes, np.abs(shares) * rows.weights[contact_nodes - first])
+        if rows.couplings is None:  # an obstacle ends nowhere
+            self.reached[:] = 1.0 + self.reached.max()
+
+    def recovered(self) -> RecoveredSide:
+        """Return the tractions of the elements equivalent to the forces of nodes."""
+        is_reached = self.reached > _REACHED * self.reached.max(initial=0.0)
+        is_covered = is_reached[self.local].all(axis=1)
+        # isolated nodes: on a sliver, or beside nodes that a support holds
+        is_alone = is_reached.copy()
+        is_alone[self.local[is_covered]] = False
+        is_covered |= is_alone[self.local].any(axis=1)
+        xi, weights = gauss_legendre(self.space.degree + 1)
+        # from values at the dofs of elements, of which those of lower degree have fewer, to the local nodes
+        n_local = self.local.shape[1]
+        unit = np.broadcast_to(np.eye(n_local), (self.elements.size, n_local, n_local))
+        lifting = from_own_nodes(self.space, unit, self.elements)
+        half_lengths = 0.5 * self.space.mesh.lengths[self.elements][:, None]
+        integrals = half_lengths * np.einsum("l,elk->ek", self.space.basis(xi) @ weights, lifting)
+        totals = np.bincount(self.local[is_covered].ravel(), integrals[is_covered].ravel(), self.reached.size)
+        shares = is_covered[:, None] / np.where(totals > 0.0, totals, np.inf)[self.local]
+        values = (self.projection @ lifting) * shares[:, None]  # (m, n_values, n_local)
+        shares, contact_nodes, nodes = (np.concatenate(each) for each in zip(*self.entries, strict=True))
+        return RecoveredSide(self.body, self.elements, shares, contact_nodes, nodes, values, self.local)
+
+
+def _sides(rows: ContactRows, first: int) -> list[tuple[int, IntArray, _Entries]]:
+    """Return body, elements, and signed shares, contact nodes and nodes of each side that a contact has."""
+    numbers = first + np.arange(rows.n_contact)
+    if rows.couplings is None:
+        return [(rows.body, rows.elements, (np.ones(rows.n_contact), numbers, rows.nodes))]
+    sides: list[tuple[int, IntArray, _Entries]] = []
+    pairs = zip(rows.sides, (rows.elements, rows.other_elements), rows.couplings, (1.0, -1.0), strict=True)
+    for body, elements, on_nodes, sign in pairs:
+        owners = np.repeat(numbers, np.diff(on_nodes.indptr))
+        sides.append((body, elements, (np.asarray(sign * on_nodes.data), owners, np.asarray(on_nodes.indices))))
+    return sides
+
+
+def _projection(space: BoundarySpace, of_tractions: BoundarySpace) -> FloatArray:
+    """Return the projection (n_values, n_local) of fields at the nodes of displacements onto tractions of elements."""
+    xi, weights = gauss_legendre(space.degree + 1)
+    return projector(of_tractions, xi, weights) @ space.basis(xi).T

@@ -14,7 +14,6 @@ from bemkit.geometry.errors import GeometryError
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.placement import Placement
 from bemkit.geometry.spaces import BoundarySpace
-from bemkit.model.matched_sides import matching_densities
 from bemkit.model.units import Units, check_position
 from bemkit.operators.material import Material
 from bemkit.scene.body import Body
@@ -168,6 +167,10 @@ def _drawn(scene: Scene, given: Mapping[str, BoundaryMesh]) -> dict[str, Boundar
             by_scene[id(own_scene)] = _divided(own_scene, scene, body)
     meshes = {**given, **{body.name: by_scene[id(own_scenes[body.name])] for body in divided}}
     rough = [pair for pair in scene.elastic_contacts if not scene.law_of(pair).is_frictionless]
+    if not rough:
+        return meshes
+    from bemkit.model.matched_sides import matching_densities
+
     densities = matching_densities(rough, own_scenes, meshes)
     matched: dict[int, BoundaryMesh] = {}
     for body in divided:

@@ -19,6 +19,7 @@ from bemkit.contact.laws import FrictionLaw
 from bemkit.geometry.spaces import dof_points
 from bemkit.model.contact_data import ContactData
 from bemkit.model.contacts import ContactRows, candidates_of, law_of_rows, obstacle_rows, retained_for
+from bemkit.model.fields import TractionRecovery
 from bemkit.model.given import (
     far_motion_of,
     given_data,
@@ -29,7 +30,6 @@ from bemkit.model.given import (
 )
 from bemkit.model.placed import Meshes, PlacedBody, place
 from bemkit.model.same_bodies import bodies_under, check_step, find_units, listed_contacts, with_found_contacts
-from bemkit.model.traction_recovery import TractionRecovery
 from bemkit.model.units import Units
 from bemkit.operators.linear.solvers import ChosenLinearSolver, DenseCholesky, LinearSolver
 from bemkit.operators.material import Material
@@ -43,7 +43,6 @@ from bemkit.operators.steklov_poincare.nodal_conditions import (
     free_modes,
     turning,
 )
-from bemkit.operators.steklov_poincare.rigid_connection import RigidlyConnected
 from bemkit.result_warning import ResultWarning
 from bemkit.scene.mesh_options import thinness_warnings
 from bemkit.scene.scene import Scene
@@ -162,6 +161,8 @@ class Prepared:
         chosen = self.linear_solver(body)
         elastic = with_far_motion(self._map_of(body, chosen.solver), body.far_motion)
         if body.conditions.connected:
+            from bemkit.operators.steklov_poincare.rigid_connection import RigidlyConnected
+
             return RigidlyConnected.of(elastic, body.scene.discretisation.method)
         if chosen.hierarchical is None:
             return elastic

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray
-from bemkit.contact.laws import FrictionLaw, LawOfCoefficients
+from bemkit.contact.laws import FrictionLaw
 from bemkit.geometry.errors import format_point
 from bemkit.geometry.vectors import norms
 from bemkit.result_warning import ResultWarning
@@ -30,12 +30,12 @@ def law_jumps(contact: ContactTable, laws: Mapping[str, FrictionLaw]) -> Iterato
     ----------
     contact : ContactTable
     laws : mapping of str to FrictionLaw
-        Of the contacts by name. Laws that depend on slip or time, or have a number for each node, are not examined.
+        Of the contacts by name, of those that vary along the boundary.
     """
     for name, law in laws.items():
         rows = np.flatnonzero(contact.rows(name))
         pressure = float(np.abs(contact.sigma_n[rows]).max(initial=0.0))
-        if not _varies(law) or rows.size < 2 or pressure == 0.0:
+        if rows.size < 2 or pressure == 0.0:
             continue
         points = np.stack([contact.x[rows], contact.y[rows]], axis=1)
         is_pressed, arc = contact.sigma_n[rows] != 0.0, np.diff(contact.s[rows])
@@ -47,14 +47,6 @@ def law_jumps(contact: ContactTable, laws: Mapping[str, FrictionLaw]) -> Iterato
                 "there into parts, each with a law of its own."
             )
             yield ResultWarning("jump of friction", name, text)
-
-
-def _varies(law: FrictionLaw) -> bool:
-    """Whether a law has formulas or functions of the coordinates, and otherwise only numbers."""
-    if not isinstance(law, LawOfCoefficients) or law.needs_history:
-        return False
-    values = law.coefficients.values()
-    return any(map(callable, values)) and not any(isinstance(value, np.ndarray) for value in values)
 
 
 def _jumps(law: FrictionLaw, pressure: float, points: FloatArray, is_asked: BoolArray) -> FloatArray:

@@ -211,7 +211,7 @@ class Solution(SolvedScene, Explorable):
 
     @cached_property
     def missed_contacts(self) -> dict[str, tuple[float, float]]:
-        """Points where contact is missed, because no node meets it, by contact; see `bemkit.results.missed_contact`."""
+        """Points where contact is missed, because no node meets it, by contact; see `bemkit.results.between_nodes`."""
         return missed_contacts(self.contact, self.contacts_between_nodes)
 
     @cached_property

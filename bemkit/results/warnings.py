@@ -9,6 +9,7 @@ from itertools import chain
 import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray, IntArray
+from bemkit.contact.laws import FrictionLaw, LawOfCoefficients
 from bemkit.geometry.local_values import values_on_elements
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.neighbours import break_nodes
@@ -18,7 +19,6 @@ from bemkit.operators.rigid_modes import without_motion
 from bemkit.result_warning import ResultWarning, first_of_each_kind
 from bemkit.results.between_nodes import BetweenNodes
 from bemkit.results.contact_table import ContactTable, free_contacts
-from bemkit.results.law_jumps import law_jumps
 from bemkit.results.solution import Solution
 from bemkit.results.solved_body import SolvedBody
 from bemkit.scene.conditions import Clamped, PrescribedDisplacement, Roller
@@ -69,7 +69,7 @@ def find_warnings(solution: Solution) -> tuple[ResultWarning, ...]:
         _large_of_tractions(solution.estimated_traction_error, remedy),
         *of_bodies,
         _unbounded_tractions(solution),
-        law_jumps(solution.contact, laws),
+        _law_jumps(solution.contact, laws),
         _no_load(solution),
         _narrow_zones(solution.contact, smooth, remedy),
         _hidden_overlaps(solution.contacts_between_nodes, solution.contact, solution.units, remedy),
@@ -364,3 +364,20 @@ def _narrow(part: str, kind: str, zones: Sequence[FloatArray], remedy: str) -> R
 
 def _there(remedy: str) -> str:
     return remedy.replace("more elements", "more elements there")
+
+
+def _law_jumps(contact: ContactTable, laws: Mapping[str, FrictionLaw]) -> Iterator[ResultWarning]:
+    """Warn of jumps of friction bounds that vary in space; with a history or numbers at nodes they are not examined."""
+    if not (varying := {name: law for name, law in laws.items() if _varies(law)}):
+        return
+    from bemkit.results.law_jumps import law_jumps
+
+    yield from law_jumps(contact, varying)
+
+
+def _varies(law: FrictionLaw) -> bool:
+    """Whether a law has formulas or functions of the coordinates, and otherwise only numbers."""
+    if not isinstance(law, LawOfCoefficients) or law.needs_history:
+        return False
+    values = law.coefficients.values()
+    return any(map(callable, values)) and not any(isinstance(value, np.ndarray) for value in values)

@@ -16,16 +16,21 @@ from bemkit.model.model import Model
 from bemkit.model.solved_contact import contact_warnings
 from bemkit.plan import Plan
 from bemkit.result_warning import ResultWarning
-from bemkit.results.contact_table import ContactTable, bound_at, find_transitions
+from bemkit.results.contact_table import ContactTable, bound_at, find_transitions, free_contacts
 from bemkit.results.part_forces import PartForce, RigidResult, contact_forces, forces_on_parts, nodal_resultant
 from bemkit.results.solution import Solution
 from bemkit.results.solved_body import BoundaryFields, SideName, SolvedBody
 from bemkit.results.warnings import find_warnings
+from bemkit.scene.unit_names import amount
 from bemkit.solvers.base import ContactSolution, Status
 from bemkit.stopwatch import Stage, StageClock
 
 if TYPE_CHECKING:
     from bemkit.model.prepared import Prepared
+
+LARGEST_APART = 1.0
+"""Largest distance of sides that touch, relative to the displacement by contact forces. Mortar conditions hold in the
+mean: curved sides of long elements fulfil them at a distance."""
 
 
 def solution_of(
@@ -139,3 +144,34 @@ def _contact_table(model: Model, state: ContactState, node_status: IntArray) -> 
         status=np.asarray(node_status).copy(),
         weight=prepared.column("weights"),
     )
+
+
+def with_missed_contact_named(solution: Solution) -> Solution:
+    """Return the same solution, with the status MISSED_CONTACT if the mesh does not find the contact.
+
+    A contact without any force overlaps between its nodes, one with a force at a few nodes is much deeper between them
+    than forces move the bodies, or sides that touch nowhere have a force.
+    """
+    if not solution.is_converged:
+        return solution
+    if solution.unfound_contacts:
+        name, (x, y) = next(iter(solution.unfound_contacts.items()))
+        between = solution.narrow_contacts_between_nodes[name]
+        depth = amount(between.penetration_depth, "length", solution.units, 2)
+        words = f"Contact {name!r} overlaps by {depth} at ({x:.4g}, {y:.4g})."
+    elif apart := _pressed_apart(solution):
+        words = f"Contact {apart[0]!r} has a force, but its sides touch nowhere."
+    else:
+        return solution
+    message = f"{Status.MISSED_CONTACT.value} {words}"
+    return replace(solution, status=Status.MISSED_CONTACT, message=message, warnings=solution.unasked_warnings)
+
+
+def _pressed_apart(solution: Solution) -> list[str]:
+    """Return the contacts between elastic bodies with a force whose sides touch nowhere."""
+    free = free_contacts(solution.contact)
+    return [
+        name
+        for name, each in solution.narrow_contacts_between_nodes.items()
+        if name not in free and solution.n_sides(name) > 1 and each.apart > LARGEST_APART
+    ]

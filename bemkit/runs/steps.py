@@ -19,10 +19,9 @@ from bemkit.model.prepared import Prepared, prepare_steps
 from bemkit.model.solved_contact import with_energies_checked
 from bemkit.operators.linear.threads import blas_threads_for
 from bemkit.plan import Plan, announce_plan, check_elements, check_memory, plan_steps
-from bemkit.results.missed_contact import with_missed_contact_named
 from bemkit.results.solved_steps import following
 from bemkit.runs.load_path import Callback, IncrementEnd, Path, ReachedStep, advance
-from bemkit.runs.solution_of import solution_of
+from bemkit.runs.solution_of import solution_of, with_missed_contact_named
 from bemkit.scene.load_history import load_steps
 from bemkit.scene.scene import NoContactError, Scene
 from bemkit.solvers.active_sets import NodeStatus

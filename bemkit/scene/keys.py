@@ -15,9 +15,8 @@ from bemkit.errors import InputError
 from bemkit.formulas import closest
 from bemkit.scene.body import Body
 from bemkit.scene.conditions import Part
-from bemkit.scene.declared_types import hints_of
 from bemkit.scene.plane_motion import RigidBody
-from bemkit.scene.registry import SYNONYMS
+from bemkit.scene.registry import SYNONYMS, hints_of
 from bemkit.scene.unit_names import UnitNames
 
 _NAME = r'(?:"[^"]+"|[^.\[\]"=\s]+)'

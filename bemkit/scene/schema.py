@@ -17,9 +17,17 @@ from typing import Any, cast, get_args, get_origin
 from bemkit.arrays import FloatArray
 from bemkit.errors import InputError
 from bemkit.formulas import Expression
-from bemkit.scene.declared_types import default_of, heading_of, hints_of, is_required, options_of, registry_of
 from bemkit.scene.docstrings import parameters, summary
-from bemkit.scene.registry import RISING, Registry
+from bemkit.scene.registry import (
+    RISING,
+    Registry,
+    default_of,
+    heading_of,
+    hints_of,
+    is_required,
+    options_of,
+    registry_of,
+)
 from bemkit.scene.scene import OF_ONE_BODY, OF_SEVERAL, Scene
 from bemkit.scene.written_tables import unstructure
 

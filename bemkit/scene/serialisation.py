@@ -20,10 +20,8 @@ import numpy as np
 from bemkit.arrays import FloatArray
 from bemkit.errors import InputError
 from bemkit.formulas import Expression, closest, nearest, shorten
-from bemkit.scene.declared_types import heading_of, hints_of, is_required, options_of, registry_of
-from bemkit.scene.quantities import in_units_of_scene
-from bemkit.scene.registry import SYNONYMS, Registry
-from bemkit.scene.unit_names import UnitNames
+from bemkit.scene.registry import SYNONYMS, Registry, heading_of, hints_of, is_required, options_of, registry_of
+from bemkit.scene.unit_names import UnitNames, in_units_of_scene
 
 T = TypeVar("T")
 

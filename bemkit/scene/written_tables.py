@@ -12,8 +12,7 @@ import numpy as np
 from bemkit.contact.laws import FrictionLaw
 from bemkit.errors import InputError
 from bemkit.formulas import Expression, shorten
-from bemkit.scene.declared_types import default_of, hints_of, is_required, registry_of
-from bemkit.scene.registry import LAWS
+from bemkit.scene.registry import LAWS, default_of, hints_of, is_required, registry_of
 
 
 class UnstructureError(InputError):

@@ -9,8 +9,8 @@ import numpy as np
 import bemkit as bk
 from bemkit.contact.further_laws import PiecewiseLaw
 from bemkit.contact.laws import Coulomb, LawOfCoefficients
+from bemkit.model.fields import TractionRecovery
 from bemkit.model.prepared import prepare_steps
-from bemkit.model.traction_recovery import TractionRecovery
 from bemkit.scene.load_history import load_steps
 from tests.runs.masonry import wall
 

@@ -10,9 +10,8 @@ from hypothesis import strategies as st
 
 import bemkit as bk
 from bemkit.scene.keys import Key, with_value
-from bemkit.scene.quantities import in_units_of_scene
 from bemkit.scene.toml import SceneError
-from bemkit.scene.unit_names import read_unit
+from bemkit.scene.unit_names import in_units_of_scene, read_unit
 
 MM = bk.UnitNames("mm", "MPa")
 BLOCK = """

@@ -19,7 +19,6 @@ import numpy as np
 
 from bemkit.arrays import ComplexArray, FloatArray, IntArray
 from bemkit.geometry.mesh import BoundaryMesh
-from bemkit.operators.collocation.compiled import layer_for
 from bemkit.operators.collocation.gradient_reconstruction import GradientReconstruction
 from bemkit.operators.collocation.layers import Constants, Layer, Unknowns, combined
 from bemkit.operators.collocation.reciprocity import Reciprocity
@@ -98,6 +97,10 @@ class CollocationEquations:
         log_length : float, optional [m]
             Unit of length in the logarithm; by default the diameter of the mesh.
         """
+        if layer is None:
+            from bemkit.operators.collocation.compiled import layer_for
+
+            layer = layer_for(mesh.n_elements)
         log_length = mesh.diameter if log_length is None else log_length
         geometry = ElementGeometry(mesh)
         return cls(
@@ -108,7 +111,7 @@ class CollocationEquations:
             2.0 * geometry.half[order],
             *_reconstruction(mesh, geometry, order, takes_slopes=takes_slopes),
             border,
-            layer or layer_for(mesh.n_elements),
+            layer,
             _curved(geometry, material, order, log_length),
         )
 

@@ -11,7 +11,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from bemkit.operators.collocation import compiled
 from bemkit.operators.linear.solvers import (
     Automatic,
     ChosenLinearSolver,
@@ -166,6 +165,8 @@ def hierarchical_cost(case: BodyCase, options: Hierarchical, *, takes_slopes: bo
 
 def _tree_items(case: BodyCase, options: Hierarchical) -> tuple[PlanItem, PlanItem, PlanItem]:
     """Return the items of the linear solver and of the kernels, with the time of the other kernels."""
+    from bemkit.operators.collocation import compiled
+
     is_compiled, why = compiled.expected(case.mesh.n_elements)
     chosen, other = (_cost(case, options, is_compiled=choice).seconds for choice in (is_compiled, not is_compiled))
     others = f"{'numpy' if is_compiled else 'compiled ones'} would take about {other:.3g} s instead of {chosen:.3g} s"
@@ -181,6 +182,8 @@ def _cost(case: BodyCase, options: Hierarchical, *, is_compiled: bool | None = N
     n, digits = case.mesh.n_elements, -math.log10(options.tolerance) / _DIGITS
     n_both = int(np.count_nonzero(case.conditions.is_retained.any(axis=1)))
     if is_compiled is None:
+        from bemkit.operators.collocation import compiled
+
         is_compiled, _ = compiled.expected(n)
     memory = int(digits * (costs.of_top + costs.n_bytes * n + costs.of_contact * n_both))
     evaluations = digits * n * (costs.compiled if is_compiled else costs.evaluations)
