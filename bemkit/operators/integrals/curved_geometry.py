@@ -59,6 +59,21 @@ class CurvedGeometry:
     about_end: ComplexArray
     bend: FloatArray
 
+    def at(self, elements: IntArray, t: float) -> ComplexArray:
+        """Return p(t) of some elements (n,) at one local coordinate."""
+        return evaluate(self.about_centre[:, elements], np.full(elements.size, t + 0j))
+
+    def slopes_from_end(self, elements: IntArray, shift: FloatArray, at_start: BoolArray) -> ComplexArray:
+        """Return (p(end + shift) - p(end)) / shift (n,) of some elements from their start or their other end node."""
+        about = np.where(at_start, self.about_start[1:, elements], self.about_end[1:, elements])
+        return evaluate(about, shift.astype(complex))
+
+    def stretched(self, distance: float) -> FloatArray:
+        """Return the distance, in half lengths, at which the parameter of circular elements is `distance`."""
+        exponent = np.minimum(self.bend * distance, 300.0)  # to avoid overflow
+        ratio = np.where(exponent > 1e-8, np.expm1(exponent) / np.maximum(exponent, 1e-8), 1.0)
+        return np.asarray(distance * ratio)
+
 
 def fit(mesh: BoundaryMesh, tangent: ComplexArray, half: FloatArray, centre: ComplexArray) -> CurvedGeometry:
     """Interpolate the curved elements of a mesh up to the round-off of their coordinates.
@@ -140,14 +155,6 @@ def _shifted(coefficients: ComplexArray, centre: float) -> ComplexArray:
     taylor = np.array([[math.comb(m, k) * centre ** (m - k) if m >= k else 0.0 for m in range(n)] for k in range(n)])
     taylor[0] = 0.0
     return np.asarray(taylor @ coefficients)
-
-
-def stretched(bend: FloatArray, distance: float) -> FloatArray:
-    """Return the distance, in half lengths, at which the parameter of circular elements is `distance`."""
-    exponent = np.minimum(bend * distance, 300.0)  # to avoid overflow
-    ratio = np.where(exponent > 1e-8, np.expm1(exponent) / np.maximum(exponent, 1e-8), 1.0)
-    result: FloatArray = distance * ratio
-    return result
 
 
 def evaluate(coefficients: ComplexArray, t: ComplexArray) -> ComplexArray:

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from bemkit.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from bemkit.geometry.mesh import BoundaryMesh
-from bemkit.operators.integrals import curved_geometry
+
+if TYPE_CHECKING:
+    from bemkit.operators.integrals.curved_geometry import CurvedGeometry
 
 
 class ElementGeometry:
@@ -40,12 +44,14 @@ class ElementGeometry:
         self.tangent: ComplexArray = span / (2.0 * self.half)
         self.centre: ComplexArray = self.start + 0.5 * span
         self.is_straight = mesh.is_straight
-        self.curved: curved_geometry.CurvedGeometry | None = None
+        self.curved: CurvedGeometry | None = None
         if not self.is_straight.all():
+            from bemkit.operators.integrals.curved_geometry import fit
+
             curved = np.flatnonzero(~self.is_straight)
             self.half[curved] = 0.5 * mesh.lengths[curved]
             self.centre[curved] = mesh.centres[curved] @ np.array([1.0, 1j])
-            self.curved = curved_geometry.fit(mesh, self.tangent, self.half, self.centre)
+            self.curved = fit(mesh, self.tangent, self.half, self.centre)
         self.to_local: ComplexArray = self.tangent.conj() / self.half
 
     def polynomials(self, elements: IntArray) -> ComplexArray:
@@ -58,8 +64,7 @@ class ElementGeometry:
         """Return the points of some elements at one local coordinate in [-1, 1]."""
         if self.curved is None:
             return self.centre[elements] + (xi * self.half * self.tangent)[elements]
-        local = curved_geometry.evaluate(self.polynomials(elements), np.full(elements.size, xi + 0j))
-        return self.centre[elements] + (self.half * self.tangent)[elements] * local
+        return self.centre[elements] + (self.half * self.tangent)[elements] * self.curved.at(elements, xi)
 
     def offset(self, elements: IntArray, fraction: FloatArray, at_start: BoolArray) -> ComplexArray:
         """Return points relative to one end node, with full relative accuracy at any distance from it.
@@ -76,8 +81,7 @@ class ElementGeometry:
         offset = self.tangent[elements] * (self.half[elements] * shift)
         if self.curved is None:
             return offset
-        about = np.where(at_start, self.curved.about_start[1:, elements], self.curved.about_end[1:, elements])
-        return offset * curved_geometry.evaluate(about, shift.astype(complex))
+        return offset * self.curved.slopes_from_end(elements, shift, at_start)
 
     def distance_at(self, distance: float) -> FloatArray:
         """Return the distance from the centre, in half lengths, at which the parameter of each element is `distance`.
@@ -87,7 +91,7 @@ class ElementGeometry:
         """
         if self.curved is None:
             return np.full(self.half.size, distance)
-        return curved_geometry.stretched(self.curved.bend, distance)
+        return self.curved.stretched(distance)
 
 
 def squared_distance(x: ComplexArray, y: ComplexArray) -> FloatArray:
