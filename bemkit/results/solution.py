@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Mapping
 from copy import copy
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
@@ -27,7 +27,6 @@ from bemkit.results.contact_table import narrow_contacts
 from bemkit.results.contact_violations import violations_between_nodes
 from bemkit.results.solved_body import BoundaryFields as BoundaryFields
 from bemkit.results.solved_scene import SolvedScene, contact_facts, part_facts
-from bemkit.results.when_asked import WhenAsked
 from bemkit.solvers.base import Status, StepRecord
 
 if TYPE_CHECKING:
@@ -35,6 +34,11 @@ if TYPE_CHECKING:
 
     from bemkit.results.contact_places import ContactPlaces
     from bemkit.results.singular_corners import SingularCorner
+
+
+def stated_warnings(warnings: tuple[ResultWarning, ...], solution: Any) -> tuple[ResultWarning, ...]:
+    """Return known warnings of a solution, for `Solution.warnings_of`."""
+    return warnings
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -58,8 +62,8 @@ class Solution(SolvedScene, Explorable):
         How the solver ended.
     memory : mapping of str to int [bytes]
         Largest memory of all arrays in each stage of the run; empty unless `tracemalloc` was tracing.
-    warnings : tuple of ResultWarning
-        See `bemkit.results.warnings`.
+    warnings_of : callable (solution) -> tuple of ResultWarning
+        Called when `warnings` are first read; none by default.
     provenance : mapping of str to str
         Versions, platform and time of a result from a file; empty otherwise.
     """
@@ -74,7 +78,7 @@ class Solution(SolvedScene, Explorable):
     work: OperationCounts
     message: str = ""
     memory: Mapping[str, int] = field(default_factory=dict)
-    warnings: WhenAsked[tuple[ResultWarning, ...]] = WhenAsked(())  # noqa: RUF009 - a descriptor, shared by all on purpose
+    warnings_of: Callable[[Any], tuple[ResultWarning, ...]] = partial(stated_warnings, ())  # noqa: RUF009 - it is pure
     provenance: Mapping[str, str] = field(default_factory=dict)
 
     def __repr__(self) -> str:
@@ -224,18 +228,15 @@ class Solution(SolvedScene, Explorable):
         """Largest violations between the nodes of contacts with a force at a few nodes at most."""
         return self.between_nodes_of(narrow_contacts(self.contact))
 
-    @property
-    def unasked_warnings(self) -> Any:
-        """The warnings, or the function that finds them later, for a solution that replaces this one."""
-        return WhenAsked.held(self, "warnings")
+    @cached_property
+    def warnings(self) -> tuple[ResultWarning, ...]:
+        """Warnings about the result; see `bemkit.results.warnings`."""
+        return self.warnings_of(self)
 
-    def with_warnings(self, warnings: tuple[ResultWarning, ...] | Callable[[Any], tuple[ResultWarning, ...]]) -> Self:
-        """Return the same solution, with what it has computed, and other warnings.
-
-        A function of the solution is called when the warnings are first read.
-        """
+    def with_warnings(self, warnings: tuple[ResultWarning, ...]) -> Self:
+        """Return the same solution, with what it has computed, and other warnings."""
         result = copy(self)
-        object.__setattr__(result, "warnings", warnings)
+        vars(result).update(warnings=warnings, warnings_of=partial(stated_warnings, warnings))
         return result
 
     def summary(self) -> dict[str, Any]:

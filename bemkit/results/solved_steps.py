@@ -36,7 +36,6 @@ def with_totals(result: Solution, solutions: Sequence[Solution], names: Sequence
         records = continued(records, solution.history, name)
     return replace(
         with_times(result, solutions),
-        warnings=result.unasked_warnings,
         history=records,
         linear_solves=sum(solution.linear_solves for solution in solutions),
         outer_steps=sum(solution.outer_steps for solution in solutions),
@@ -47,7 +46,6 @@ def with_times(result: Solution, solutions: Sequence[Solution]) -> Solution:
     """Return a solution with the total times and the largest memory of all solutions on the way."""
     return replace(
         result,
-        warnings=result.unasked_warnings,
         timings={name: sum(solution.timings[name] for solution in solutions) for name in result.timings},
         memory={name: max(solution.memory.get(name, 0) for solution in solutions) for name in result.memory},
     )
@@ -84,7 +82,7 @@ def following(so_far: Solution | None, solution: Solution, stated: Scene, number
     warnings = without_duplicates((*solution.warnings, *earlier))
     loading = None if solution.loading is None else replace(solution.loading, asked=stated)
     message = f"{name}: {solution.message}"
-    return replace(total, message=message, warnings=warnings, loading=loading)
+    return replace(total, message=message, loading=loading).with_warnings(warnings)
 
 
 def continued(records: Sequence[StepRecord], further: Iterable[StepRecord], words: str = "") -> tuple[StepRecord, ...]:

@@ -8,6 +8,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -23,7 +24,7 @@ from bemkit.result_warning import ResultWarning
 from bemkit.results.contact_table import ContactTable, Transition
 from bemkit.results.load_history import LoadStep, StepWork
 from bemkit.results.part_forces import ContactForce, PartForce, RigidResult
-from bemkit.results.solution import Solution
+from bemkit.results.solution import Solution, stated_warnings
 from bemkit.results.solved_body import BoundaryFields, SideName, SolvedBody
 from bemkit.scene.scene import Scene
 from bemkit.scene.serialisation import structure
@@ -188,7 +189,7 @@ def _outcome(entries: Mapping[str, Any]) -> dict[str, Any]:
         "timings": {name: float(seconds) for name, seconds in entries["timings"].items()},
         "memory": {name: int(size) for name, size in entries["memory"].items()},
         "work": structure(entries["work"], OperationCounts),
-        "warnings": tuple(ResultWarning(**warning) for warning in entries["warnings"]),
+        "warnings_of": partial(stated_warnings, tuple(ResultWarning(**warning) for warning in entries["warnings"])),
         "history": tuple(
             StepRecord(**{**record, "certificate": _certificate(record["certificate"])})
             for record in entries["history"]

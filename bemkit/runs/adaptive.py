@@ -221,4 +221,4 @@ def _best_last(
     names = [f"mesh {number} of {len(solutions)}" for number in range(1, len(solutions) + 1)]
     others = [solution for solution in solutions if solution is not best]
     total = with_totals(best, solutions, names)
-    return (*others, replace(total, warnings=total.unasked_warnings, status=status, message=message))
+    return (*others, replace(total, status=status, message=message))

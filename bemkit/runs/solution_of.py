@@ -69,7 +69,7 @@ def solution_of(
     on_sides = [(prepared.bodies[rows.body].mesh, rows.part) for rows in prepared.rows]
     lengths = [float(mesh.lengths[mesh.part(part)].sum()) for mesh, part in on_sides]
     transitions = find_transitions(table, table.u_t - model.problem.slip_origin * model.units.displacement)
-    solution = Solution(
+    return Solution(
         scene=prepared.scene,
         bodies={
             body.name: SolvedBody(body.name, body.scene, body.mesh, own, depth * energy, on_parts.get(body.name, {}))
@@ -95,8 +95,8 @@ def solution_of(
         plan=plan,
         work=model.work,
         message=result.message,
+        warnings_of=partial(_warnings, of_contact),
     )
-    return solution.with_warnings(partial(_warnings, of_contact))
 
 
 def _resultants(prepared: Prepared, table: ContactTable) -> list[list[PartForce]]:
@@ -164,7 +164,7 @@ def with_missed_contact_named(solution: Solution) -> Solution:
     else:
         return solution
     message = f"{Status.MISSED_CONTACT.value} {words}"
-    return replace(solution, status=Status.MISSED_CONTACT, message=message, warnings=solution.unasked_warnings)
+    return replace(solution, status=Status.MISSED_CONTACT, message=message)
 
 
 def _pressed_apart(solution: Solution) -> list[str]:

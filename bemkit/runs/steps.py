@@ -325,8 +325,7 @@ def _not_reached(before: Solution | None, result: ContactSolution, clock: StageC
         outer_steps=result.steps,
         timings=clock.timings,
         memory=clock.memory,
-        warnings=before.plan.warnings,
-    )
+    ).with_warnings(before.plan.warnings)
 
 
 def run_on_mesh(

@@ -177,13 +177,10 @@ def test_fields_of_another_body_are_wrong_unless_the_solution_says_that_it_is_co
         solution,
         scene=dataclasses.replace(solution.scene, material=bk.Material(3.0, 0.3)),
         energy=solution.energy,
-        warnings=(),
     )
-    assert judge([strained])[:2] == (Outcome.WRONG, "reciprocity")
-    assert (
-        judge([dataclasses.replace(strained, warnings=(ResultWarning("test", "", "use more elements"),))])[0]
-        is Outcome.WARNED
-    )
+    assert judge([strained.with_warnings(())])[:2] == (Outcome.WRONG, "reciprocity")
+    warned = strained.with_warnings((ResultWarning("test", "", "use more elements"),))
+    assert judge([warned])[0] is Outcome.WARNED
 
 
 def test_what_is_not_a_number_in_summary_or_tables_is_wrong() -> None:

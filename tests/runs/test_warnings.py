@@ -46,7 +46,7 @@ WARNINGS = (
 def solution() -> Solution:
     found = run(with_overrides(load_scene("paper-1"), elements=40, discretisation="linear"))
     plan = dataclasses.replace(found.plan, warnings=WARNINGS[:1])
-    return dataclasses.replace(found, plan=plan, warnings=WARNINGS)
+    return dataclasses.replace(found, plan=plan).with_warnings(WARNINGS)
 
 
 def test_doubts_about_meshes_are_found_when_asked_for(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -47,9 +47,8 @@ def test_each_planted_fault_is_named(solution) -> None:
 
 
 def test_fields_of_another_material_need_a_warning(solution) -> None:
-    other = changed(
-        solution, scene=replace(solution.scene, material=bk.Material(3.0, 0.3)), energy=solution.energy, warnings=()
-    )
+    scene = replace(solution.scene, material=bk.Material(3.0, 0.3))
+    other = changed(solution, scene=scene, energy=solution.energy).with_warnings(())
     with pytest.raises(CheckFailed, match="the solution lacks a warning of reciprocity"):
         check_solution(other)
 
