@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import re
 from dataclasses import replace
 from itertools import count
@@ -92,12 +93,28 @@ def test_steps_that_are_reached_are_kept_in_the_result_of_a_scene() -> None:
         bk.run(replace(assembly, load_factors=(5.0, 1.0)))
 
 
-def test_a_jump_that_stalls_is_gone_in_halves() -> None:
-    """Two full steps settle small increments and no large ones."""
-    impatient = bk.SemismoothNewton(max_steps=5)
-    assembly = replace(wall(3, 4, push=True), load_factors=(0.0, 4.6))
-    assembly = replace(assembly, solver=impatient)
-    first, second = bk.run([assembly])
+IMPATIENT = replace(wall(3, 4, push=True), load_factors=(0.0, 4.6), solver=bk.SemismoothNewton(max_steps=5))
+"""Five steps settle small increments and no large ones."""
+
+
+@pytest.fixture(scope="module")
+def halved() -> tuple[bk.SolvedSteps, list[str]]:
+    """Return the steps of that scene, and what is announced on the way."""
+    announced: list[str] = []
+    handler, logger = logging.Handler(), logging.getLogger("bemkit.progress")
+    handler.emit = lambda record: announced.append(record.getMessage())  # type: ignore[method-assign]
+    before = logger.level
+    logger.addHandler(handler)
+    logger.setLevel("DEBUG")
+    try:
+        return bk.run([IMPATIENT]), announced
+    finally:
+        logger.removeHandler(handler)
+        logger.setLevel(before)
+
+
+def test_a_jump_that_stalls_is_gone_in_halves(halved: tuple[bk.SolvedSteps, list[str]]) -> None:
+    first, second = halved[0]
     assert second.is_converged
     assert "increments reached it" in second.message
     remarks = [record.message for record in second.history]
@@ -186,11 +203,8 @@ def test_blocks_of_the_same_objects_are_assembled_once_under_every_load() -> Non
         assert len(free) == 3
 
 
-def test_increments_are_announced_with_their_load_factors(caplog) -> None:  # type: ignore[no-untyped-def]
-    assembly = replace(wall(3, 4, push=True), load_factors=(0.0, 4.6), solver=bk.SemismoothNewton(max_steps=5))
-    with caplog.at_level("DEBUG", logger="bemkit.progress"):
-        assert bk.run(assembly).is_converged
-    words = [record.getMessage() for record in caplog.records if "load " in record.getMessage()]
+def test_increments_are_announced_with_their_load_factors(halved: tuple[bk.SolvedSteps, list[str]]) -> None:
+    words = [message for message in halved[1] if "load " in message]
     assert words[:3] == [
         "load step 1 of 2 finished",
         "load factor 4.6 failed, load factor 2.3 is next",
@@ -199,19 +213,19 @@ def test_increments_are_announced_with_their_load_factors(caplog) -> None:  # ty
     assert words[-1] == "load step 2 of 2 finished"
 
 
-def test_an_increment_grows_only_where_the_solver_took_few_steps(monkeypatch) -> None:  # type: ignore[no-untyped-def]
+def test_an_increment_grows_only_where_the_solver_took_few_steps(
+    halved: tuple[bk.SolvedSteps, list[str]], monkeypatch: pytest.MonkeyPatch
+) -> None:
     """The first increment that succeeds is half the way; the next one takes the rest, its half, or a quarter of it."""
-    assembly = replace(wall(3, 4, push=True), load_factors=(0.0, 4.6), solver=bk.SemismoothNewton(max_steps=5))
 
-    def factors() -> list[float]:
-        messages = [record.message for record in bk.run(assembly).history if "increment to" in record.message]
+    def factors(solution: bk.Solution) -> list[float]:
+        messages = [record.message for record in solution.history if "increment to" in record.message]
         words = [message.split("factor ")[1].split(";")[0] for message in messages]
         return [float(word) for word in dict.fromkeys(words)]
 
-    quick = factors()
     monkeypatch.setattr(load_path, "_FAST", 0)
     monkeypatch.setattr(load_path, "_SLOW", 0)
-    slow = factors()
+    quick, slow = factors(halved[0][-1]), factors(bk.run(IMPATIENT))
     assert len(slow) > len(quick)
     assert slow[1] - slow[0] == pytest.approx(0.5 * slow[0])
 
