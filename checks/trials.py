@@ -72,7 +72,7 @@ class Trial:
         return self.outcome in (Outcome.WRONG, Outcome.TRACEBACK)
 
 
-def drawn_case(seed: int, index: int) -> RandomCase | RandomCase:
+def drawn_case(seed: int, index: int) -> RandomCase:
     """Draw what a trial solves; see `random_case` and `random_assembly`."""
     return random_assembly(seed, index) if index % EVERY == EVERY - 1 else random_case(seed, index)
 
@@ -89,9 +89,7 @@ def try_case(seed: int, index: int, solve: Callable[[RandomCase], Sequence[Solut
             return Trial(seed, index, Outcome.TRACEBACK, type(error).__name__, traceback.format_exc())
 
 
-def solved_steps(
-    case: RandomCase,
-) -> Sequence[Solution]:
+def solved_steps(case: RandomCase) -> Sequence[Solution]:
     """Solve the scenes of a case; one solution for each load step."""
     scenes: Any = case.scenes
     return [run(scenes[0])] if len(scenes) == 1 and scenes[0].n_steps == 1 else run(scenes)
