@@ -30,10 +30,10 @@ NOT_NEEDED = (
     *("model.obstacle_travel", "model.overlaps", "model.shapes", "results.load_history", "scene.written_tables"),
     *("operators.half_plane", "operators.kernels", "operators.collocation.curved_elements"),
     *("operators.steklov_poincare.forces_inside", "operators.steklov_poincare.rigid_connection"),
-    *("operators.integrals.curved_geometry", "model.matched_sides", "results.law_jumps"),
+    *("operators.hierarchy", "operators.integrals.curved_geometry", "model.matched_sides", "results.law_jumps"),
 )
 """Of a scene with one body of straight sides on one obstacle, solved by collocation from a number of elements."""
-MOST_MODULES = 144
+MOST_MODULES = 142
 """Modules of the package that may be loaded to solve a simple scene, packages and command line counted."""
 HEAVY = ("scipy.sparse.linalg", "h5py", "pyamg", "matplotlib", "meshio", "rich", "click")
 

@@ -19,10 +19,10 @@ import numpy as np
 
 from bemkit.arrays import ComplexArray, FloatArray, IntArray
 from bemkit.geometry.mesh import BoundaryMesh
+from bemkit.operators.boundary_equations import Border
 from bemkit.operators.collocation.gradient_reconstruction import GradientReconstruction
 from bemkit.operators.collocation.layers import Constants, Layer, Unknowns, combined
 from bemkit.operators.collocation.reciprocity import Reciprocity
-from bemkit.operators.hierarchy.equations import Border
 from bemkit.operators.integrals.element_geometry import ElementGeometry
 from bemkit.operators.material import Material
 from bemkit.operators.rigid_modes import traction_free_modes
@@ -40,7 +40,7 @@ Densities: TypeAlias = tuple[ComplexArray, ComplexArray, ComplexArray]
 
 @dataclass(frozen=True, eq=False)
 class CollocationEquations:
-    """The equations of a body without symmetry; see `bemkit.operators.hierarchy.equations.BoundaryEquations`.
+    """The equations of a body without symmetry; see `bemkit.operators.boundary_equations.BoundaryEquations`.
 
     Parameters
     ----------

@@ -8,9 +8,9 @@ import numpy as np
 
 from bemkit.arrays import ComplexArray, FloatArray, IntArray
 from bemkit.geometry.mesh import BoundaryMesh
+from bemkit.operators.boundary_equations import Border, BoundaryEquations
 from bemkit.operators.collocation.equations import CollocationEquations, collocation_border
 from bemkit.operators.collocation.layers import Layer
-from bemkit.operators.hierarchy.equations import Border, BoundaryEquations
 from bemkit.operators.material import Material
 
 

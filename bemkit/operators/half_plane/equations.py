@@ -12,8 +12,8 @@ from functools import cached_property
 import numpy as np
 
 from bemkit.arrays import ComplexArray, FloatArray, IntArray
+from bemkit.operators.boundary_equations import Border
 from bemkit.operators.half_plane.flexibility import logarithms_between
-from bemkit.operators.hierarchy.equations import Border
 from bemkit.operators.hierarchy.interpolative import Block, Interpolation, sketched
 from bemkit.operators.hierarchy.skeletons import Compression, LevelView, Skeleton
 from bemkit.operators.material import Material

@@ -19,7 +19,7 @@ from functools import partial
 import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray, IntArray
-from bemkit.operators.hierarchy.equations import BoundaryEquations
+from bemkit.operators.boundary_equations import BoundaryEquations
 from bemkit.operators.hierarchy.known_loads import KnownLoads
 from bemkit.operators.hierarchy.merge import ClusterResponse, merge_siblings
 from bemkit.operators.hierarchy.skeletons import Compression, LevelView, Skeleton

@@ -19,7 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bemkit.arrays import BoolArray, ComplexArray, FloatArray, IntArray
-from bemkit.operators.hierarchy.equations import BoundaryEquations
+from bemkit.operators.boundary_equations import BoundaryEquations
 from bemkit.operators.hierarchy.interpolative import Block, Interpolation, sketched
 from bemkit.operators.hierarchy.tree import ClusterTree, Discs
 from bemkit.operators.linear.threads import for_each_chunk

@@ -10,7 +10,7 @@ from typing import Protocol
 import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray, IntArray
-from bemkit.operators.hierarchy.equations import BoundaryEquations
+from bemkit.operators.boundary_equations import BoundaryEquations
 from bemkit.operators.hierarchy.tree import ClusterTree
 from bemkit.operators.linear.dense import SingularMatrixError
 
