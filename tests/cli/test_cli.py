@@ -451,7 +451,7 @@ def test_a_compressed_run_that_is_ended_says_so_and_leaves_no_file(
     monkeypatch.setattr(owner, name, ended)
     before = signal.signal(signal.SIGINT, signal.default_int_handler)  # a background job does not heed it
     try:
-        assert call("run", "large.toml", "--discretisation", "constant", "--elements", "800", "-o", "r.h5") == code
+        assert call("run", "large.toml", "--discretisation", "constant", "--elements", "300", "-o", "r.h5") == code
     finally:
         signal.signal(signal.SIGINT, before)
     assert signal.getsignal(signal.SIGTERM) is signal.SIG_DFL
