@@ -24,7 +24,8 @@ def matching_densities(
     Parameters
     ----------
     contacts : iterable of ContactPair
-        Between elastic bodies, with friction: without it a body on alike meshes would turn nearly freely.
+        Between elastic bodies, with friction, or of two bodies that cannot turn: without friction others would
+        turn nearly freely on alike meshes.
     bodies : mapping of str to BodyScene
         The placed bodies by name.
     meshes : mapping of str to BoundaryMesh

@@ -145,6 +145,15 @@ class BodyScene:
         """The parts that may touch an obstacle."""
         return tuple(part for part in self.parts if isinstance(part.condition, Contact))
 
+    @property
+    def cannot_turn(self) -> bool:
+        """Whether a symmetry, or a part whose displacements are given in x and y, keeps the body from turning."""
+        return self.symmetry is not None or any(
+            isinstance(part.condition, Clamped)
+            or (isinstance(part.condition, PrescribedDisplacement) and all(part.condition.is_prescribed))
+            for part in self.parts
+        )
+
     def parts_on(self, mesh: BoundaryMesh) -> list[tuple[Part, IntArray]]:
         """Return the parts with their elements (k,) on a mesh, without parts beyond a symmetry line."""
         return [(part, elements) for part in self.parts if (elements := mesh.part(part.name)).size]
