@@ -1,1 +1,1 @@
-"""Contact with friction: obstacles, laws, projections, the problem that a body poses, and its certificate."""
+"""Contact with friction: obstacles, laws, projections, the contact problem of a body, and its certificate."""

@@ -1,4 +1,4 @@
-"""The elastic body as contact sees it: the state of its contact nodes, how they have slipped, how it responds."""
+"""The interface of elastic bodies: state and slip of their contact nodes, and responses to contact conditions."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from bemkit.errors import BemkitError, InputError
 
 
 class SingularResponse(BemkitError, ArithmeticError):  # noqa: N818 - a response, not a mistake of the caller
-    """The conditions at the contact nodes leave the body free to move, or contradict each other."""
+    """The conditions at the contact nodes do not hold the body, or contradict each other."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,7 +25,7 @@ class ContactState:
     ----------
     displacement : (n_contact, 2) array [m]
     traction : (n_contact, 2) array [Pa]
-        What the obstacle does to the body; pressed nodes have a negative normal component.
+        Tractions of the obstacle on the body; the normal component of pressed nodes is negative.
 
     Raises
     ------
@@ -68,15 +68,14 @@ class ContactState:
         return bool(np.isfinite(self.displacement).all() and np.isfinite(self.traction).all())
 
     def blended(self, other: ContactState, fraction: float) -> ContactState:
-        """Return the state the given fraction of the way to `other`.
+        """Return the interpolation (1 - fraction) self + fraction other.
 
-        Two responses of one body blend into a response again, because the body is linear.
+        An interpolation of two responses is again a response, because the body is linear.
 
         Parameters
         ----------
         other : ContactState
         fraction : float
-            Zero gives this state, one gives `other`.
         """
         if fraction == 1.0:
             return other
@@ -88,16 +87,16 @@ class ContactState:
 
 @dataclass(frozen=True, eq=False)
 class SlipHistory:
-    """Time and slip at the end of an increment, in the units of the user.
+    """Time and slip at the end of an increment, in user units.
 
     Parameters
     ----------
     time, time_step : float [s]
         Time at the end of the increment, and its duration.
     slip : (n_contact,) array [m]
-        Length of the path that each node has slipped while it was closed, this increment included; never falls.
+        Accumulated slip of each node while it was closed, including this increment; non-decreasing.
     last_slip : (n_contact,) array [m]
-        Its part in this increment, not negative.
+        Slip in this increment, not negative.
     """
 
     time: float
@@ -107,12 +106,12 @@ class SlipHistory:
 
     @classmethod
     def at_rest(cls, n_contact: int) -> SlipHistory:
-        """Return the history before any load: time zero and no slip."""
+        """Return the history before loading: time zero and no slip."""
         return cls(0.0, 0.0, np.zeros(n_contact), np.zeros(n_contact))
 
     @property
     def rate(self) -> FloatArray:
-        """(n_contact,) array [m/s]: the speed of slip in this increment."""
+        """(n_contact,) array [m/s]: slip rate in this increment."""
         return self.last_slip / self.time_step if self.time_step > 0.0 else np.zeros_like(self.last_slip)
 
     def followed(self, time: float, slip: FloatArray, is_closed: BoolArray) -> SlipHistory:
@@ -121,36 +120,36 @@ class SlipHistory:
         Parameters
         ----------
         time : float [s]
-            At the end of that increment.
+            Time at the end of that increment.
         slip : (n_contact,) array [m]
-            Slip of each node in it, of either sign; that of open nodes does not count.
+            Slip of each node in that increment, of either sign; slip of open nodes does not count.
         is_closed : (n_contact,) bool array
         """
         added = np.where(is_closed, np.abs(slip), 0.0)
         return SlipHistory(time, time - self.time, self.slip + added, added)
 
     def of(self, nodes: IntArray) -> SlipHistory:
-        """Return the history of some of the nodes."""
+        """Return the history of some nodes."""
         return SlipHistory(self.time, self.time_step, self.slip[nodes], self.last_slip[nodes])
 
 
 class LinearBody(Protocol):
     """One or several elastic bodies under their loads, reduced to the contact nodes.
 
-    All nonlinear code in bemkit sees bodies only through this protocol: a body never learns of friction, solvers
-    never learn how it finds its response. Derive from this class and write `weights`, `stiffness_scale` and `respond`;
-    a body that only contact can hold also writes `rigid_motions` and `rigid_load`. `bemkit.testing.check_body` tests
-    everything said here.
+    All nonlinear code in bemkit uses bodies through this protocol: a body does not depend on friction, and solvers do
+    not depend on how it computes responses. Derive from this class and implement `weights`, `stiffness_scale` and
+    `respond`; a body that only contact can hold also implements `rigid_motions` and `rigid_load`.
+    `bemkit.testing.check_body` tests this contract.
 
     Attributes
     ----------
     weights : (n_contact,) array [m]
-        Positive: nodal force = weight times traction.
+        Positive weights; nodal force = weight times traction.
     accuracy : float
         Relative error of the displacements and tractions of a response: 1e-14 (the default) for a direct solver, the
         tolerance at which it stops for an iterative one. Solvers take their tolerances from it.
     responses_are_expensive : bool
-        Whether solvers should ask for tens of responses at most, rather than for several per contact node. False by
+        Whether solvers should take at most tens of responses instead of several for each contact node. False by
         default.
     """
 
@@ -167,7 +166,7 @@ class LinearBody(Protocol):
     def stiffness_scale(self) -> float:
         """Typical traction per displacement of a single contact node [Pa/m], positive; the unit of automatic rho.
 
-        For a material of plane modulus E' this is E' divided by the weight of a node, however the body is held.
+        For a material of plane modulus E' it is E' divided by the weight of a node; it does not depend on supports.
         """
         ...
 
@@ -175,8 +174,8 @@ class LinearBody(Protocol):
     def tangent_follows(self) -> BoolArray:
         """(n_contact,) bool array: nodes whose tangential displacement follows from normal ones; none by default.
 
-        A support or two obstacles hold them, so that their tangential condition is one on tractions.
-        `ContactProblem.respond` replaces others.
+        A support or two obstacles hold these nodes. Their tangential condition must be on tractions;
+        `ContactProblem.respond` replaces other conditions.
         """
         return np.zeros(self.n_contact, bool)
 
@@ -186,25 +185,25 @@ class LinearBody(Protocol):
         Parameters
         ----------
         conditions : LinearConditions
-            At nodes whose tangent follows the second one is on tractions.
+            The second condition of nodes whose tangent follows is on tractions.
 
         Raises
         ------
         SingularResponse
             If the conditions do not determine the response.
         InputError
-            If there is another tangential condition where the tangent follows.
+            If a node whose tangent follows has a condition on its tangential displacement.
         """
         ...
 
     def rigid_motions(self) -> RigidMotions:
-        """Return the motions of the body that only contact can hold; by default there are none.
+        """Return the rigid motions that only contact can hold; by default there are none.
 
         Returns
         -------
         (n_motions, n_contact, 2) array, or sparse (n_motions, 2 n_contact) array
-            Normal and tangential components at the contact nodes; linearly independent. Sparse, with index
-            ``2 node + component``, if the body has many members, each with motions of its own.
+            Normal and tangential components at the contact nodes; linearly independent. Bodies of many members use the
+            sparse form with index ``2 node + component``.
         """
         return np.zeros((0, self.n_contact, 2))
 
@@ -214,27 +213,27 @@ class LinearBody(Protocol):
         Returns
         -------
         (n_motions,) array [N]
-            Per unit of thickness and of motion.
+            Work per unit of thickness and of motion.
         """
         return np.zeros(self.rigid_motions().shape[0])
 
     def moving_bodies(self, coefficients: FloatArray) -> str:
-        """Name the bodies that a combination (n_motions,) of the rigid motions moves; messages go on with "moves"."""
+        """Name the bodies that a combination (n_motions,) of the rigid motions moves, as subject of a message."""
         return "the body"
 
     def partners_of(self, coefficients: FloatArray) -> str:
-        """Name what these bodies may touch; messages put "along" before it."""
+        """Name the bodies or obstacles that these bodies may touch, for messages."""
         return "the obstacle"
 
     def shares(self, forces: FloatArray) -> FloatArray:
         """Return the share of the largest force that scales each node in the certificate; by default 1.
 
-        With several bodies the scale of a node is the contact force of its own partners, not of all bodies.
+        With several bodies the scale of a node is the contact force between its two partners.
 
         Parameters
         ----------
         forces : (n_contact,) array [N/m]
-            Sizes of the nodal forces, some of them positive.
+            Magnitudes of the nodal forces, not all zero.
 
         Returns
         -------
@@ -244,20 +243,19 @@ class LinearBody(Protocol):
         return np.ones(self.n_contact)
 
     def imbalance(self, state: ContactState) -> Imbalance:
-        """Return how far all forces on the body, those inside it included, are from equilibrium.
+        """Return the relative residual of the equilibrium of all forces on the body, including body forces.
 
         Parameters
         ----------
         state : ContactState
-            Of any origin: a state that is no response of this body is out of balance.
+            Any state; one that is no response of this body is out of balance.
 
         Returns
         -------
         Imbalance
-            Relative to the forces on the body, moments also to its size. By default `force` is the largest nodal force
-            that is missing to hold the displacements of the state, which takes a response, and `moment` the work of
-            load and tractions on the rigid motions, whose largest component is one; both relative to the largest nodal
-            force of the state and of that response.
+            By default `force` is the largest difference of nodal forces between the state and a response with the same
+            displacements, and `moment` the work of load and tractions on the rigid motions of largest component one.
+            Both are relative to the largest nodal force of the state and of that response.
         """
         follows = self.tangent_follows
         held = np.stack([np.ones_like(follows), ~follows], axis=1)
@@ -269,13 +267,13 @@ class LinearBody(Protocol):
         largest = float(np.abs(forces).max())
         if largest == 0.0:
             return Imbalance(0.0, 0.0)
-        # displacements that the response does not reach count as the tractions that would cause them
+        # differences of displacements count as the tractions that would cause them
         misfit = self.stiffness_scale * np.abs(response.displacement - state.displacement).max(axis=1)
         missing = max(float(np.abs(forces[0] - forces[1]).max()), float((self.weights * misfit).max()))
         motions = as_rows(self.rigid_motions())
-        size = float(largest_components(motions).max(initial=0.0)) or 1.0
-        work = float(np.max(np.abs(self.rigid_load() + motions @ forces[0].ravel()) / size, initial=0.0))
-        # an error of the displacements causes tractions, too
+        largest_component = float(largest_components(motions).max(initial=0.0)) or 1.0
+        work = float(np.max(np.abs(self.rigid_load() + motions @ forces[0].ravel()) / largest_component, initial=0.0))
+        # errors of the displacements cause tractions, too
         by_displacement = self.stiffness_scale * float((self.weights[:, None] * np.abs(state.displacement)).max())
         round_off = self.accuracy * max(largest, by_displacement) / largest
         return Imbalance(missing / largest, work / largest, round_off)

@@ -1,4 +1,4 @@
-"""The certificate of a solution: violations of contact, friction and equilibrium, numbers anyone can check."""
+"""The certificate of a solution: violations of contact, friction and equilibrium."""
 
 from __future__ import annotations
 
@@ -11,20 +11,18 @@ from bemkit.contact.body import ContactState
 from bemkit.contact.problem import ContactProblem
 
 _ROUND_OFF = 1e-13
-"""Tractions below this share of those of the sticking state are round-off (450 eps) of the sums they come from. Larger
-ones count, however small they are."""
+"""Tractions relative to those of the sticking state below which they are round-off (450 eps)."""
 _LARGEST_STICKING_RATIO = 100.0
-"""The tractions of the sticking state measure a state only up to this multiple of its own tractions. These are then
-known to 1e-7 at a tolerance of 1e-9, and to 1e-6 (the mean of an element) where few nodes carry all."""
+"""Largest ratio of the stress scale, from the sticking state, to the tractions of the state. At a tolerance of 1e-9
+tractions are then accurate to 1e-7, or to 1e-6 (mean of an element) if few nodes carry the load."""
 DEFORMED = 1e-3
-"""Share of its displacement that counts as deformation of a body without contact tractions. It lies above the round-off
-of the displacement at a tolerance of 1e-9, and below the deformation by a load under which the body gives way to an
-overlap."""
+"""Length scale of a body without contact tractions, relative to its displacement. It is larger than round-off at a
+tolerance of 1e-9, and smaller than the deformation by a load that lets the body recede from an overlap."""
 
 
 @dataclass(frozen=True)
 class Certificate:
-    """Largest violation of each condition over all contact nodes; all numbers are dimensionless and zero is perfect.
+    """Largest violation of each condition over all contact nodes; dimensionless, zero for an exact solution.
 
     Parameters
     ----------
@@ -33,15 +31,16 @@ class Certificate:
     tension : float
         ``sigma_n`` where positive.
     complementarity : float
-        The smaller of traction and distance to the obstacle, positive if an open node carries traction.
+        The smaller of normal traction and distance to the obstacle; positive if an open node carries traction.
     cone_excess : float
-        ``|sigma_t| - bound(sigma_n)`` where positive, the bound taken at the *present* normal traction.
+        ``|sigma_t| - bound(sigma_n)`` where positive, with the bound at the present normal traction.
     slip_opposition : float
-        The smaller of ``|slip|`` and ``|sigma_t + bound(sigma_n) sign(slip)|``: slip without full, opposing friction.
+        The smaller of ``|slip|`` and ``|sigma_t + bound(sigma_n) sign(slip)|``; positive for slip without full,
+        opposing friction.
     force_imbalance, moment_imbalance : float
-        Distance of all forces on the body from equilibrium, see `LinearBody.imbalance`.
+        Residual of the equilibrium of all forces on the body, see `LinearBody.imbalance`.
     round_off : float
-        No violation: how much of the two imbalances may be round-off, at most 1e-6.
+        Part of the two imbalances that may be round-off, at most 1e-6; not a violation.
     """
 
     penetration: float
@@ -55,16 +54,16 @@ class Certificate:
 
     @property
     def violations(self) -> dict[str, float]:
-        """The measured violations by name: all entries but `round_off`."""
+        """The violations by name, without `round_off`."""
         return {name: value for name, value in self.as_dict().items() if name != "round_off"}
 
     @property
     def worst(self) -> float:
-        """The largest violation, round-off included; ``nan`` if any violation is."""
+        """The largest violation, including round-off; ``nan`` if any violation is ``nan``."""
         return float(np.max(list(self.violations.values())))
 
     def is_below(self, tolerance: float) -> bool:
-        """Whether violations are at most `tolerance`, imbalances at most `tolerance + round_off`; never for ``nan``."""
+        """Whether violations are at most `tolerance`, imbalances at most `tolerance + round_off`; not for ``nan``."""
         allowed = {name: tolerance for name in self.violations}
         for name in ("force_imbalance", "moment_imbalance"):
             allowed[name] += self.round_off
@@ -76,13 +75,13 @@ class Certificate:
 
 
 def certify(problem: ContactProblem, state: ContactState) -> Certificate:
-    """Measure how far a state violates conditions (6) to (8) of the paper and the equilibrium of the body.
+    """Return the violations of conditions (6) to (8) of the paper and of the equilibrium of the body.
 
     Parameters
     ----------
     problem : ContactProblem
     state : ContactState
-        Of any origin: it need not be a response of the body.
+        Any state; it need not be a response of the body.
 
     Returns
     -------
@@ -101,7 +100,7 @@ def certify(problem: ContactProblem, state: ContactState) -> Certificate:
     stress, length = scales.stresses(problem.body.weights), scales.lengths
     clearance = problem.gap - state.u_n
     slip = state.u_t - problem.slip_origin
-    # friction given across the gap is not a sign of contact
+    # friction that acts across the gap is no contact
     shear = np.where(problem.law.acts_across_gap, 0.0, np.abs(state.sigma_t))
     traction, distance = np.maximum(np.abs(state.sigma_n), shear) / stress, np.abs(clearance) / length
     bound = problem.friction_bound(state.sigma_n, is_closed=traction > distance)
@@ -121,7 +120,7 @@ def certify(problem: ContactProblem, state: ContactState) -> Certificate:
 
 @dataclass(frozen=True, eq=False)
 class Scales:
-    """Scales of the certificate.
+    """Scales of stress and length in the certificate.
 
     ===================  ===========================================  ===================================
     regime               stress [Pa]                                  length [m]
@@ -137,16 +136,15 @@ class Scales:
     Parameters
     ----------
     stress : float [Pa]
-        The sticking state (all nodes held) takes part so that a nearly lifted body is judged by its load.
+        It includes the sticking state (all nodes held), so that the scale of a nearly lifted body is its load.
     force : float [N/m]
-        The largest nodal force, chosen like the stress. At a node the stress is at most this force by the weight of the
-        node, so that the high tractions of tiny elements in a corner do not loosen the test elsewhere.
+        The largest nodal force, chosen like the stress. The stress of a node is at most this force divided by its
+        weight, so that high tractions of tiny elements in a corner do not weaken the test of other nodes.
     length, least_length : float [m]
-        Digits beyond the least length are round-off of the displacements. A far obstacle or a long rigid motion does
-        not loosen the test until it exceeds the length a million times.
+        Differences below the least length are round-off of the displacements. A far obstacle or a long rigid motion
+        weakens the test only if it is more than a million times the length.
     share : (n_contact,) array [-]
-        Each contact is measured by the partner that carries less, down to a thousandth of what the others carry; see
-        `LinearBody.shares`.
+        Relative scale of each node: that of the partner with less load, at least a thousandth; see `LinearBody.shares`.
     """
 
     stress: float
@@ -156,20 +154,19 @@ class Scales:
     share: FloatArray
 
     def stresses(self, weights: FloatArray) -> FloatArray:
-        """Return the stress (n_contact,) [Pa] of each node."""
+        """Return the stress scale (n_contact,) [Pa] of each node."""
         return np.asarray(np.minimum(self.stress, self.force / weights) * self.share)
 
     @property
     def lengths(self) -> FloatArray:
-        """(n_contact,) array [m]: the length of each node."""
+        """(n_contact,) array [m]: length scale of each node."""
         return np.asarray(np.maximum(self.length * self.share, self.least_length))
 
     @classmethod
     def of(cls, problem: ContactProblem, state: ContactState) -> Scales:
-        """Return the scales of a state of any origin."""
-        present, sticking = (np.abs(each.traction).max(axis=1) for each in (state, problem.sticking_state))
-        # Without tractions, friction that needs no pressure is one to be met, however small beside those of the
-        # sticking state. Tractions that are there are no larger because a law would allow more.
+        """Return the scales of any state."""
+        present, sticking = (np.abs(known.traction).max(axis=1) for known in (state, problem.sticking_state))
+        # without tractions, cohesion is a requirement however small it is; it does not increase present tractions
         is_loaded = present.max() > _ROUND_OFF * sticking.max()
         required = present if is_loaded else np.maximum(present, problem.cohesion)
         if required.max() > _ROUND_OFF * sticking.max() and max(present.max(), sticking.max()) > 0.0:
@@ -180,10 +177,10 @@ class Scales:
     def _of_contact(
         cls, problem: ContactProblem, state: ContactState, present: FloatArray, required: FloatArray
     ) -> Scales:
-        """Return the scales where contact carries something; `required` (n_contact,) [Pa] includes cohesion."""
+        """Return the scales of a state with contact tractions; `required` (n_contact,) [Pa] includes cohesion."""
         weights, sticking = problem.body.weights, np.abs(problem.sticking_state.traction).max(axis=1)
-        # Holding a nearly incompressible body may take a million times the tractions of the solution. Measured by
-        # those, errors of the solution would not be seen.
+        # the sticking state of a nearly incompressible body may have tractions a million times larger, which would hide
+        # errors of the solution
         stress, force = (
             max(
                 float((factor * present).max()),
@@ -198,9 +195,9 @@ class Scales:
 
     @classmethod
     def _of_motion(cls, problem: ContactProblem, state: ContactState) -> Scales:
-        """Return the scales where contact carries nothing, so that the displacement is the only length there is.
+        """Return the scales of a state without contact tractions: the length is a share of the displacement.
 
-        A body that has not moved is measured by the force that would hold it or, if that is zero, by the gaps.
+        For a body at rest the scale is the force of the sticking state or, if that is zero, the gaps.
         """
         weights, sticking = problem.body.weights, np.abs(problem.sticking_state.traction).max(axis=1)
         gaps = np.abs(problem.gap[np.isfinite(problem.gap)])

@@ -1,7 +1,7 @@
-"""Two linear conditions at each contact node, under which a body responds, and the rigid motions they leave free.
+"""Two linear conditions at each contact node, and the rigid motions that they do not hold.
 
-Components are (n, t) throughout: index 0 along the outward normal, index 1 along the tangent. The first of the two
-conditions at a node is its normal, the second its tangential one.
+Components are (n, t): index 0 along the outward normal, index 1 along the tangent. The first condition of a node is the
+normal one, the second the tangential one.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ else:
 
 
 def as_rows(motions: RigidMotions) -> RigidMotions:
-    """Return motions, dense or sparse, with one row (2 n_contact,) for each."""
+    """Return motions, dense or sparse, with one row (2 n_contact,) for each motion."""
     if isinstance(motions, np.ndarray) and motions.ndim == 3:
         return motions.reshape(len(motions), 2 * motions.shape[1])
     return motions
@@ -36,7 +36,7 @@ def as_dense(motions: RigidMotions, n_contact: int) -> FloatArray:
 
 
 def largest_components(motions: RigidMotions) -> FloatArray:
-    """Return (n_motions,) the size of the largest component of each motion."""
+    """Return the largest component (n_motions,) of each motion."""
     rows = as_rows(motions)
     if isinstance(rows, np.ndarray):
         return np.asarray(np.abs(rows).max(axis=1, initial=0.0))
@@ -44,12 +44,12 @@ def largest_components(motions: RigidMotions) -> FloatArray:
 
 
 def scaled_motions(motions: RigidMotions, sizes: FloatArray) -> RigidMotions:
-    """Return motions (a row each) divided by their sizes (n_motions,)."""
+    """Return motions, one in each row, divided by their sizes (n_motions,)."""
     return motions / sizes[:, None] if isinstance(motions, np.ndarray) else (motions.T / sizes).T.tocsr()
 
 
 def orthonormal(motions: FloatArray) -> FloatArray:
-    """Return orthonormal motions (n_motions, n_contact, 2) that span the same as independent ones."""
+    """Return orthonormal motions (n_motions, n_contact, 2) with the span of linearly independent ones."""
     return np.asarray(np.linalg.qr(motions.reshape(len(motions), 2 * motions.shape[1]).T)[0]).T.reshape(motions.shape)
 
 
@@ -91,12 +91,12 @@ class LinearConditions:
         return len(self.value)
 
     def replaced(self, rows: BoolArray, other: LinearConditions) -> LinearConditions:
-        """Return these conditions with the marked ones taken from `other`.
+        """Return these conditions with the marked ones replaced by those of `other`.
 
         Parameters
         ----------
         rows : (n_contact, 2) bool array
-            Which conditions (normal, tangential) of which nodes to replace.
+            Marks conditions (normal, tangential) of nodes.
         other : LinearConditions
         """
         return LinearConditions(
@@ -106,7 +106,7 @@ class LinearConditions:
         )
 
     def with_given_displacements(self, displacement: FloatArray) -> FloatArray:
-        """Return displacements (n_contact, 2) [m], those that conditions prescribe exact to the last digit."""
+        """Return displacements (n_contact, 2) [m] with the exact values of prescribed ones."""
         corrected = displacement.copy()
         for row in (0, 1):
             factor, other = self.on_displacement[:, row, row], self.on_displacement[:, row, 1 - row]
@@ -115,10 +115,10 @@ class LinearConditions:
         return corrected
 
     def with_given_tractions(self, traction: FloatArray) -> FloatArray:
-        """Return tractions (n_contact, 2) [Pa], those that conditions prescribe exact to the last digit.
+        """Return tractions (n_contact, 2) [Pa] with the exact values of prescribed ones.
 
-        That includes a component that follows from the other one. Ties such as ``|sigma_t| = s |sigma_n|`` are then
-        decided alike in all units.
+        This includes a component that follows from the other one. Ties such as ``|sigma_t| = s |sigma_n|`` are then
+        decided in the same way in all units.
         """
         corrected = traction.copy()
         for row in (0, 1):
@@ -129,17 +129,17 @@ class LinearConditions:
         return corrected
 
     def free_motions(self, motions: RigidMotions) -> RigidMotions:
-        """Return the rigid motions that change no condition: along them only tractions are prescribed.
+        """Return the rigid motions that the conditions do not hold: only tractions are prescribed along them.
 
         Parameters
         ----------
         motions : (n_motions, n_contact, 2) array, or sparse (n_motions, 2 n_contact) array
-            Rigid motions, which change no traction; linearly independent.
+            Rigid motions; linearly independent.
 
         Returns
         -------
         (n_free, n_contact, 2) array, or sparse (n_free, 2 n_contact) array
-            A basis, orthonormal unless it is sparse.
+            A basis, orthonormal if it is dense.
         """
         if not motions.shape[0]:
             return motions
@@ -149,23 +149,23 @@ class LinearConditions:
         return np.tensordot(self._free_combinations(basis), basis, axes=1)
 
     def hold(self, basis: FloatArray) -> bool:
-        """Whether every combination of orthonormal motions (n_motions, n_contact, 2) changes some condition."""
+        """Whether the conditions hold every combination of orthonormal motions (n_motions, n_contact, 2)."""
         return not len(basis) or bool((np.linalg.svd(self._changes(basis), compute_uv=False) > NULL_TOLERANCE).all())
 
     def _free_combinations(self, basis: FloatArray) -> FloatArray:
-        """Return the combinations (n_free, n_motions) of orthonormal motions that change no condition."""
+        """Return the combinations (n_free, n_motions) of orthonormal motions that no condition holds."""
         _, singular, directions = np.linalg.svd(np.linalg.qr(self._changes(basis), mode="r"))
         return np.asarray(directions[np.count_nonzero(singular > NULL_TOLERANCE) :])
 
     def _changes(self, basis: FloatArray) -> FloatArray:
-        """Return the changes (2 n_contact, n_motions) of the scaled conditions by orthonormal motions."""
+        """Return the changes (2 n_contact, n_motions) of the scaled conditions under orthonormal motions."""
         return np.asarray(self._scaled_on_displacement @ basis.transpose(1, 2, 0)).reshape(-1, len(basis))
 
     @property
     def _scaled_on_displacement(self) -> FloatArray:
         """(n_contact, 2, 2) array: A_u with the largest factor of each condition scaled to one."""
-        size = np.abs(self.on_displacement).max(axis=2, keepdims=True)
-        return np.asarray(self.on_displacement / np.where(size > 0.0, size, 1.0))
+        largest = np.abs(self.on_displacement).max(axis=2, keepdims=True)
+        return np.asarray(self.on_displacement / np.where(largest > 0.0, largest, 1.0))
 
     def _sparse_free_motions(self, motions: csr_array) -> csr_array:
         from scipy import sparse
@@ -178,16 +178,15 @@ class LinearConditions:
         return sparse.csr_array(null_space(sparse.csr_array(sparse.csr_array(conditions) @ unit.T)) @ unit)
 
     def regularised(self, displacement: FloatArray, stiffness: float) -> LinearConditions:
-        """Return the conditions with weak springs added wherever only tractions are prescribed.
+        """Return the conditions with weak springs added to those that prescribe only tractions.
 
-        A body that these conditions leave free to move is then held near `displacement`. The springs carry nothing
-        once the displacement stays where it is, so a sequence of such proximal steps [Rockafellar1976] ends without
-        them.
+        The springs hold a free body near `displacement`. A sequence of such proximal steps [Rockafellar1976] converges
+        to a solution without forces in the springs.
 
         Parameters
         ----------
         displacement : (n_contact, 2) array [m]
-            Where the springs are without force.
+            Displacement at which the springs carry no force.
         stiffness : float [Pa/m]
         """
         spring = np.where(np.any(self.on_displacement != 0.0, axis=2), 0.0, stiffness)
@@ -204,13 +203,13 @@ def separated(n_contact: int) -> LinearConditions:
 
 
 def stick(gap: FloatArray, reference_slip: FloatArray) -> LinearConditions:
-    """Return the conditions of closed nodes that do not slip: ``u_n = g``, ``u_t = reference_slip``.
+    """Return the conditions of sticking nodes: ``u_n = g``, ``u_t = reference_slip``.
 
     Parameters
     ----------
     gap : (n_contact,) array [m]
     reference_slip : (n_contact,) array [m]
-        Tangential displacement at which the node was last at rest (zero for the static law).
+        Tangential displacement without slip (zero for the static law).
     """
     n_contact = len(gap)
     value = np.stack([gap, reference_slip], axis=1)
@@ -220,7 +219,7 @@ def stick(gap: FloatArray, reference_slip: FloatArray) -> LinearConditions:
 def slip(
     gap: FloatArray, direction: FloatArray, bound_slope: FloatArray, bound_intercept: FloatArray
 ) -> LinearConditions:
-    """Return the conditions of closed nodes that slip: ``u_n = g``, ``t_t = -direction * bound(t_n)``.
+    """Return the conditions of slipping nodes: ``u_n = g``, ``t_t = -direction * bound(t_n)``.
 
     Parameters
     ----------
@@ -234,7 +233,7 @@ def slip(
 
     Notes
     -----
-    Algorithm 2 of the paper prints the slip traction with the opposite sign; equation (16) implies the one used here.
+    Algorithm 2 of the paper prints the slip traction with the opposite sign; the sign here follows from equation (16).
     """
     n_contact = len(gap)
     on_displacement = np.zeros((n_contact, 2, 2))
@@ -246,18 +245,18 @@ def slip(
 
 
 def of_statuses(
-    is_closed: BoolArray, slips: BoolArray, held: LinearConditions, sliding: LinearConditions
+    is_closed: BoolArray, slips: BoolArray, sticking: LinearConditions, sliding: LinearConditions
 ) -> LinearConditions:
     """Return the conditions of nodes in different statuses.
 
     Parameters
     ----------
     is_closed, slips : (n_contact,) bool arrays
-        Nodes with the normal condition of `held` (the others have ``t_n = 0``), and nodes with the tangential condition
-        of `sliding` (the others have that of `held`).
-    held, sliding : LinearConditions
+        Closed nodes have the normal condition of `sticking`, open nodes ``t_n = 0``. Slipping nodes have the tangential
+        condition of `sliding`, the others that of `sticking`.
+    sticking, sliding : LinearConditions
     """
-    conditions = separated(len(is_closed)).replaced(np.stack([is_closed, ~slips], axis=1), held)
+    conditions = separated(len(is_closed)).replaced(np.stack([is_closed, ~slips], axis=1), sticking)
     return conditions.replaced(np.stack([np.zeros_like(slips), slips], axis=1), sliding)
 
 
@@ -273,7 +272,7 @@ def augmented(
     reference_slip : (n_contact,) array [m]
         Tangential part of u_0.
     multiplier : (n_contact, 2) array [Pa]
-        sigma^(k) of Algorithm 1, kept fixed during an inner loop.
+        sigma^(k) of Algorithm 1, constant in an inner loop.
     rho_n, rho_t : float [Pa/m]
     """
     n_contact = len(gap)

@@ -1,4 +1,4 @@
-"""Load factors at which rigid bodies in contact with Coulomb friction, which does not dilate, may collapse."""
+"""Load factors of collapse of rigid bodies in contact with non-associative Coulomb friction."""
 
 from __future__ import annotations
 
@@ -17,17 +17,17 @@ from bemkit.contact.solvability import with_violated_nodes
 from bemkit.errors import InputError
 
 MOST_PROGRAMMES = 60
-"""Most linear programmes with given friction bounds; walls of 30 to 60 blocks take 10 to 50."""
+"""Largest number of linear programmes with given friction bounds; walls of 30 to 60 blocks take 10 to 50."""
 _SHARE = 0.6
-"""Share of the last normal forces in the next ones: without the mean, states of equal factors alternate."""
+"""Weight of the last normal forces in the next ones; without it, states of equal factors alternate."""
 _STEADY, _N_STEADY = 1e-5, 6
-"""Relative change of the factor, and number of steps in turn without a larger one, after which the iteration ends."""
+"""Largest relative change of the factor, and number of consecutive steps, at which the iteration ends."""
 _MOVES = 1e-7
-"""Velocity relative to the largest one, above which it is no round-off of linear programming."""
+"""Smallest velocity, relative to the largest one, that is not round-off of linear programming."""
 _BELOW = (0.01, 0.02, 0.05, 0.1, 0.2)
-"""Shares below the factor at which a state of forces that holds is sought."""
+"""Relative distances below the factor at which a stable state of forces is sought."""
 _HOLDS = 1e-6
-"""Relative growth of the factor that shows that no motion begins, above the tolerance of linear programming."""
+"""Smallest relative growth of the factor without a motion, above the tolerance of linear programming."""
 
 _WEDGED = 1e4
 """Pressing force relative to the loads above which bodies are wedged."""
@@ -38,23 +38,22 @@ _ANY_FACTOR = np.array([[-WITHOUT_BOUND, WITHOUT_BOUND]])
 class CoulombLimit:
     """Load factors of collapse with Coulomb friction.
 
-    With friction that does not dilate, contact forces at a factor are not unique, and whether a motion begins depends
-    on them. So factors of collapse fill intervals, and none of these numbers is a lower bound of all of them.
+    With friction without dilatancy, the contact forces at a factor are not unique, and they decide whether a motion
+    begins. So factors of collapse fill intervals, and none of these numbers is a lower bound of all of them.
 
     Parameters
     ----------
     held : float
-        At this factor a state of forces is known from which the growing load begins no motion: the same friction bounds
-        hold more. It is 1 % below `factor` for walls of dozens of blocks, minus infinity if no state was found.
+        Factor with a state of forces from which no motion begins: the same friction bounds balance a larger load. It is
+        1 % below `factor` for walls of dozens of blocks, and minus infinity if no state was found.
     factor : float
-        At this factor a state of forces is known from which a motion begins: forces in balance and in the cones of
-        friction, and a motion that nowhere penetrates, opens only joints without pressure and slides only against full
-        friction. It is the limit of the iteration, and agrees
-        with factors in the literature.
+        Factor with a state of forces from which a motion begins: forces in equilibrium and in the friction cones, and a
+        motion that does not penetrate, opens only joints without pressure and slides only against full friction. It is
+        the limit of the iteration and agrees with factors in the literature.
     smallest : float
-        The smallest factor at which such a state was found: an upper bound of the smallest factor of collapse.
+        The smallest factor with such a state: an upper bound of the smallest factor of collapse.
     associative : float
-        No state of forces at all exists above this factor.
+        Factor above which no state of forces exists (associative friction).
     """
 
     held: float
@@ -75,7 +74,7 @@ def coulomb_limit(
     *,
     most_programmes: int = MOST_PROGRAMMES,
 ) -> CoulombLimit | None:
-    """Return load factors of collapse; the parameters are those of `bemkit.contact.limit_load.largest_factor`.
+    """Return load factors of collapse; parameters are those of `bemkit.contact.limit_load.largest_factor`.
 
     Parameters
     ----------
@@ -83,20 +82,20 @@ def coulomb_limit(
     constant, growing : (n_motions,) arrays [N]
     cohesion, slope : (n,) arrays [N], [-]
     most_programmes : int
-        With given friction bounds.
+        Largest number of programmes with given friction bounds.
 
     Returns
     -------
     CoulombLimit or None
-        None if no factor at all balances the loads. All factors are infinite if supports hold any multiple, or if no
-        load is constant and contact forces hold any multiple.
+        None if no factor balances the loads. All factors are infinite if supports hold any multiple, or if no load is
+        constant and contact forces hold any multiple.
 
     Notes
     -----
-    Linear programmes in turn: friction bounds are given by the normal forces of the programmes before, so that sliding
-    does not dilate [FerrisTinLoi2001]. Each yields a motion. The forces of collapse of that motion form a convex set,
-    and two further programmes find its smallest and largest factor; every factor between has a state of collapse. A
-    state holds if the same friction bounds balance a larger factor.
+    A sequence of linear programmes: the normal forces of the last programme give the friction bounds of the next one,
+    so that sliding does not dilate [FerrisTinLoi2001]. Each programme gives a motion. The forces of collapse for that
+    motion form a convex set, and two more programmes find its smallest and largest factor; every factor between them
+    has a state of collapse. A state holds if the same friction bounds balance a larger factor.
     """
     associative = largest_factor(motions, constant, growing, [(cohesion, slope)])
     if associative is None:
@@ -104,7 +103,7 @@ def coulomb_limit(
     if np.isinf(associative) and not (motions.shape[0] and constant.any() and growing.any()):
         return _WITHOUT_LIMIT
     unit = largest_components(motions)
-    unit = np.where(unit > 0.0, unit, 1.0)  # what touches nothing
+    unit = np.where(unit > 0.0, unit, 1.0)  # bodies that touch nothing
     scaled, constant, growing = scaled_motions(motions, unit), constant / unit, growing / unit
     size = float(np.abs(growing).max())
     scale = float(np.abs(constant).max()) or size
@@ -122,17 +121,17 @@ def coulomb_limit(
         )
         return _limit(blocks, most_programmes)
 
-    # sliding does not dilate: only points that the motion presses, or that hold without pressure, join
+    # sliding does not dilate: add only nodes that the motion presses or that have cohesion
     found = with_violated_nodes(scaled, cohesion / scale, 0.0 * slope, programme)
     if np.isnan(found.factor):
-        raise InputError("no state of collapse was found: compare largest_load_factor, a bound from above")
+        raise InputError("no state of collapse was found: use largest_load_factor, an upper bound")
     held, factor, smallest = (scale / size * value for value in (found.held, found.factor, found.smallest))
     return CoulombLimit(held, factor, smallest, associative)
 
 
 @dataclass(frozen=True, eq=False)
 class _Blocks:
-    """Dimensionless loads (m,) on m motions, and works (m, n) of unit forces, outward and along n points, on them."""
+    """Dimensionless loads (m,) on m motions, and work (m, n) of unit normal and tangential forces at n points."""
 
     normal: csc_array
     tangential: csc_array
@@ -147,17 +146,17 @@ class _Blocks:
 
     @property
     def load_column(self) -> csc_array:
-        """The growing load as the last column of the equations of balance."""
+        """The growing load as the last column of the equilibrium equations."""
         return sparse.csc_array(self.growing[:, None])
 
 
 def _limit(blocks: _Blocks, most_programmes: int) -> tuple[CoulombLimit, FloatArray | None]:
-    """Return the factors, without dimension, and the velocities of the last collapse; nan and None if there is none."""
+    """Return the dimensionless factors and the velocities of the last collapse; nan and None if there is none."""
     none = CoulombLimit(np.nan, np.nan, np.nan, np.nan), None
     pressing = _pressing_forces_at_the_limit(blocks)
     if pressing is None:
         return none
-    if pressing.max(initial=0.0) > _WEDGED:  # without a limit: begin with the forces that the constant load needs
+    if pressing.max(initial=0.0) > _WEDGED:  # no limit: begin with the forces that balance the constant load
         least = _pressing_forces_near(blocks, 0.0, np.zeros(pressing.size))
         pressing = pressing if least is None else least
     factor, smallest, velocities, n_steady = np.nan, np.inf, None, 0
@@ -179,7 +178,7 @@ def _limit(blocks: _Blocks, most_programmes: int) -> tuple[CoulombLimit, FloatAr
     if velocities is None:
         return none
     below = (float(factor - share * abs(factor)) for share in _BELOW)
-    held = next((each for each in below if _holds(blocks, each, pressing)), -np.inf)
+    held = next((candidate for candidate in below if _holds(blocks, candidate, pressing)), -np.inf)
     return CoulombLimit(held, factor, smallest, np.nan), velocities
 
 
@@ -190,14 +189,14 @@ def _least(
     limits: FloatArray,
     below: tuple[csc_array | None, FloatArray | None] = (None, None),
 ) -> Any:
-    """Return the result of a linear programme with equations, limits (n, 2), and perhaps inequalities."""
+    """Return the result of a linear programme with equations, limits (n, 2) and optional inequalities."""
     return linprog(  # type: ignore[call-overload]  # the stubs know no sparse arrays
         cost, A_ub=below[0], b_ub=below[1], A_eq=balance, b_eq=right, bounds=limits, method="highs"
     )
 
 
 def _pressing_forces_at_the_limit(blocks: _Blocks) -> FloatArray | None:
-    """Return the pressing forces (n,) that balance the largest factor when sliding dilates; None if none do."""
+    """Return the pressing forces (n,) at the largest factor of associative friction; None if there is none."""
     n, wedged = blocks.slope.size, blocks.tangential @ sparse.diags_array(blocks.slope)
     edges = [wedged - blocks.normal, -wedged - blocks.normal]
     balance = sparse.hstack([*edges, blocks.tangential, blocks.load_column], format="csc")
@@ -207,7 +206,7 @@ def _pressing_forces_at_the_limit(blocks: _Blocks) -> FloatArray | None:
 
 
 def _largest_with_bound(blocks: _Blocks, bound: FloatArray) -> tuple[float, FloatArray, FloatArray] | None:
-    """Return the largest factor with given friction bounds (n,), its pressing forces (n,) and its motion (m,)."""
+    """Return the largest factor with given friction bounds (n,), its pressing forces (n,) and motion (m,)."""
     balance = sparse.hstack([-blocks.normal, blocks.tangential, blocks.load_column], format="csc")
     limits = np.vstack([np.tile([0.0, np.inf], (bound.size, 1)), bound[:, None] * [-1.0, 1.0], _ANY_FACTOR])
     result = _least(np.append(np.zeros(2 * bound.size), -1.0), balance, -blocks.constant, limits)
@@ -217,9 +216,9 @@ def _largest_with_bound(blocks: _Blocks, bound: FloatArray) -> tuple[float, Floa
 
 
 def _factors_of_collapse(blocks: _Blocks, motion: FloatArray) -> tuple[float, float]:
-    """Return the smallest and the largest factor under which a motion (m,) begins; (inf, -inf) if under none.
+    """Return the smallest and largest factor at which a motion (m,) begins; (inf, -inf) if there is none.
 
-    Points that open carry no pressure; at points that slide friction is full and opposes sliding.
+    Opening points carry no pressure; at sliding points friction is full and opposes sliding.
     """
     opening, sliding = motion @ blocks.normal, motion @ blocks.tangential
     least = _MOVES * float(max(np.abs(opening).max(), np.abs(sliding).max()))
@@ -239,11 +238,11 @@ def _factors_of_collapse(blocks: _Blocks, motion: FloatArray) -> tuple[float, fl
     if any(result.x is None for result in results):
         return np.inf, -np.inf
     first, last = (float(result.x[-1]) for result in results)
-    return min(first, last), max(first, last)  # they may differ by round-off only
+    return min(first, last), max(first, last)  # round-off may exchange them
 
 
 def _pressing_forces_near(blocks: _Blocks, factor: float, wanted: FloatArray) -> FloatArray | None:
-    """Return the pressing forces (n,) of a state in balance that differs least in sum from those wanted, or None."""
+    """Return the pressing forces (n,) of the state in equilibrium nearest to `wanted` in the 1-norm, or None."""
     n, unit = wanted.size, sparse.eye_array(wanted.size)
     balance = sparse.hstack([-blocks.normal, blocks.normal, blocks.tangential], format="csc")
     wedge = sparse.diags_array(blocks.slope)
@@ -261,7 +260,7 @@ def _pressing_forces_near(blocks: _Blocks, factor: float, wanted: FloatArray) ->
 
 
 def _holds(blocks: _Blocks, factor: float, wanted: FloatArray) -> bool:
-    """Return whether a state of forces at a factor, near pressing forces (n,), lets no motion begin."""
+    """Return whether no motion begins from a state of forces at a factor, near pressing forces `wanted` (n,)."""
     pressing = _pressing_forces_near(blocks, factor, wanted)
     found = None if pressing is None else _largest_with_bound(blocks, blocks.bound(pressing))
     return found is not None and found[0] > factor + _HOLDS * max(abs(factor), 1.0)

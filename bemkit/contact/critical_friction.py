@@ -9,26 +9,27 @@ from bemkit.contact.body import LinearBody, SingularResponse
 from bemkit.contact.conditions import LinearConditions, of_statuses, separated, stick
 
 LARGEST_COEFFICIENT = 1e3
-"""Larger coefficients are taken for round-off of a coupling that vanishes, as between bodies of equal material."""
+"""Largest coefficient; larger ones are round-off of a vanishing coupling, as between bodies of equal material."""
 _NEARLY_REAL = 1e-9
-"""Imaginary part, relative to an eigenvalue, up to which it counts as real: round-off may join two real ones."""
+"""Largest relative imaginary part of a real eigenvalue; round-off may turn two close real ones into a pair."""
 
 
 def sliding_response(body: LinearBody, is_closed: BoolArray, slides: BoolArray) -> tuple[FloatArray, FloatArray]:
-    """Return the changes of tractions by tangential displacements of nodes in contact.
+    """Return the changes of tractions under tangential displacements of nodes in contact.
 
     Parameters
     ----------
     body : LinearBody
     is_closed : (n_contact,) bool array
-        Nodes in contact; the others carry nothing.
+        Nodes in contact; the others carry no traction.
     slides : (n_contact,) bool array
-        The nodes in contact that may move along their tangents; the others have no friction.
+        Nodes in contact that slide; the others have no friction.
 
     Returns
     -------
     normal, tangential : (n_sliding, n_sliding) arrays [Pa/m]
-        Changes of sigma_n and sigma_t (rows) under unit displacements u_t (columns), nodes in contact staying closed.
+        Changes of sigma_n and sigma_t (rows) under unit displacements u_t (columns), with u_n fixed at nodes in
+        contact.
 
     Raises
     ------
@@ -40,7 +41,7 @@ def sliding_response(body: LinearBody, is_closed: BoolArray, slides: BoolArray) 
     rows = np.flatnonzero(slides)
     smooth = of_statuses(is_closed, np.ones(n_contact, bool), stick(zero, zero), separated(n_contact))
     if smooth.free_motions(body.rigid_motions()).shape[0]:
-        raise SingularResponse("nothing but friction keeps the body from sliding")
+        raise SingularResponse("only friction keeps the body from sliding: add a support")
 
     def response(moved: FloatArray) -> FloatArray:
         held: LinearConditions = of_statuses(is_closed, ~slides, stick(zero, moved), separated(n_contact))
@@ -52,26 +53,26 @@ def sliding_response(body: LinearBody, is_closed: BoolArray, slides: BoolArray) 
 
 
 def critical_coefficient(normal: FloatArray, tangential: FloatArray, direction: FloatArray) -> float:
-    """Return the smallest coefficient at which nodes that slide in given directions lose uniqueness.
+    """Return the smallest friction coefficient at which sliding in given directions loses uniqueness.
 
     Parameters
     ----------
     normal, tangential : (n_sliding, n_sliding) arrays [Pa/m]
-        From `sliding_response`, or a part of it: other nodes stick.
+        From `sliding_response`, or a part of these if other nodes stick.
     direction : (n_sliding,) array
         +1 for sliding along the tangent, -1 against it.
 
     Returns
     -------
     float
-        Infinite if there is none up to `LARGEST_COEFFICIENT`.
+        Infinite if there is no coefficient up to `LARGEST_COEFFICIENT`.
 
     Notes
     -----
-    Rates of nodes that go on sliding obey ``du_n = 0`` and ``d sigma_t = s direction d sigma_n``, because sigma_t
-    opposes the motion and sigma_n is negative. With ``tangential v = s diag(direction) normal v`` for a motion v
-    that is not zero the rate problem has no solution for most loads and a line of them for the others. That needs s to
-    be a real eigenvalue; complex ones belong to no quasistatic motion.
+    Rates of sliding nodes fulfil ``du_n = 0`` and ``d sigma_t = s direction d sigma_n``, because sigma_t opposes the
+    motion and sigma_n is negative. If ``tangential v = s diag(direction) normal v`` has a solution v other than zero,
+    the rate problem has no solution for most loads and a line of solutions for the others. So s must be a real
+    eigenvalue; complex eigenvalues belong to no quasistatic motion.
 
     References
     ----------

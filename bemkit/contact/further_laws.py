@@ -1,4 +1,4 @@
-"""Further friction laws: with cohesion and a cap, dependent on slip or its speed, different from part to part."""
+"""Further friction laws: cohesion and a cap, dependence on slip or slip rate, and different laws at different nodes."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ class CohesiveCoulomb(LawOfCoefficients):
     friction_coefficient : Coefficient [-]
         s, not negative.
     cohesion : Coefficient [Pa]
-        c, not negative; acts while the node is closed and ends when it opens.
+        c, not negative; acts only at closed nodes.
     cap : Coefficient [Pa]
         tau_max, not below the cohesion; infinite by default.
 
     Notes
     -----
-    Cohesion drops to zero at once when a node opens. So a problem with ``c > 0`` and a moving edge of contact need not
-    have a solution; the status of a solver then says that it has found none.
+    Cohesion drops to zero when a node opens. So a problem with ``c > 0`` and a moving contact edge may have no
+    solution; the status of the solver then reports that it found none.
     """
 
     friction_coefficient: Coefficient
@@ -43,13 +43,13 @@ class CohesiveCoulomb(LawOfCoefficients):
         super().__post_init__()
         if not (callable(self.cap) or callable(self.cohesion)) and np.any(self.cap < np.asarray(self.cohesion)):
             raise InputError(
-                f"cap = {np.min(self.cap):g} lies below cohesion = {np.max(self.cohesion):g}; "
-                "the cap bounds cohesion and friction together, so give cap >= cohesion"
+                f"cap = {np.min(self.cap):g} is less than cohesion = {np.max(self.cohesion):g}; "
+                "the cap bounds the sum of cohesion and friction, so give cap >= cohesion"
             )
 
     @property
     def is_frictionless(self) -> bool:
-        """Whether friction coefficient and cohesion are zero, or the cap is."""
+        """Whether friction coefficient and cohesion are zero, or the cap is zero."""
         return is_zero(self.cap) or (is_zero(self.friction_coefficient) and is_zero(self.cohesion))
 
     def bound(self, sigma_n: FloatArray) -> FloatArray:
@@ -57,7 +57,7 @@ class CohesiveCoulomb(LawOfCoefficients):
         return np.minimum(self._uncapped(sigma_n), numbers_of("cap", self.cap))
 
     def bound_derivative(self, sigma_n: FloatArray) -> FloatArray:
-        """Return ``-s`` below the cap and zero from the cap on (and under tension)."""
+        """Return ``-s`` below the cap, and zero at the cap and under tension."""
         is_rising = (self._uncapped(sigma_n) < numbers_of("cap", self.cap)) & (sigma_n <= 0.0)
         return np.where(is_rising, -np.asarray(numbers_of("friction_coefficient", self.friction_coefficient)), 0.0)
 
@@ -73,9 +73,9 @@ class SlipWeakening(LawOfCoefficients):
     Parameters
     ----------
     static_friction, kinetic_friction : Coefficient [-]
-        s_s at rest, and s_k, not above it, after the slip D.
+        s_s at rest, and s_k <= s_s after the slip D.
     slip_distance : Coefficient [m]
-        D, positive. The slip d is the length of the path since the beginning of the load history.
+        D, positive. The slip d is accumulated from the beginning of the load history.
     """
 
     static_friction: Coefficient
@@ -89,43 +89,43 @@ class SlipWeakening(LawOfCoefficients):
             raise InputError(f"slip_distance = {np.min(distance):g}: give a positive length")
         if not (callable(first) or callable(last)) and np.any(np.subtract(last, first) > 0.0):
             raise InputError(
-                f"kinetic_friction = {np.max(last):g} lies above static_friction = {np.min(first):g}; friction that "
-                "falls with the slip begins with the larger one"
+                f"kinetic_friction = {np.max(last):g} is larger than static_friction = {np.min(first):g}; friction "
+                "decreases with slip, so give kinetic_friction <= static_friction"
             )
 
     @property
     def is_frictionless(self) -> bool:
-        """Whether there is no friction even at rest."""
+        """Whether the static friction is zero."""
         return is_zero(self.static_friction)
 
     @property
     def needs_history(self) -> bool:
-        """True: friction falls with the slip."""
+        """True: friction decreases with slip."""
         return True
 
     def at_slip(self, motion: SlipHistory) -> FrictionLaw:
-        """Return Coulomb's law with the coefficients that the slip has left."""
+        """Return Coulomb's law with the coefficients at the present slip."""
         first, last = (numbers_of(name, getattr(self, name)) for name in ("static_friction", "kinetic_friction"))
         share = np.maximum(1.0 - motion.slip / numbers_of("slip_distance", self.slip_distance), 0.0)
         return Coulomb(last + (np.asarray(first) - last) * share)
 
     def bound(self, sigma_n: FloatArray) -> FloatArray:
-        """Return that of Coulomb's law before any slip; `at_slip` gives the law of a load step."""
+        """Return the value without slip; `at_slip` gives the law of a load step."""
         return Coulomb(self.static_friction).bound(sigma_n)
 
     def bound_derivative(self, sigma_n: FloatArray) -> FloatArray:
-        """Return that of Coulomb's law before any slip; `at_slip` gives the law of a load step."""
+        """Return the value without slip; `at_slip` gives the law of a load step."""
         return Coulomb(self.static_friction).bound_derivative(sigma_n)
 
 
 @dataclass(frozen=True, eq=False)
 class RateStrengthening(LawOfCoefficients):
-    """Coulomb friction that grows with the speed of slip: ``s = s_0 + a log(1 + v / v_0)``.
+    """Coulomb friction that increases with the slip rate: ``s = s_0 + a log(1 + v / v_0)``.
 
     Parameters
     ----------
     friction_coefficient : Coefficient [-]
-        s_0, of slow slip.
+        s_0, for slow slip.
     rate_coefficient : Coefficient [-]
         a, not negative.
     reference_rate : Coefficient [m/s]
@@ -133,7 +133,7 @@ class RateStrengthening(LawOfCoefficients):
 
     Notes
     -----
-    The direct effect of rate-and-state friction [Dieterich1979], regularised at rest.
+    This is the direct effect of rate-and-state friction [Dieterich1979], regularised at rest.
     """
 
     friction_coefficient: Coefficient
@@ -148,20 +148,20 @@ class RateStrengthening(LawOfCoefficients):
 
     @property
     def needs_history(self) -> bool:
-        """True: friction depends on the speed of slip."""
+        """True: friction depends on the slip rate."""
         return True
 
     def at_slip(self, motion: SlipHistory) -> FrictionLaw:
-        """Return Coulomb's law with the coefficients at the speeds of slip."""
+        """Return Coulomb's law with the coefficients at the present slip rate."""
         slow, a, v_0 = (numbers_of(name, value) for name, value in self.coefficients.items())
         return Coulomb(slow + a * np.log1p(motion.rate / v_0))
 
     def bound(self, sigma_n: FloatArray) -> FloatArray:
-        """Return that of Coulomb's law under slow slip; `at_slip` gives the law of a load step."""
+        """Return the value for slow slip; `at_slip` gives the law of a load step."""
         return Coulomb(self.friction_coefficient).bound(sigma_n)
 
     def bound_derivative(self, sigma_n: FloatArray) -> FloatArray:
-        """Return that of Coulomb's law under slow slip; `at_slip` gives the law of a load step."""
+        """Return the value for slow slip; `at_slip` gives the law of a load step."""
         return Coulomb(self.friction_coefficient).bound_derivative(sigma_n)
 
 
@@ -172,9 +172,9 @@ class PiecewiseLaw(FrictionLaw):
     Parameters
     ----------
     laws : sequence of FrictionLaw
-        Each sees the tractions of its own nodes only.
+        Each law is called with the tractions of its nodes.
     nodes : sequence of (m,) int arrays
-        The contact nodes of each law; together every contact node exactly once.
+        The contact nodes of each law; each contact node has exactly one law.
 
     Raises
     ------
@@ -197,7 +197,7 @@ class PiecewiseLaw(FrictionLaw):
 
     @property
     def needs_history(self) -> bool:
-        """Whether one of the laws needs a history."""
+        """Whether a law depends on the history."""
         return any(law.needs_history for law in self.laws)
 
     def at_slip(self, motion: SlipHistory) -> PiecewiseLaw:
@@ -206,16 +206,16 @@ class PiecewiseLaw(FrictionLaw):
 
     @cached_property
     def acts_across_gap(self) -> BoolArray:
-        """(n_contact,) bool array: as of the law of each node."""
+        """(n_contact,) bool array: property of the law of each node."""
         values = [np.broadcast_to(law.acts_across_gap, nodes.shape) for law, nodes in self._pairs]
         return self._assembled(values).astype(bool)
 
     def bound(self, sigma_n: FloatArray) -> FloatArray:
-        """Return the bound by the law of each node."""
+        """Return the bound of the law of each node."""
         return self._assembled([law.bound(sigma_n[nodes]) for law, nodes in self._pairs])
 
     def bound_derivative(self, sigma_n: FloatArray) -> FloatArray:
-        """Return the derivative by the law of each node."""
+        """Return the derivative of the law of each node."""
         return self._assembled([law.bound_derivative(sigma_n[nodes]) for law, nodes in self._pairs])
 
     def scaled(self, stress_scale: float) -> PiecewiseLaw:
@@ -234,7 +234,7 @@ class PiecewiseLaw(FrictionLaw):
 
 
 def law_name(law: FrictionLaw) -> str:
-    """Return the class name of a law for messages: the original of a rescaled law, all names of several laws."""
+    """Return the class name of a law for messages; for rescaled laws that of the original, for several laws all."""
     if isinstance(law, RescaledLaw):
         return law_name(law.law)
     if isinstance(law, PiecewiseLaw):

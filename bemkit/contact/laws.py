@@ -1,14 +1,15 @@
-"""Friction laws: how large the tangential traction may grow under a given normal traction.
+"""Friction laws: bounds of the tangential traction for a given normal traction.
 
-A law is a *bound*; the contact conditions themselves are the same for all laws: at a closed node the tangential
-traction stays within the bound, and where the node slips it has the size of the bound and opposes the slip,
+The contact conditions are the same for all laws. At a closed node the tangential traction does not exceed the bound; if
+the node slips, it has the magnitude of the bound and opposes the slip,
 
     |sigma_t| <= bound(sigma_n),    sigma_t = -bound(sigma_n) u_t / |u_t|  where  u_t != 0.
 
-A law of your own is a class with `bound` and `bound_derivative`; deriving it from `FrictionLaw` supplies the rest.
+To add a law, derive a class from `FrictionLaw` and implement `bound` and `bound_derivative`. Coefficients may vary
+along
 
-Coefficients may vary along the boundary: as numbers per contact node, or as formulas or functions of the coordinates,
-which `FrictionLaw.at` turns into numbers per node.
+the boundary: one number for each contact node, or formulas or functions of the coordinates, which `FrictionLaw.at`
+evaluates at the nodes.
 """
 
 from __future__ import annotations
@@ -24,20 +25,20 @@ from bemkit.errors import InputError
 from bemkit.formulas import ScalarField, check_field, evaluate_field
 
 Coefficient: TypeAlias = ScalarField | FloatArray
-"""A number, a formula or function of x and y, or one number per contact node."""
+"""A number, a formula or function of x and y, or one number for each contact node."""
 
 
 class LawError(InputError):
-    """A friction law failed or returned values that are not bounds; the message names the law."""
+    """A friction law raised an error or returned invalid bounds; the message names the law."""
 
 
 def checked_coefficient(name: str, value: Coefficient, *, may_be_infinite: bool = False) -> Coefficient:
-    """Check a coefficient and return it as a float, a read-only copy of an array, or the formula or function itself.
+    """Check a coefficient; return a float, a read-only copy of an array, or the formula or function.
 
     Raises
     ------
     InputError
-        If a number is negative, infinite (unless it may be) or NaN, or an array has more than one axis.
+        If a number is negative or NaN, or infinite without `may_be_infinite`, or an array has more than one axis.
     """
     if callable(value):
         check_field(value, name)
@@ -46,7 +47,7 @@ def checked_coefficient(name: str, value: Coefficient, *, may_be_infinite: bool 
         check_field(value, name)
     array = np.array(value, dtype=float)
     if array.ndim > 1:
-        raise InputError(f"{name} has the shape {array.shape}; give one number or one number per contact node")
+        raise InputError(f"{name} has the shape {array.shape}; give one number, or one number for each contact node")
     is_wrong = np.isnan(array) | (array < 0.0) | (False if may_be_infinite else np.isinf(array))
     if np.any(is_wrong):
         where = f" at contact node {int(np.argmax(is_wrong))}" if array.ndim else ""
@@ -55,19 +56,19 @@ def checked_coefficient(name: str, value: Coefficient, *, may_be_infinite: bool 
 
 
 def numbers_of(name: str, value: Coefficient) -> float | FloatArray:
-    """Return a coefficient that is a number or an array; InputError if it is a function of the coordinates."""
+    """Return a coefficient that is a number or an array; raise InputError for a function of the coordinates."""
     if callable(value):
-        raise InputError(f"{name} is a function of the coordinates; take law.at(points) for the contact nodes first")
+        raise InputError(f"{name} is a function of the coordinates; call law.at(points) with the contact nodes first")
     return value
 
 
 def is_zero(value: Coefficient) -> bool:
-    """Whether a coefficient is known to vanish everywhere."""
+    """Whether a coefficient is zero at all nodes; not for formulas and functions."""
     return not callable(value) and not np.any(value)
 
 
 def evaluated_coefficient(name: str, value: Coefficient, points: FloatArray) -> Coefficient:
-    """Return a coefficient in numbers, evaluated at (n_contact, 2) points [m] if it is a formula or function."""
+    """Return the numbers of a coefficient; evaluate formulas and functions at (n_contact, 2) points [m]."""
     if isinstance(value, np.ndarray) and len(value) != len(points):
         raise LawError(
             f"{name} has {len(value)} values for {len(points)} contact nodes: give one number, one for each node, or a "
@@ -88,50 +89,50 @@ def evaluated_coefficient(name: str, value: Coefficient, points: FloatArray) -> 
 
 @runtime_checkable
 class FrictionLaw(Protocol):
-    """Bound of the tangential traction; derive from this class and write two methods.
+    """Bound of the tangential traction; derived classes implement `bound` and `bound_derivative`.
 
     Notes
     -----
-    Both methods are called with compressive normal tractions only (``sigma_n <= 0``) and with all contact nodes at
-    once, so coefficients may differ from node to node. `bemkit.testing.check_law` tests everything said here.
+    Both methods are called with compressive normal tractions (``sigma_n <= 0``) of all contact nodes, so coefficients
+    may differ from node to node. `bemkit.testing.check_law` tests this contract.
     """
 
     @property
     def is_frictionless(self) -> bool:
-        """Whether the bound vanishes for every pressure."""
+        """Whether the bound is zero for every pressure."""
         return False
 
     @property
     def needs_history(self) -> bool:
-        """Whether the bound depends on slip or time, so that a scene has to have steps; see `at_slip`."""
+        """Whether the bound depends on slip or time and requires load steps; see `at_slip`."""
         return False
 
     def at_slip(self, motion: SlipHistory) -> FrictionLaw:
-        """Return the law for one load step, whose bound depends only on the normal traction.
+        """Return the law of one load step, whose bound depends only on the normal traction.
 
         Parameters
         ----------
         motion : SlipHistory
-            How far the contact nodes have slipped, and the time.
+            Time and slip of the contact nodes.
 
         Returns
         -------
         FrictionLaw
-            By default this law itself.
+            By default the law itself.
         """
         return self
 
     @property
     def acts_across_gap(self) -> bool | BoolArray:
-        """Whether ``bound(0)`` also holds at open nodes (for all nodes, or node by node).
+        """Whether friction ``bound(0)`` also acts at open nodes, for all nodes or for each node.
 
-        False (the default): an open node carries no traction. True only for friction that is *given* on the whole
-        contact boundary, which makes the problem convex (see `Tresca`). Without meaning where ``bound(0) = 0``.
+        By default False: open nodes carry no traction. True for friction that is given on the whole contact boundary,
+        which makes the problem convex (see `Tresca`). It has no effect if ``bound(0) = 0``.
         """
         return False
 
     def at(self, points: FloatArray) -> FrictionLaw:
-        """Return the law for given contact nodes: every formula or function of the coordinates is evaluated.
+        """Return the law with formulas and functions of the coordinates evaluated at contact nodes.
 
         Parameters
         ----------
@@ -140,7 +141,7 @@ class FrictionLaw(Protocol):
         Returns
         -------
         FrictionLaw
-            By default this law itself. A law of one's own whose coefficients vary along the boundary overrides it.
+            By default the law itself; laws with variable coefficients override it.
 
         Raises
         ------
@@ -150,7 +151,7 @@ class FrictionLaw(Protocol):
         return self
 
     def bound(self, sigma_n: FloatArray) -> FloatArray:
-        """Return the largest tangential traction the nodes can carry.
+        """Return the largest tangential traction of each node.
 
         Parameters
         ----------
@@ -160,12 +161,12 @@ class FrictionLaw(Protocol):
         Returns
         -------
         (n_contact,) array [Pa]
-            Not negative, and not falling when the pressure ``-sigma_n`` grows.
+            Not negative, and non-decreasing with the pressure ``-sigma_n``.
         """
         ...
 
     def bound_derivative(self, sigma_n: FloatArray) -> FloatArray:
-        """Return the derivative of `bound` by `sigma_n`.
+        """Return the derivative of `bound` with respect to `sigma_n`.
 
         Parameters
         ----------
@@ -174,19 +175,19 @@ class FrictionLaw(Protocol):
         Returns
         -------
         (n_contact,) array [-]
-            Not positive; at a kink the derivative of either side, at ``sigma_n = 0`` that of the compressive side.
+            Not positive. At a kink either one-sided derivative, at ``sigma_n = 0`` that of the compressive side.
         """
         ...
 
     def scaled(self, stress_scale: float) -> FrictionLaw:
-        """Return the same law for stresses measured in units of `stress_scale` [Pa]."""
+        """Return the same law for stresses in units of `stress_scale` [Pa]."""
         return RescaledLaw(self, stress_scale)
 
 
 class LawOfCoefficients(FrictionLaw):
-    """Base of laws whose fields are coefficients: checks, evaluates, rescales and compares them.
+    """Base class of laws whose fields are coefficients; it checks, evaluates, rescales and compares them.
 
-    Two laws are equal if their classes and coefficients are; arrays are compared as a whole.
+    Two laws are equal if their classes and coefficients are equal.
 
     Attributes
     ----------
@@ -205,7 +206,7 @@ class LawOfCoefficients(FrictionLaw):
             object.__setattr__(self, name, value)
 
     def scaled(self, stress_scale: float) -> Self:
-        """Return the law with its stresses in units of `stress_scale`."""
+        """Return the law with stresses in units of `stress_scale`."""
         _check_scale(stress_scale)
         values = {name: numbers_of(name, self.coefficients[name]) / stress_scale for name in self.stresses}
         return replace(self, **values) if values else self  # type: ignore[type-var]
@@ -222,7 +223,7 @@ class LawOfCoefficients(FrictionLaw):
 
     @property
     def is_uniform(self) -> bool:
-        """Whether its coefficients are numbers, the same at all nodes."""
+        """Whether all coefficients are single numbers."""
         return all(isinstance(value, float) for value in self.coefficients.values())
 
     def _compared(self) -> tuple[object, ...]:
@@ -239,7 +240,7 @@ class LawOfCoefficients(FrictionLaw):
 
 @dataclass(frozen=True, eq=False)
 class Frictionless(LawOfCoefficients):
-    """No tangential traction at all."""
+    """No tangential traction."""
 
     @property
     def is_frictionless(self) -> bool:
@@ -266,9 +267,8 @@ class Tresca(LawOfCoefficients):
 
     Notes
     -----
-    As in the theory of the Tresca problem the bound is given on the *whole* contact boundary, open nodes included:
-    only then is the problem convex and uniquely solvable. For friction that ends where the contact ends use
-    `CohesiveCoulomb` with ``cohesion=0`` and a ``cap``.
+    The bound acts on the whole contact boundary, including open nodes; the problem is then convex and has a unique
+    solution. For friction that vanishes at open nodes use `CohesiveCoulomb` with ``cohesion=0`` and a ``cap``.
     """
 
     bound_value: Coefficient
@@ -311,12 +311,12 @@ class Coulomb(LawOfCoefficients):
         return is_zero(self.friction_coefficient)
 
     def bound(self, sigma_n: FloatArray) -> FloatArray:
-        """Return ``s |sigma_n|`` (zero under tension, which no solution contains)."""
+        """Return ``s |sigma_n|``, and zero under tension."""
         s = numbers_of("friction_coefficient", self.friction_coefficient)
         return np.asarray(s * np.maximum(-sigma_n, 0.0))
 
     def bound_derivative(self, sigma_n: FloatArray) -> FloatArray:
-        """Return ``-s`` (zero under tension)."""
+        """Return ``-s``, and zero under tension."""
         s = numbers_of("friction_coefficient", self.friction_coefficient)
         return np.where(sigma_n <= 0.0, -np.asarray(s), 0.0)
 
@@ -340,12 +340,12 @@ class RescaledLaw(FrictionLaw):
 
     @property
     def is_frictionless(self) -> bool:
-        """As of the original law."""
+        """Property of the original law."""
         return self.law.is_frictionless
 
     @property
     def needs_history(self) -> bool:
-        """As of the original law."""
+        """Property of the original law."""
         return self.law.needs_history
 
     def at_slip(self, motion: SlipHistory) -> FrictionLaw:
@@ -354,7 +354,7 @@ class RescaledLaw(FrictionLaw):
 
     @property
     def acts_across_gap(self) -> bool | BoolArray:
-        """As of the original law."""
+        """Property of the original law."""
         return self.law.acts_across_gap
 
     def at(self, points: FloatArray) -> FrictionLaw:

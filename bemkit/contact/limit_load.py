@@ -1,4 +1,4 @@
-"""The largest multiple of a load that the contact forces of rigid bodies can balance."""
+"""Limit analysis: the largest multiple of a load that the contact forces of rigid bodies can balance."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from bemkit.contact.solvability import contact_forces, with_violated_nodes
 from bemkit.errors import InputError
 
 WITHOUT_BOUND = 1e6
-"""Multiple of all other forces above which the load that contact holds counts as unbounded."""
+"""Multiple of all other forces above which a load counts as unbounded."""
 
 _UNBOUNDED = 3
 """Status of a linear programme of `scipy.optimize.linprog`."""
@@ -25,52 +25,51 @@ def largest_factor(
     growing: FloatArray,
     envelopes: Sequence[tuple[FloatArray, FloatArray]],
 ) -> float | None:
-    """Return the largest factor of a growing load that contact forces can balance together with a constant load.
+    """Return the largest factor of a growing load that contact forces balance together with a constant load.
 
     Parameters
     ----------
     motions : (n_motions, 2 n) array or sparse array
-        Rigid motions of the bodies that no support resists: relative velocities, normal and tangential, at n points.
+        Rigid motions that no support resists: relative normal and tangential velocities at n points.
     constant, growing : (n_motions,) arrays [N]
         Work of both loads on each motion.
     envelopes : sequence of (n,) arrays [N], (n,) arrays [-]
-        Friction that needs no pressure, and that which grows with it; see
-        `bemkit.contact.solvability.envelopes_of`. The factor is the smallest of those under each pair.
+        Pairs of cohesion and friction coefficient, see `bemkit.contact.solvability.envelopes_of`. The factor is the
+        smallest one over all pairs.
 
     Returns
     -------
     float or None
-        Infinite if nothing limits it, None if no factor at all balances the loads.
+        Infinite if there is no limit, None if no factor balances the loads.
 
     Notes
     -----
-    The static theorem of limit analysis: of all forces at the points with ``p_n <= 0`` and ``|p_t| <= c + s |p_n|``
-    those are sought that balance the largest factor [FerrisTinLoi2001]. For Coulomb's law that is an upper bound,
-    because a sliding contact does not dilate: states of the incremental law may fail to exist below it, none exists
-    above.
+    By the static theorem of limit analysis the factor is the largest one for which forces at the points with ``p_n <=
+    0`` and ``|p_t| <= c + s |p_n|`` balance the loads [FerrisTinLoi2001]. For Coulomb's law without dilatancy it is an
+    upper bound: the incremental law has no states above it, and may have none below it.
     """
     if not motions.shape[0]:
         return np.inf
     unit = largest_components(motions)
-    unit = np.where(unit > 0.0, unit, 1.0)  # what touches nothing
+    unit = np.where(unit > 0.0, unit, 1.0)  # bodies that touch nothing
     motions = scaled_motions(motions, unit)
     constant, growing = constant / unit, growing / unit
-    size = float(np.abs(growing).max())
-    if size == 0.0:
+    load_scale = float(np.abs(growing).max())
+    if load_scale == 0.0:
         return np.inf
-    scale = float(np.abs(constant).max()) or size
+    scale = float(np.abs(constant).max()) or load_scale
     factors = []
     for cohesion, slope in envelopes:
-        programme = partial(_programme, motions, constant / scale, growing / size, cohesion / scale)
+        programme = partial(_programme, motions, constant / scale, growing / load_scale, cohesion / scale)
         factors.append(with_violated_nodes(motions, cohesion / scale, slope, programme))
-    bounded = [scale / size * factor for factor in factors if factor is not None]
+    bounded = [scale / load_scale * factor for factor in factors if factor is not None]
     return min(bounded) if len(bounded) == len(factors) else None
 
 
 def _programme(
     motions: RigidMotions, constant: FloatArray, growing: FloatArray, resistance: FloatArray, slope: FloatArray
 ) -> tuple[float | None, FloatArray | None]:
-    """Return the factor under the forces of the points whose slope is a number, and the velocities of the collapse."""
+    """Return the factor with forces at the points whose slope is a number, and the velocities of the collapse."""
     from scipy import sparse
     from scipy.optimize import linprog
 
@@ -95,7 +94,7 @@ def least_force(
     cohesion: FloatArray,
     slope: FloatArray,
 ) -> tuple[FloatArray, FloatArray] | None:
-    """Return the contact forces in balance with a load of which a given combination is smallest.
+    """Return the contact forces in equilibrium with a load that minimise a given combination.
 
     Parameters
     ----------
@@ -111,21 +110,21 @@ def least_force(
     forces : (n, 2) array [N]
         Normal, negative where pressed, and tangential.
     velocities : (n_motions,) array
-        The motions when the support yields by one against the combination. Where several states are smallest,
-        one of the mechanisms.
+        Motions under a unit displacement of the support against the combination; one of several if the minimum is not
+        unique.
     None
         If no forces balance the load.
 
     Raises
     ------
     InputError
-        If friction holds any force.
+        If the combination has no minimum.
     """
     from scipy import sparse
     from scipy.optimize import linprog
 
     unit = largest_components(motions)
-    unit = np.where(unit > 0.0, unit, 1.0)  # what touches nothing
+    unit = np.where(unit > 0.0, unit, 1.0)  # bodies that touch nothing
     scale = float(np.abs(load / unit).max()) or 1.0
     simple, bounds = contact_forces(sparse.eye_array(2 * slope.size, format="csr"), cohesion / scale, slope)
     result = linprog(  # type: ignore[call-overload]  # the stubs know no sparse arrays
@@ -137,7 +136,7 @@ def least_force(
     )
     if result.status == _UNBOUNDED:
         raise InputError(
-            "friction wedges the bodies, so that the force has no bound: choose another contact or direction"
+            "friction wedges the bodies, so that the force is unbounded: choose another contact or direction"
         )
     if result.x is None:
         return None

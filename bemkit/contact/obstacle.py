@@ -1,7 +1,7 @@
-"""Rigid obstacles: how far each boundary point is from them, and in which direction it touches.
+"""Rigid obstacles: distance of boundary points, and direction of contact.
 
-Contact acts along the obstacle's normal at its nearest point [Wriggers2006]: that is where the point touches first, and
-a frictionless obstacle pushes along its own normal, for any shape of the body there.
+Contact acts along the normal of the obstacle at the nearest point [Wriggers2006]: the body touches there first, and a
+frictionless obstacle exerts forces along its normal for any shape of the body.
 """
 
 from __future__ import annotations
@@ -17,18 +17,18 @@ from bemkit.errors import InputError, called
 from bemkit.formulas import ScalarField, check_field, evaluate_field
 
 FACING_TOLERANCE = 1e-3
-"""Cosine of the angle between the body's normal and the direction of contact up to which a point does not face the
-obstacle: it would have to slide a thousand times as far as it approaches."""
+"""Smallest cosine of the angle between the normal of the body and the direction of contact at points that face the
+obstacle."""
 
 
 class Obstacle(Protocol):
-    """A rigid body that the elastic body must not enter.
+    """A rigid body that the elastic body must not penetrate.
 
-    Contact acts along the body's normals, unless the obstacle is a `DirectedObstacle`.
+    Contact acts along the normals of the body, unless the obstacle is a `DirectedObstacle`.
     """
 
     def gap(self, points: FloatArray, normals: FloatArray) -> FloatArray:
-        """Measure the initial gap g of the condition u_n <= g.
+        """Return the initial gap g of the condition u_n <= g.
 
         Parameters
         ----------
@@ -40,34 +40,34 @@ class Obstacle(Protocol):
         Returns
         -------
         (n,) array [m]
-            The signed distance from each point to the obstacle along the direction of contact: negative where the
-            bodies overlap initially (an interference fit), infinite where the point can never touch.
+            Signed distance from each point to the obstacle along the direction of contact. It is negative where the
+            bodies overlap initially (an interference fit), and infinite where the point can never touch.
         """
         ...
 
 
 @runtime_checkable
 class DirectedObstacle(Obstacle, Protocol):
-    """An obstacle that knows in which direction each point approaches it."""
+    """An obstacle that gives the direction of contact."""
 
     def approach(self, points: FloatArray, normals: FloatArray) -> FloatArray:
-        """Return the direction of contact: that of u_n and sigma_n.
+        """Return the direction of contact, which is that of u_n and sigma_n.
 
         Parameters
         ----------
         points, normals : (n, 2) arrays
-            As for `gap`.
+            See `gap`.
 
         Returns
         -------
         (n, 2) array [-]
-            Unit vectors from the body into the obstacle: against the obstacle's normal at its nearest point.
+            Unit vectors from the body into the obstacle, opposite to the normal of the obstacle at the nearest point.
         """
         ...
 
 
 def measure_contact(obstacle: Obstacle, points: FloatArray, normals: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Measure gap and direction of contact; points that face away from the obstacle can never touch it.
+    """Return gap and direction of contact; points that face away from the obstacle have an infinite gap.
 
     Parameters
     ----------
@@ -78,14 +78,13 @@ def measure_contact(obstacle: Obstacle, points: FloatArray, normals: FloatArray)
     Returns
     -------
     gap : (n,) array [m]
-        Infinite where the body's normal does not point towards the obstacle.
+        Infinite where the normal of the body does not point towards the obstacle.
     direction : (n, 2) array [-]
 
     Raises
     ------
     InputError
-        If a method of an obstacle of one's own takes other arguments, or returns an array of another shape; the message
-        names the obstacle.
+        If a method of the obstacle takes other arguments or returns an array of another shape.
     """
     gap = _measured(obstacle, "gap", points, normals, points.shape[:1])
     if not isinstance(obstacle, DirectedObstacle):
@@ -102,25 +101,25 @@ def _measured(
         f"{'(n,)' if len(shape) == 1 else '(n, 2)'}"
     )
     values = called(obstacle, name, (points, normals), remedy)
-    found = np.asarray(values, dtype=float)
-    if found.shape != shape:
+    result = np.asarray(values, dtype=float)
+    if result.shape != shape:
         raise InputError(
-            f"{type(obstacle).__name__}.{name} returned an array of the shape {found.shape}: return the shape {shape} "
+            f"{type(obstacle).__name__}.{name} returned an array of the shape {result.shape}: return the shape {shape} "
             f"for {shape[0]} points"
         )
-    return found
+    return result
 
 
 @dataclass(frozen=True)
 class RigidHalfPlane:
-    """The obstacle fills the half-plane behind a line, with the inner product (x - point, normal) <= 0.
+    """The obstacle fills the half-plane behind a straight line, where the body may not enter.
 
     Parameters
     ----------
     point : (x, y) [m]
-        Any point of its straight surface.
+        Any point of the straight surface.
     normal : (x, y) [-]
-        From the obstacle towards the body; it need not have unit length.
+        From the obstacle towards the body, of any length.
 
     Raises
     ------
@@ -138,7 +137,7 @@ class RigidHalfPlane:
             raise InputError("normal is (0, 0): give the direction from the obstacle towards the body, such as (0, 1)")
 
     def gap(self, points: FloatArray, normals: FloatArray) -> FloatArray:
-        """Measure the distance from the surface; see `Obstacle.gap`."""
+        """Return the distance from the surface; see `Obstacle.gap`."""
         return np.asarray((points - np.array(self.point)) @ self._unit_normal)
 
     def approach(self, points: FloatArray, normals: FloatArray) -> FloatArray:
@@ -166,7 +165,7 @@ class _Round:
 
 @dataclass(frozen=True)
 class RigidCircle(_Round):
-    """The obstacle fills a disc; the body lies outside it (a roll, a shaft in a hole).
+    """The obstacle fills a disc; the body is outside of it (a roll, a shaft in a hole).
 
     Parameters
     ----------
@@ -180,7 +179,7 @@ class RigidCircle(_Round):
     """
 
     def gap(self, points: FloatArray, normals: FloatArray) -> FloatArray:
-        """Measure the distance from the circle; see `Obstacle.gap`."""
+        """Return the distance from the circle; see `Obstacle.gap`."""
         return np.asarray(np.hypot(*self._from_centre(points).T) - self.radius)
 
     def approach(self, points: FloatArray, normals: FloatArray) -> FloatArray:
@@ -190,7 +189,7 @@ class RigidCircle(_Round):
 
 @dataclass(frozen=True)
 class RigidCavity(_Round):
-    """The obstacle fills everything outside a circle; the body lies inside it (a disc in a rigid ring).
+    """The obstacle fills the outside of a circle; the body is inside (a disc in a rigid ring).
 
     Parameters
     ----------
@@ -204,7 +203,7 @@ class RigidCavity(_Round):
     """
 
     def gap(self, points: FloatArray, normals: FloatArray) -> FloatArray:
-        """Measure the distance from the circle; see `Obstacle.gap`."""
+        """Return the distance from the circle; see `Obstacle.gap`."""
         return np.asarray(self.radius - np.hypot(*self._from_centre(points).T))
 
     def approach(self, points: FloatArray, normals: FloatArray) -> FloatArray:
@@ -213,7 +212,7 @@ class RigidCavity(_Round):
 
 
 SIMPLE_OBSTACLES = (RigidHalfPlane, RigidCircle, RigidCavity)
-"""Obstacles for which no other module is loaded."""
+"""Obstacles that are defined in this module."""
 
 
 @dataclass(frozen=True)
@@ -223,15 +222,15 @@ class Gap:
     Parameters
     ----------
     value : float, Expression or callable (x, y) -> (n,) array [m]
-        The distance along `direction`. Zero is an obstacle that fits the body exactly.
+        Distance along `direction`; zero for an obstacle that fits the body exactly.
     direction : pair of float, Expression or callable [-], optional
-        The direction from the body into the obstacle, of any length; by default the outward normal of the body.
+        Direction from the body into the obstacle, of any length; by default the outward normal of the body.
 
     Raises
     ------
     ValueError
-        If the value or a component is not a finite number, a formula for a number or a function; if the direction is
-        zero somewhere.
+        If the value or a component is not a finite number, a formula or a function, or if the direction is zero at a
+        point.
     """
 
     value: ScalarField = 0.0
@@ -239,8 +238,8 @@ class Gap:
 
     def __post_init__(self) -> None:
         check_field(self.value, "value")
-        for number, component in enumerate(self.direction or ()):
-            check_field(component, f"direction[{number}]")
+        for index, component in enumerate(self.direction or ()):
+            check_field(component, f"direction[{index}]")
         if self.direction is not None and len(self.direction) != 2:
             raise InputError(f"direction has {len(self.direction)} components: give x and y, such as (0, -1)")
 
@@ -249,7 +248,7 @@ class Gap:
         return evaluate_field(self.value, points)
 
     def approach(self, points: FloatArray, normals: FloatArray) -> FloatArray:
-        """Evaluate the given direction, or return the body's normals; see `DirectedObstacle.approach`."""
+        """Evaluate the given direction, or return the normals of the body; see `DirectedObstacle.approach`."""
         if self.direction is None:
             return normals
         towards = np.stack([evaluate_field(component, points) for component in self.direction], axis=1)
@@ -261,10 +260,10 @@ class Gap:
 
 
 def unit_vectors(vectors: FloatArray, otherwise: FloatArray) -> FloatArray:
-    """Return unit vectors (n, 2), those of `otherwise` where a vector is zero."""
+    """Return unit vectors (n, 2); zero vectors are replaced by those of `otherwise`."""
     largest = np.abs(vectors).max(axis=1, initial=0.0)[:, None]
     is_nonzero = largest > 0.0
-    scaled = vectors / np.where(is_nonzero, largest, 1.0)  # lengths of tiny vectors have few digits
+    scaled = vectors / np.where(is_nonzero, largest, 1.0)  # squares of tiny components would underflow
     return np.where(is_nonzero, scaled / np.where(is_nonzero, np.hypot(*scaled.T)[:, None], 1.0), otherwise)
 
 

@@ -1,4 +1,4 @@
-"""The contact problem: a body, a gap, a friction law."""
+"""The contact problem: a body, a gap and a friction law."""
 
 from collections.abc import Callable
 from contextlib import suppress
@@ -27,30 +27,30 @@ __all__ = [
 Result = TypeVar("Result")
 
 _RESTS = 1e-9
-"""Slip below this share of the largest displacement is round-off of the frames of contact and support."""
+"""Largest slip relative to the largest displacement that is round-off of the frames of contact and support."""
 
 
 @dataclass(frozen=True, eq=False)
 class ContactProblem:
-    """Find ``u_n <= g``, ``sigma_n <= 0``, ``sigma_n (u_n - g) = 0`` and friction by the law, for one loaded body.
+    """Find ``u_n <= g``, ``sigma_n <= 0``, ``sigma_n (u_n - g) = 0`` with friction for one loaded body.
 
     Parameters
     ----------
     body : LinearBody
     gap : (n_contact,) array [m]
-        Distance to the obstacle along the normal; negative where body and obstacle overlap before the load acts,
-        ``inf`` where the node can never touch.
+        Distance to the obstacle along the normal; negative where body and obstacle overlap initially, ``inf`` where the
+        node can never touch.
     law : FrictionLaw
     reference_slip : (n_contact,) array [m], optional
-        Slip is ``u_t - reference_slip``. Zero (the default) is the static law of the paper; the tangential
+        Slip is ``u_t - reference_slip``. Zero, the default, gives the static law of the paper; the tangential
         displacement of the last load step gives the incremental law.
 
     Raises
     ------
     ValueError
-        If a shape does not fit the body, or an entry is not a number.
+        If a shape does not fit the body, or an entry is NaN.
     LawError
-        If the law fails or returns bounds of another shape, negative or not finite.
+        If the law raises an error or returns bounds of another shape, negative or not finite.
     """
 
     body: LinearBody
@@ -71,7 +71,7 @@ class ContactProblem:
                 node = int(np.argmax(is_wrong))
                 raise InputError(f"{name} is {array[node]} at contact node {node}; give a number")
             object.__setattr__(self, name, read_only(array))
-        _ = self.cohesion  # asks the law once, so that a law that fails does so here
+        _ = self.cohesion  # call the law once, so that its errors surface here
 
     @property
     def n_contact(self) -> int:
@@ -85,10 +85,10 @@ class ContactProblem:
 
     @cached_property
     def sticking_state(self) -> ContactState:
-        """Response with all nodes sticking and none overlapping: the cold start, and the measure of the load.
+        """Response with all nodes sticking and none overlapping: the cold start, and the scale of the load.
 
-        Nodes are held at ``u_n = min(g, 0)`` and ``u_t = reference_slip``, or ``sigma_t = 0`` where the tangent follows
-        or, if that does not set the body free, where there is no friction.
+        Nodes are held at ``u_n = min(g, 0)`` and ``u_t = reference_slip``. Nodes whose tangent follows have
+        ``sigma_t = 0``, as do frictionless nodes unless the body could then move.
         """
         return self.for_all_laws("sticking_state", self._sticking)
 
@@ -108,7 +108,7 @@ class ContactProblem:
         return self.body.stiffness_scale * float(np.median(self.body.weights))
 
     def for_all_laws(self, name: str, compute: Callable[[], Result]) -> Result:
-        """Return a result that does not depend on the law, computed once for the problems that `with_law` makes."""
+        """Return a result that does not depend on the law; problems from `with_law` share it."""
         if name not in self._law_independent:
             self._law_independent[name] = compute()
         result: Result = self._law_independent[name]
@@ -119,9 +119,9 @@ class ContactProblem:
         return {}
 
     def respond(self, conditions: LinearConditions) -> ContactState:
-        """Return the response of the body, with ``sigma_t = 0`` for conditions on displacements that follow.
+        """Return the response of the body; conditions on tangents that follow are replaced by ``sigma_t = 0``.
 
-        Solvers call this instead of `LinearBody.respond`, and need not know which tangents supports hold.
+        Solvers call this instead of `LinearBody.respond`, and need not know which tangents follow.
 
         Raises
         ------
@@ -131,37 +131,37 @@ class ContactProblem:
         return self.body.respond(self.possible(conditions))
 
     def possible(self, conditions: LinearConditions) -> LinearConditions:
-        """Return the conditions with ``sigma_t = 0`` for those on tangential displacements that follow."""
+        """Return the conditions with ``sigma_t = 0`` in place of those on tangential displacements that follow."""
         rows = self.body.tangent_follows & conditions.on_displacement[:, 1].any(axis=1)
         if not rows.any():
             return conditions
         return conditions.replaced(np.stack([np.zeros_like(rows), rows], axis=1), separated(self.n_contact))
 
     def given_direction(self, state: ContactState) -> FloatArray:
-        """Return (n_contact,) the direction, +1, -1 or 0, in which nodes slip whose tangent follows; 0 elsewhere."""
+        """Return the slip direction (n_contact,), +1, -1 or 0, of nodes whose tangent follows; 0 for other nodes."""
         slip = np.where(self.body.tangent_follows, state.u_t - self.slip_origin, 0.0)
         return np.where(np.abs(slip) > _RESTS * np.abs(state.displacement).max(), np.sign(slip), 0.0)
 
     def with_law(self, law: FrictionLaw) -> "ContactProblem":
-        """Return the problem under another law, with the results that do not depend on it."""
+        """Return the problem with another law; it keeps results that do not depend on the law."""
         other = replace(self, law=law)
         other.__dict__["_law_independent"] = self._law_independent
         return other
 
     @cached_property
     def cohesion(self) -> FloatArray:
-        """(n_contact,) array [Pa]: the friction bound without pressure."""
+        """(n_contact,) array [Pa]: friction bound at zero pressure."""
         return self.friction_bound(np.zeros(self.n_contact))
 
     def friction_bound(self, sigma_n: FloatArray, is_closed: BoolArray | None = None) -> FloatArray:
-        """Return the bound of the tangential traction at every node.
+        """Return the bound of the tangential traction at each node.
 
         Parameters
         ----------
         sigma_n : (n_contact,) array [Pa]
-            Normal tractions; tension is read as zero.
+            Normal tractions; tension counts as zero.
         is_closed : (n_contact,) bool array, optional
-            Open nodes have the bound zero unless the law acts across the gap. All closed by default.
+            Open nodes have the bound zero, unless the law acts across the gap. By default all nodes are closed.
 
         Returns
         -------
@@ -170,7 +170,7 @@ class ContactProblem:
         Raises
         ------
         LawError
-            If the law fails, or returns a wrong shape or negative or non-finite bounds.
+            If the law raises an error, or returns a wrong shape or negative or non-finite bounds.
         """
         bound = self._ask_law("bound", np.minimum(sigma_n, 0.0))
         if np.any(bound < 0.0):
@@ -182,7 +182,7 @@ class ContactProblem:
         return self._where_acting(bound, is_closed)
 
     def friction_slope(self, sigma_n: FloatArray, is_closed: BoolArray | None = None) -> FloatArray:
-        """Return the derivative of the bound by the normal traction at every node; see `friction_bound`."""
+        """Return the derivative of the bound with respect to the normal traction; see `friction_bound`."""
         return self._where_acting(self._ask_law("bound_derivative", np.minimum(sigma_n, 0.0)), is_closed)
 
     def _where_acting(self, values: FloatArray, is_closed: BoolArray | None) -> FloatArray:
@@ -193,12 +193,12 @@ class ContactProblem:
     def _ask_law(self, method: str, sigma_n: FloatArray) -> FloatArray:
         try:
             values = np.asarray(getattr(self.law, method)(sigma_n), dtype=float)
-        except Exception as error:  # every error of a law must surface with the name of the law
+        except Exception as error:  # add the name of the law to any error
             raise LawError(f"{self._name(method)} failed: {type(error).__name__}: {error}") from error
         if values.shape != sigma_n.shape:
             shapes = f"the shape {values.shape} for {sigma_n.shape}"
-            raise LawError(f"{self._name(method)} returned {shapes}; give one value a node")
-        # A state that is not finite is the solver's to report; finite tractions must give finite bounds.
+            raise LawError(f"{self._name(method)} returned {shapes}; give one value for each node")
+        # finite tractions must give finite bounds; the solver reports states that are not finite
         if not np.isfinite(values).all() and np.isfinite(sigma_n).all():
             node = int(np.argmin(np.isfinite(values)))
             at = f"at contact node {node} (sigma_n = {sigma_n[node]:g})"
@@ -210,18 +210,18 @@ class ContactProblem:
 
 
 def _check_members(body: LinearBody, law: FrictionLaw) -> None:
-    """Refuse a body or a law that lacks what solvers ask of it."""
+    """Refuse a body or a law without the members that solvers use."""
     absent = [name for name in _BODY_MEMBERS if not hasattr(body, name)]
     if absent:
         raise InputError(
             f"body {type(body).__name__} has no {', '.join(absent)}; "
-            "derive it from bemkit.contact.body.LinearBody and write weights, stiffness_scale and respond"
+            "derive it from bemkit.contact.body.LinearBody and implement weights, stiffness_scale and respond"
         )
     absent = [name for name in _LAW_MEMBERS if not hasattr(law, name)]
     if absent:
         raise LawError(
             f"friction law {_name(law)} has no {', '.join(absent)}; "
-            "derive it from bemkit.contact.laws.FrictionLaw and write bound and bound_derivative"
+            "derive it from bemkit.contact.laws.FrictionLaw and implement bound and bound_derivative"
         )
 
 

@@ -1,4 +1,4 @@
-"""Profiles in files: text of two columns, and the files of instruments through SurfaceTopography."""
+"""Profiles from files: text of two columns, or files of instruments read by SurfaceTopography."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from bemkit.arrays import FloatArray
 from bemkit.errors import InputError, printable
 
 LARGEST_STEP = 5.0
-"""Distance of two neighbours, in usual steps, from which on points are missing between them."""
+"""Largest distance of two neighbours, relative to the median step; at larger distances points are missing."""
 
 
 class ProfileError(InputError):
-    """A file that holds no profile; the message names the file, the line and the remedy."""
+    """A file contains no profile; the message gives the file, the line and the remedy."""
 
 
 @dataclass(frozen=True)
@@ -27,9 +27,9 @@ class ReadProfile:
     Parameters
     ----------
     x, heights : (n,) arrays
-        Increasing positions, and heights there, in the unit of the file.
+        Increasing positions, and heights, in the unit of the file.
     unit : str
-        Unit of length that the file states; empty if none.
+        Unit of length from the file; empty if it has none.
     """
 
     x: FloatArray
@@ -43,7 +43,7 @@ def read_profile(file: str | Path, row: int | None = None) -> ReadProfile:
     Parameters
     ----------
     file : str or Path
-        Text of two columns. Any other file is that of an instrument, whose lengths are returned in metres.
+        Text of two columns. Other files are read as files of instruments, with lengths in metres.
     row : int, optional
         Row of a map of heights, counted from 0 along y.
 
@@ -76,7 +76,7 @@ def _read_text(name: str, text: str, row: int | None) -> ReadProfile:
         if len(cells) != 2 or not all(map(_is_number, cells)):
             raise ProfileError(
                 f"{name}: line {number} is {printable(line.strip())[:60]!r}: give two finite numbers, position and "
-                "height; where no height is known, cut the profile there or fill it in"
+                "height; if a height is unknown, cut the profile there or fill it in"
             )
         rows.append((float(cells[0]), float(cells[1])))
         numbers.append(number)
@@ -98,7 +98,7 @@ def _read_text(name: str, text: str, row: int | None) -> ReadProfile:
 
 
 def _cells(line: str) -> list[str]:
-    """Split a line; a cell between two separators may be empty."""
+    """Split a line into cells; a cell between two separators may be empty."""
     for separator in (",", ";"):
         if separator in line:
             return [cell.strip() for cell in line.split(separator)]
@@ -113,7 +113,7 @@ def _is_number(cell: str) -> bool:
 
 
 def _read_instrument(name: str, path: Path, row: int | None) -> ReadProfile:
-    """Read a line scan, or a row of a map of heights, in metres if the file states its unit."""
+    """Read a line scan, or a row of a map of heights, in metres if the file has a unit."""
     if importlib.util.find_spec("SurfaceTopography") is None:
         raise ProfileError(
             f"{name}: is not a text of two columns; files of instruments need SurfaceTopography: "
@@ -127,7 +127,7 @@ def _read_instrument(name: str, path: Path, row: int | None) -> ReadProfile:
             unit = scan.unit or ""
             scan = scan.to_unit("m") if unit else scan
             x, heights = scan.positions_and_heights() if scan.dim == 1 else (scan.positions()[0], scan.heights())
-    except Exception as error:  # readers of forty formats, each with errors of its own
+    except Exception as error:  # readers of forty formats raise many kinds of errors
         raise ProfileError(
             f"{name}: SurfaceTopography cannot read it ({printable(str(error))[:200] or type(error).__name__}): export "
             "it as text of two columns"

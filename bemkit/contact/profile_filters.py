@@ -1,4 +1,4 @@
-"""Levelling, filters and statistics of sampled profiles, which are straight between their points."""
+"""Levelling, filters and statistics of sampled profiles, which are linear between their points."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from bemkit.arrays import FloatArray
 
 
 class Levelling(Enum):
-    """The straight line that is subtracted from a profile: none, that of least squares, or that through its ends."""
+    """The line that is subtracted from a profile: none, the least-squares line, or the line through its ends."""
 
     NONE = "none"
     LINE = "line"
@@ -18,12 +18,12 @@ class Levelling(Enum):
 
 
 def levelled(x: FloatArray, heights: FloatArray, levelling: Levelling) -> FloatArray:
-    """Return heights (n,) [m] at positions (n,) [m] above a straight line."""
+    """Return heights (n,) [m] at positions (n,) [m] minus a straight line."""
     if levelling is Levelling.NONE:
         return heights
     if levelling is Levelling.ENDS:
         return heights - np.interp(x, x[[0, -1]], heights[[0, -1]])
-    middle, length = x.mean(), float(np.ptp(x))  # numbers about 1, so that nothing is lost to round-off
+    middle, length = x.mean(), float(np.ptp(x))  # scaled to numbers about 1, against round-off
     rise, offset = np.polyfit((x - middle) / length, heights, 1)
     return np.asarray(heights - offset - rise * (x - middle) / length)
 
@@ -31,15 +31,15 @@ def levelled(x: FloatArray, heights: FloatArray, levelling: Levelling) -> FloatA
 def filtered(
     x: FloatArray, heights: FloatArray, period: float | None, shortest: float | None, longest: float | None
 ) -> tuple[FloatArray, FloatArray]:
-    """Return a profile with the wavelengths between two cut-offs, on equidistant positions.
+    """Return the wavelengths of a profile between two cut-offs, at equidistant positions.
 
     Parameters
     ----------
     x, heights : (n,) arrays [m]
     period : float or None [m]
-        Without it the profile is continued antisymmetrically about its ends, so that a straight line has no roughness.
+        Without a period the profile is continued antisymmetrically about its ends, so that a line has no roughness.
     shortest, longest : float or None [m]
-        Cut-offs of Gaussian filters, which pass half the height of a wave as long as they.
+        Cut-offs of Gaussian filters, which halve the height of a wave of that length.
 
     Returns
     -------
@@ -65,7 +65,7 @@ def filtered(
 
 
 def _long_waves(heights: FloatArray, cut_off: float, *, is_periodic: bool) -> FloatArray:
-    """Return the waves (n,) [m] longer than a cut-off, in steps, of heights (n,) [m]."""
+    """Return the waves (n,) [m] of heights (n,) [m] that are longer than a cut-off [steps]."""
     n = heights.size
     if not is_periodic:
         line = np.linspace(heights[0], heights[-1], n)
@@ -77,7 +77,7 @@ def _long_waves(heights: FloatArray, cut_off: float, *, is_periodic: bool) -> Fl
 
 
 def rms_height(x: FloatArray, heights: FloatArray) -> float:
-    """Return the root mean square [m] of heights (n,) [m] about their mean along a broken line."""
+    """Return the root mean square [m] of a polyline of heights (n,) [m] about its mean."""
     steps = np.diff(x)
     above = heights - np.sum(steps * (heights[1:] + heights[:-1])) / (2.0 * steps.sum())
     first, last = above[:-1], above[1:]
@@ -85,7 +85,7 @@ def rms_height(x: FloatArray, heights: FloatArray) -> float:
 
 
 def rms_slope(x: FloatArray, heights: FloatArray) -> float:
-    """Return the root mean square [-] of the slopes of a broken line through heights (n,) [m]; a jump is infinite."""
+    """Return the root mean square slope [-] of a polyline through heights (n,) [m]; infinite with a vertical jump."""
     steps, rises = np.diff(x), np.diff(heights)
     slopes = np.divide(rises, steps, out=np.where(rises == 0.0, 0.0, np.inf), where=steps > 0.0)
     return float(np.sqrt(np.sum(np.where(steps > 0.0, steps, 1.0) * slopes**2) / steps.sum()))

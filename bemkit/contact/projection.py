@@ -1,4 +1,4 @@
-"""The two projections that turn contact and friction into equations, with their generalised derivatives [QiSun1993]."""
+"""The two projections of contact and friction conditions, with their generalised derivatives [QiSun1993]."""
 
 import numpy as np
 
@@ -42,15 +42,14 @@ def clip_to_bound(x: FloatArray, bound: FloatArray | float) -> FloatArray:
     Parameters
     ----------
     x : (n,) array or (n, d) array
-        Tangential components along the one tangent of a plane problem, or one vector a row.
+        Tangential components of a plane problem, or one vector in each row.
     bound : (n,) array or float
         Radii, not negative.
 
     Returns
     -------
     array of the shape of `x`
-        `x` where ``|x| <= bound``, else ``bound x / |x|``; equation (14) of the paper, continued to ``bound = 0``
-        (where it is zero).
+        `x` where ``|x| <= bound``, otherwise ``bound x / |x|``; equation (14) of the paper, and zero for ``bound = 0``.
 
     Raises
     ------
@@ -67,7 +66,7 @@ def clip_to_bound(x: FloatArray, bound: FloatArray | float) -> FloatArray:
 
 
 def clip_to_bound_derivative(x: FloatArray, bound: FloatArray | float) -> tuple[FloatArray, FloatArray]:
-    """Return one element of the generalised derivative of `clip_to_bound`, by `x` and by `bound`.
+    """Return one element of the generalised derivative of `clip_to_bound` with respect to `x` and `bound`.
 
     Parameters
     ----------
@@ -77,15 +76,15 @@ def clip_to_bound_derivative(x: FloatArray, bound: FloatArray | float) -> tuple[
     Returns
     -------
     by_x : (n,) array or (n, d, d) array
-        One (the unit matrix) where ``|x| <= bound``, that is where the node sticks; outside
-        ``bound/|x| (I - x x^T/|x|^2)``, which is zero in the plane.
+        One (the unit matrix) where ``|x| <= bound``, for sticking nodes; otherwise ``bound/|x| (I - x x^T/|x|^2)``,
+        which is zero for (n,) components.
     by_bound : (n,) array or (n, d) array
-        Zero where the node sticks, ``x/|x|`` outside. ``x = 0`` is never outside, so no direction of zero is taken.
+        Zero for sticking nodes, otherwise ``x/|x|``.
 
     Raises
     ------
     ValueError
-        As `clip_to_bound`.
+        See `clip_to_bound`.
     """
     bound = _checked_bound(x, bound)
     if x.ndim == 1:

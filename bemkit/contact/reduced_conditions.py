@@ -1,6 +1,6 @@
-"""Two linear conditions at each node, reduced to the unknown tractions and one equation for each of them.
+"""Two linear conditions at each node, reduced to unknown tractions and one equation for each of them.
 
-Pairs (n, t) are complex numbers here: the tangential component is the real part, the normal one the imaginary part.
+Pairs (n, t) are complex numbers with the tangential component as real part and the normal component as imaginary part.
 """
 
 from __future__ import annotations
@@ -27,19 +27,19 @@ def as_pairs(numbers: ComplexArray) -> FloatArray:
 
 @dataclass(frozen=True, eq=False)
 class ReducedConditions:
-    """Tractions ``t = given + sum of direction * unknown``, and one equation for each unknown.
+    """Tractions ``t = given + sum of direction * unknown``, with one equation for each unknown.
 
     Parameters
     ----------
     given : (n_contact,) complex array [Pa]
-        Tractions given by conditions without displacements; zero elsewhere.
+        Tractions from conditions without displacements; zero elsewhere.
     node : (n_unknowns,) int array
-        The node of each unknown; those with two unknowns come twice, one after the other.
+        The node of each unknown, ascending; a node may have two unknowns.
     direction : (n_unknowns,) complex array
         Unit traction of each unknown.
     on_displacement, on_traction : (n_unknowns,) complex arrays
-        Factors of the equation of each unknown, scaled so that that of the displacement has unit size; an equation is
-        the real part of ``conj(factor) * number``.
+        Factors of the equation of each unknown. The factor of the displacement has unit size; an equation is the real
+        part of ``conj(factor) * number``.
     value : (n_unknowns,) array [m]
         Right-hand sides.
     """
@@ -58,7 +58,7 @@ class ReducedConditions:
         Raises
         ------
         SingularResponse
-            If two conditions on the traction of a node are dependent, or a condition has no factor at all.
+            If two conditions on the traction of a node are dependent, or a condition has only zero factors.
         """
         on_u, on_t = conditions.on_displacement, conditions.on_traction
         is_of_traction = ~(on_u != 0.0).any(axis=2)
@@ -74,7 +74,7 @@ class ReducedConditions:
         if not np.abs(factor).all():
             raise SingularResponse("a condition at a contact node involves neither displacement nor traction")
         given[one] = conditions.value[one, row] * factor / np.abs(factor) ** 2
-        # the unknown is at right angles to the factor, with a normal component that is not negative
+        # the unknown is perpendicular to the factor, with a non-negative normal component
         along[one] = 1j * factor / np.abs(factor)
         along[one] *= np.where(along[one].imag < 0.0, -1.0, 1.0)
         node, equation = np.nonzero(~is_of_traction)
@@ -91,11 +91,11 @@ class ReducedConditions:
 
     @property
     def n_unknowns(self) -> int:
-        """Number of unknown tractions."""
+        """Number of unknowns."""
         return self.node.size
 
     def _summed(self, numbers: ComplexArray) -> ComplexArray:
-        """Return the sums (n_contact,) of numbers of the unknowns of each node."""
+        """Return the sum (n_contact,) over the unknowns of each node."""
         result = np.zeros(self.given.size, complex)
         result[self.node] = numbers
         result[self.node[self._is_second]] += numbers[self._is_second - 1]
@@ -103,11 +103,11 @@ class ReducedConditions:
 
     @cached_property
     def _is_second(self) -> IntArray:
-        """The unknowns that share their node with the one before them."""
+        """Indices of unknowns with the same node as the unknown before."""
         return 1 + np.flatnonzero(self.node[1:] == self.node[:-1])
 
     def changes(self, unknowns: FloatArray) -> ComplexArray:
-        """Return the tractions (n_contact,) of the unknowns, without those given."""
+        """Return the tractions (n_contact,) of the unknowns, without given ones."""
         return self._summed(self.direction * unknowns)
 
     def tractions(self, unknowns: FloatArray) -> ComplexArray:
@@ -130,16 +130,16 @@ class ReducedConditions:
         return np.asarray(self.on_traction.conj())
 
     def displacements(self, rows: FloatArray, stiffness: float) -> ComplexArray:
-        """Return approximate displacements (n_contact,) with the left-hand sides `rows` (n_unknowns,), of least size.
+        """Return the smallest approximate displacements (n_contact,) with left-hand sides `rows` (n_unknowns,).
 
-        An equation that involves tractions shares its left-hand side between both, by the stiffness [Pa/m] of a node.
+        Tractions in an equation are estimated with the stiffness [Pa/m] of a node.
         """
         return self._summed(self.on_displacement * rows / (1.0 + self._softness * stiffness))
 
     def unknowns(self, traction: ComplexArray, rows: FloatArray, stiffness: float) -> FloatArray:
-        """Return the unknowns (n_unknowns,) in tractions that hold displacements with the left-hand sides `rows`.
+        """Return the unknowns (n_unknowns,) in tractions that belong to displacements with left-hand sides `rows`.
 
-        An equation that involves tractions is solved by itself instead, with the stiffness [Pa/m] of a node.
+        An equation with tractions is solved separately, with the stiffness [Pa/m] of a node.
         """
         components = (self._along * traction[self.node]).real
         if not self._traction_factor.any():

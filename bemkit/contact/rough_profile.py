@@ -1,4 +1,4 @@
-"""Rough rigid surfaces: measured profiles from files, and self-affine ones of given statistics."""
+"""Rough rigid surfaces: measured profiles from files, and random self-affine profiles."""
 
 from __future__ import annotations
 
@@ -15,30 +15,30 @@ from bemkit.contact.profile_filters import Levelling
 from bemkit.errors import InputError, printable
 
 _POINTS_OF_WAVE = 16
-"""Points of the shortest wave: the error of a spline through them is less than 1e-4 of its height."""
+"""Points in the shortest wavelength; the error of a spline through them is less than 1e-4 of the height."""
 _MOST_WAVES = 1_000_000
 _STEEPER = 2.0
-"""Slope over the seam of a period, by the steepest one elsewhere, from which on it is a jump."""
+"""Slope over the seam of a period, relative to the steepest slope elsewhere, above which the seam is a jump."""
 
 
 @dataclass(frozen=True)
 class ProfilePoints:
-    """A rigid rough obstacle, straight between points; its highest point touches the undeformed body.
+    """A rigid rough obstacle, linear between points; its highest point touches the undeformed body.
 
     Parameters
     ----------
     points : sequence of (x, height) [m]
-        With increasing x.
+        Points with increasing x.
     period : float, optional [m]
-        Distance after which the profile repeats itself. Without it nothing can be touched beyond its ends.
+        Period of the profile. Without a period there is no contact beyond its ends.
     distance : float [m]
         Between the highest point and the body.
 
     Raises
     ------
     InputError
-        If there are fewer than two points, x does not increase, a number is not finite, the points are longer than the
-        period, or they leave a gap at its end.
+        If there are fewer than two points, x does not increase, a number is not finite, or the points are longer than
+        the period or end too early.
     """
 
     points: tuple[tuple[float, float], ...]
@@ -70,7 +70,7 @@ class ProfilePoints:
 
     @cached_property
     def columns(self) -> tuple[FloatArray, FloatArray]:
-        """Positions and heights, two (n,) arrays [m]."""
+        """Positions and heights, (n,) arrays [m]."""
         x, heights = np.array(self.points, float).T
         return x, heights
 
@@ -81,12 +81,12 @@ class ProfilePoints:
 
     @property
     def rms_slope(self) -> float:
-        """Root mean square of the slopes [-]; infinite with a vertical jump at the seam."""
+        """Root mean square slope [-]; infinite with a vertical jump at the seam."""
         return profile_filters.rms_slope(*self._closed)
 
     @property
     def _closed(self) -> tuple[FloatArray, FloatArray]:
-        """Positions and heights of a whole period, if there is one."""
+        """Positions and heights, closed to a whole period if there is one."""
         x, heights = self.columns
         return (
             (x, heights) if self.period is None else (np.append(x, x[0] + self.period), np.append(heights, heights[0]))
@@ -94,7 +94,7 @@ class ProfilePoints:
 
     @property
     def seam_jump(self) -> float:
-        """The step [m] from the end of a period to the next one; zero if it is not steeper than others."""
+        """Jump [m] from the end of a period to the next one; zero if it is not steeper than other steps."""
         x, heights = self._closed
         steps, rises = np.diff(x), np.abs(np.diff(heights))
         if self.period is None or rises.size < 2:
@@ -105,13 +105,13 @@ class ProfilePoints:
 
     def heights(self, x: FloatArray) -> FloatArray:
         """Return the heights (n,) [m] at positions (n,) [m], minus infinity beyond the ends."""
-        places, heights = self.columns
+        positions, heights = self.columns
         if self.period is not None:
-            return np.asarray(np.interp(x, places, heights, period=self.period))
-        return np.asarray(np.interp(x, places, heights, left=-np.inf, right=-np.inf))
+            return np.asarray(np.interp(x, positions, heights, period=self.period))
+        return np.asarray(np.interp(x, positions, heights, left=-np.inf, right=-np.inf))
 
     def gap(self, points: FloatArray, normals: FloatArray) -> FloatArray:
-        """Measure how far the profile is below its highest point; see `bemkit.contact.obstacle.Obstacle.gap`."""
+        """Return the depth of the profile below its highest point; see `bemkit.contact.obstacle.Obstacle.gap`."""
         return np.asarray(self.distance + self.columns[1].max() - self.heights(points[:, 0]))
 
 
@@ -122,11 +122,11 @@ class Profile:
     Parameters
     ----------
     file : str
-        Text of two columns, position and height [m], between which it is straight; separated by commas, semicolons or
-        blanks. Lines that begin with # and a first line without numbers are skipped. Files of instruments are read by
-        SurfaceTopography, in metres. A scene file names it from its own folder, Python from that in which it runs.
+        Text of two columns, position and height [m], separated by commas, semicolons or blanks; the profile is linear
+        between points. Lines that begin with # and a first line without numbers are skipped. Files of instruments are
+        read by SurfaceTopography, in metres. Paths are relative to the scene file or, in Python, to the current folder.
     period : float, optional [m]
-        Distance after which the profile repeats itself. Without it nothing can be touched beyond its ends.
+        Period of the profile. Without a period there is no contact beyond its ends.
     distance : float [m]
         Between the highest point and the body.
     row : int, optional
@@ -134,17 +134,17 @@ class Profile:
     scale : float, optional
         Factor of all positions and heights of the file; default 1.
     height_scale : float
-        Another factor of the heights, such as 1e-3 of a file in mm and um.
+        Additional factor of the heights, such as 1e-3 for a file in mm and um.
     levelling : Levelling
-        What is subtracted first: nothing, the line of least squares, or the line through both ends.
+        The line that is subtracted first: none, the least-squares line, or the line through both ends.
     shortest_wavelength, longest_wavelength : float, optional [m]
-        Cut-offs of Gaussian filters, which pass half the height of waves so long, and more of the waves between them.
+        Cut-offs of Gaussian filters, which halve the height of waves of that length.
 
     Raises
     ------
     ProfileError
-        If the file cannot be read, a line is not two finite numbers, positions do not increase, points are missing
-        between two, or the profile is longer than its period.
+        If the file cannot be read, a line is not two finite numbers, positions do not increase, points are missing, or
+        the profile is longer than its period.
     InputError
         If another number is out of range.
     """
@@ -173,7 +173,7 @@ class Profile:
 
     @cached_property
     def profile(self) -> ProfilePoints:
-        """Content of the file in plain numbers, levelled and filtered."""
+        """Points of the file, levelled and filtered."""
         cut_offs = self.shortest_wavelength, self.longest_wavelength
         if cut_offs == (None, None):
             return self._levelled
@@ -194,7 +194,7 @@ class Profile:
 
     @property
     def seam_jump(self) -> float:
-        """That of `ProfilePoints`, before filters spread it [m]."""
+        """Jump of `ProfilePoints` before filters smooth it [m]."""
         return self._levelled.seam_jump
 
     @cached_property
@@ -203,7 +203,7 @@ class Profile:
 
     @property
     def unit(self) -> str:
-        """Unit of length that the file states; empty if none, or if a scale replaces it."""
+        """Unit of length from the file; empty if it has none, or if a scale replaces it."""
         return self._read.unit if self.scale is None else ""
 
     @property
@@ -213,7 +213,7 @@ class Profile:
 
     @property
     def rms_slope(self) -> float:
-        """Root mean square of the slopes [-]."""
+        """Root mean square slope [-]."""
         return self.profile.rms_slope
 
     def heights(self, x: FloatArray) -> FloatArray:
@@ -221,13 +221,13 @@ class Profile:
         return self.profile.heights(x)
 
     def gap(self, points: FloatArray, normals: FloatArray) -> FloatArray:
-        """Measure how far the profile is below its highest point; see `bemkit.contact.obstacle.Obstacle.gap`."""
+        """Return the depth of the profile below its highest point; see `bemkit.contact.obstacle.Obstacle.gap`."""
         return self.profile.gap(points, normals)
 
 
 @dataclass(frozen=True, kw_only=True)
 class SelfAffineProfile:
-    """A rigid rough obstacle drawn at random: self-affine between two wavelengths, the same for the same seed.
+    """A rigid rough obstacle with a random profile, self-affine between two wavelengths; a seed makes it reproducible.
 
     Parameters
     ----------
@@ -241,7 +241,7 @@ class SelfAffineProfile:
     cut_off : float [m]
         Shortest wavelength. Elements should be at most an eighth as long.
     seed : int
-        Of the random phases.
+        Seed of the random phases.
     distance : float [m]
         Between the highest point and the body.
 
@@ -252,7 +252,7 @@ class SelfAffineProfile:
 
     References
     ----------
-    [JacobsEtAl2017], one-dimensional spectral densities.
+    [JacobsEtAl2017], one-dimensional power spectral densities.
     """
 
     period: float
@@ -283,12 +283,12 @@ class SelfAffineProfile:
 
     @property
     def n_waves(self) -> int:
-        """Number of waves in a period of the shortest wave."""
+        """Number of shortest wavelengths in a period."""
         return int(self.period / self.cut_off * (1.0 + 1e-12))
 
     @property
     def rms_slope(self) -> float:
-        """Root mean square of the slopes [-]."""
+        """Root mean square slope [-]."""
         waves = 2.0 * np.pi / self.period * np.arange(1, self.n_waves + 1)
         return float(np.sqrt(0.5 * np.sum((waves * self._amplitudes) ** 2)))
 
@@ -301,7 +301,7 @@ class SelfAffineProfile:
 
     @cached_property
     def points(self) -> tuple[FloatArray, FloatArray]:
-        """Equidistant positions over a period and heights there, two (n,) arrays [m]."""
+        """Equidistant positions over a period, and heights, (n,) arrays [m]."""
         n = _POINTS_OF_WAVE * self.n_waves
         phases = 2.0 * np.pi * np.random.default_rng(self.seed).random(self.n_waves)
         spectrum = np.zeros(n // 2 + 1, complex)
@@ -313,10 +313,10 @@ class SelfAffineProfile:
         """Return the heights (n,) [m] at positions (n,) [m]."""
         from scipy.interpolate import CubicSpline
 
-        places, heights = self.points
-        closed = np.append(places, self.period), np.append(heights, heights[0])
+        positions, heights = self.points
+        closed = np.append(positions, self.period), np.append(heights, heights[0])
         return np.asarray(CubicSpline(*closed, bc_type="periodic")(x % self.period))
 
     def gap(self, points: FloatArray, normals: FloatArray) -> FloatArray:
-        """Measure how far the profile is below its highest point; see `bemkit.contact.obstacle.Obstacle.gap`."""
+        """Return the depth of the profile below its highest point; see `bemkit.contact.obstacle.Obstacle.gap`."""
         return np.asarray(self.distance + self.points[1].max() - self.heights(points[:, 0]))

@@ -1,4 +1,4 @@
-"""Obstacles known by a function that is negative inside of them."""
+"""Obstacles given by a function that is negative inside."""
 
 from __future__ import annotations
 
@@ -12,43 +12,42 @@ from bemkit.formulas import ScalarField, check_field, evaluate_field
 from bemkit.geometry.vectors import turned_left
 
 _STEPS = 4.0 ** -np.arange(2.5, 9.0)
-"""Steps of differences, relative to the size of the points; one of them suits any curvature."""
+"""Steps of differences relative to the extent of the points; one of them suits any curvature."""
 _ONE_STEP = _STEPS[3:4]
-"""The step where slopes need few digits."""
+"""The step for slopes of low accuracy."""
 _STENCIL = ((1.0, 0.75), (2.0, -0.15), (3.0, 1.0 / 60.0))
-"""Places and weights of the central difference of sixth order."""
+"""Offsets and weights of the central difference of sixth order."""
 _IS_DISTANCE = 1e-8
-"""Difference of the slope from one up to which a function counts as a distance."""
+"""Largest difference of the slope of a distance from one."""
 _ON_LEVEL, _ROUND_OFF = 1e-10, 1e-14
-"""Lengths that count as zero, relative to the size of the points: distances from the surface, and steps on it."""
+"""Distances from the surface, and steps on it, that count as zero, relative to the extent of the points."""
 _FARTHEST_POINT = -1e-3
-"""Second derivative of half the squared distance along the surface below which a point is not the nearest one."""
+"""Second derivative of half the squared distance along the surface below which a point is no nearest point."""
 _MOST_STEPS, _MOST_HALVINGS = 100, 20
 
 
 @dataclass(frozen=True)
 class SignedDistance:
-    """The obstacle fills where a function of x and y is negative.
+    """The obstacle fills the region where a function of x and y is negative.
 
     Parameters
     ----------
     distance : Expression or callable (x, y) -> (n,) array
-        Preferably the distance from the obstacle [m]. Any other smooth function that vanishes on the surface and grows
-        away from the obstacle may be given, such as ``x**2 + 4 * y**2 - 1``: the nearest point of the surface is then
-        found by iteration.
+        The distance from the obstacle [m], or any other smooth function that vanishes on the surface and increases away
+        from it, such as ``x**2 + 4 * y**2 - 1``; the nearest point of the surface is then found by iteration.
 
     Raises
     ------
     InputError
-        If the distance is neither a formula for a number nor a function; when it is measured, if no nearest point of
-        the surface is found.
+        If the distance is neither a formula nor a function or, when it is evaluated, if no nearest point of the surface
+        is found.
 
     Notes
     -----
-    Slopes are differences of sixth order, with the step that agrees best with one four times as long: 1e-11 and better
-    where the function is smooth. Where f is a distance the nearest point to p is ``p - f grad f``; otherwise it is
-    found along the surface by Newton's method, with steps that reduce the distance. Deep inside several points may be
-    about as near; any of them may be found.
+    Slopes are differences of sixth order with the step that agrees best with a step four times longer; they are
+    accurate to 1e-11 for smooth functions. If f is a distance, the nearest point to p is ``p - f grad f``. Otherwise it
+    is found along the surface by Newton's method with steps that reduce the distance. Deep inside, several points may
+    be about equally near; any of them may be found.
     """
 
     distance: ScalarField
@@ -59,7 +58,7 @@ class SignedDistance:
             raise InputError(f"distance = {self.distance} is a number; give a formula in x and y, or a function")
 
     def gap(self, points: FloatArray, normals: FloatArray) -> FloatArray:
-        """Measure the distance from the surface; see `Obstacle.gap`."""
+        """Return the distance from the surface; see `Obstacle.gap`."""
         return self._measure(points)[0]
 
     def approach(self, points: FloatArray, normals: FloatArray) -> FloatArray:
@@ -67,7 +66,7 @@ class SignedDistance:
         return -self._measure(points)[1]
 
     def _measure(self, points: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return distances (n,) and normals (n, 2) out of the obstacle, at the nearest points of its surface."""
+        """Return distances (n,) and outward normals (n, 2) of the obstacle at the nearest points of its surface."""
         value = evaluate_field(self.distance, points)
         spread, largest = float(np.ptp(points, axis=0).max(initial=0.0)), float(np.abs(points).max(initial=0.0))
         size = max(spread or largest, 1e-3 * largest) or 1.0  # a single point has no spread
@@ -85,7 +84,7 @@ class SignedDistance:
         return value, normals
 
     def _nearest(self, points: FloatArray, size: float) -> FloatArray:
-        """Return the points (n, 2) of the surface nearest to points (n, 2)."""
+        """Return the nearest points (n, 2) of the surface."""
         foot = self._on_surface(points, size)
         for _ in range(_MOST_STEPS):
             slope = self._slope(foot, size)
@@ -107,7 +106,7 @@ class SignedDistance:
         raise InputError(self._nothing_near(points[worst]))
 
     def _descended(self, points: FloatArray, foot: FloatArray, step: FloatArray, size: float) -> FloatArray:
-        """Return points of the surface after steps from feet, halved until they are not farther from the points."""
+        """Step from points `foot` of the surface; halve steps that increase the distance from the points."""
         distance = np.hypot(*(points - foot).T)
         for _ in range(_MOST_HALVINGS):
             trial = self._on_surface(foot + step, size)
@@ -118,7 +117,7 @@ class SignedDistance:
         return trial
 
     def _on_surface(self, points: FloatArray, size: float) -> FloatArray:
-        """Return points (n, 2) of the surface, by Newton's method along the slopes from points (n, 2)."""
+        """Return points (n, 2) of the surface by Newton's method along the slopes from points (n, 2)."""
         foot = points
         for _ in range(_MOST_STEPS):
             slope = self._slope(foot, size, _ONE_STEP)
@@ -133,7 +132,7 @@ class SignedDistance:
         x, y = point
         return (
             f"distance {self.distance!r}: no nearest point of its zero level is found from ({x:.6g}, {y:.6g}); "
-            "give a smooth function that grows away from the obstacle, best the distance itself"
+            "give a smooth function that increases away from the obstacle, preferably the distance"
         )
 
     def _slope(self, points: FloatArray, size: float, steps: FloatArray = _STEPS) -> FloatArray:
@@ -152,7 +151,7 @@ class SignedDistance:
         return np.asarray(trials[best, np.arange(len(points))])
 
     def _second_derivatives(self, points: FloatArray, size: float) -> FloatArray:
-        """Return second derivatives (n, 2, 2) to about six digits, which is enough for the steps of Newton's method."""
+        """Return second derivatives (n, 2, 2) to about six digits, which is enough for Newton steps."""
         step = 1e-3 * size
         x, y = step * np.eye(2)
         at = {(i, k): evaluate_field(self.distance, points + i * x + k * y) for i in (-1, 0, 1) for k in (-1, 0, 1)}
@@ -168,10 +167,12 @@ def _squares(slope: FloatArray, points: FloatArray) -> FloatArray:
     Raises
     ------
     InputError
-        Where a slope vanishes, so that no direction is known.
+        If a slope vanishes, so that there is no direction.
     """
     squares = np.sum(slope**2, axis=1)
     if not (squares > 0.0).all():
         x, y = points[int(np.argmin(squares))]
-        raise InputError(f"distance is level at ({x:.6g}, {y:.6g}): give a function that grows away from the obstacle")
+        raise InputError(
+            f"distance has no slope at ({x:.6g}, {y:.6g}): give a function that increases away from the obstacle"
+        )
     return np.asarray(squares)

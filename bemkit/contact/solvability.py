@@ -1,4 +1,4 @@
-"""Whether contact tractions can balance the load."""
+"""Decides whether contact tractions can balance the load."""
 
 from __future__ import annotations
 
@@ -19,42 +19,42 @@ Result = TypeVar("Result")
 
 
 _RELATIVE_WORK = 1e-6
-"""Work below this share of the largest force counts as zero. Linear programming (tolerance 1e-7) cannot decide whether
-contact holds such a load; the solvers can."""
+"""Smallest work relative to the largest force. For smaller work, linear programming (tolerance 1e-7) cannot decide
+whether contact balances the load; the solvers can."""
 
 _PLAIN = 1e-3
-"""Work, relative to the forces of the sticking state, that errors of supports and integrals cannot cause; and size of
-these forces, relative to those of a body strained by as much as it moves, below which they may be round-off."""
+"""Work relative to the forces of the sticking state that errors of supports and integrals cannot cause. These forces
+may be round-off below this multiple of those of a body that strains as much as it moves."""
 
 _FARTHEST = 1e7
-"""Travel to an obstacle, in deformations of the body, up to which displacements hold nine digits of the deformation."""
+"""Largest rigid motion to an obstacle, relative to the deformation, with nine digits of the deformation."""
 
 _MANY_MOTIONS = 60
-"""Largest number of motions for which the largest residual of the balance is minimised, with a condition for each. Of
-more motions the sum of all residuals is."""
+"""Number of motions up to which the largest residual of equilibrium is minimised, with one condition for each motion;
+for more motions the sum of residuals is minimised."""
 
 _PRESSES = 1e-9
-"""Speed into an obstacle, relative to the largest speed of the motion, above which it is not round-off."""
+"""Smallest velocity into an obstacle, relative to the largest one, that is not round-off."""
 
 _MEETS = 1e-7
-"""The same for motions that are found by linear programming, whose tolerance is larger."""
+"""The same for motions from linear programming, which has a larger tolerance."""
 
 
 @dataclass(frozen=True, eq=False)
 class UnsolvableLoad:
-    """A rigid motion along which the load does work that contact cannot take up.
+    """A rigid motion on which the load does work that contact cannot balance.
 
     Parameters
     ----------
     motion : (n_contact, 2) array
         Normal and tangential components of the mechanism at the contact nodes, scaled to a largest entry of one.
     lift : (n_contact,) array
-        How much faster each node leaves the obstacle than sliding at full friction would allow, ``-v_n - s |v_t|``;
-        zero everywhere if the body slides, nan where a node can never touch.
+        Separation velocity beyond that of sliding at full friction, ``-v_n - s |v_t|``; zero at all nodes if the body
+        slides, nan at nodes that can never touch.
     work : float [N]
-        Work of the load on this motion, less what friction takes up; positive.
+        Work of the load on this motion minus that of friction; positive.
     who, where : str
-        The body that moves, and the one that it touches, in words for messages.
+        The body that moves, and the one that it touches, for messages.
     """
 
     motion: FloatArray
@@ -65,21 +65,21 @@ class UnsolvableLoad:
 
     @property
     def is_sliding(self) -> bool:
-        """Whether the body slides and stays in touch everywhere, so that only friction could have held it."""
+        """Whether the body slides without separation, so that only friction could hold it."""
         touches = ~np.isnan(self.lift)
         slip = float(np.abs(self.motion[touches, 1]).max(initial=0.0))
         return slip > 1e-6 and float(self.lift[touches].max()) <= 1e-6
 
     @property
     def description(self) -> str:
-        """One sentence that names the mechanism."""
+        """A sentence that describes the mechanism."""
         if np.isnan(self.lift).all():
-            how = f"moves {self.who} where no obstacle can meet it"
+            how = f"moves {self.who} where no obstacle stops it"
         elif not self.is_sliding:
             how = "pushes" if np.ptp(self.motion[~np.isnan(self.lift), 0]) < 1e-6 else "tips"
             how += f" {self.who} away from {self.where}"
         else:
-            how = f"slides {self.who} along {self.where} against all the friction there is"
+            how = f"slides {self.who} along {self.where} against full friction"
         return f"the load {how} (work {self.work:.3g} on that rigid motion)"
 
 
@@ -90,7 +90,7 @@ def find_unsolvable_load(problem: ContactProblem, state: ContactState | None = N
     ----------
     problem : ContactProblem
     state : ContactState, optional
-        Whose pressures bound the friction, at pressed nodes only. By default they may grow without bound.
+        State whose pressures give the friction bounds of pressed nodes. By default pressures are not limited.
 
     Raises
     ------
@@ -99,11 +99,11 @@ def find_unsolvable_load(problem: ContactProblem, state: ContactState | None = N
 
     Notes
     -----
-    A motion v is a mechanism if it nowhere presses into the obstacle harder than friction can wedge,
-    ``v_n + s |v_t| <= 0``, and the load does more work on it than cohesion, ``L(v) > sum w c |v_t|``. By linear
-    duality no mechanism exists exactly if tractions with ``sigma_n <= 0`` and ``|sigma_t| <= c + s |sigma_n|`` balance
-    the load. c and s envelop the law from above, and a cap is tried as a second pair (c = cap, s = 0), so the
-    test never refuses a load that can be held. A load that it misses is left to the status of the solver.
+    A motion v is a mechanism if ``v_n + s |v_t| <= 0`` at all nodes, and if the load does more work on it than
+    cohesion, ``L(v) > sum w c |v_t|``. By linear duality, a mechanism exists if and only if no tractions with ``sigma_n
+    <= 0`` and ``|sigma_t| <= c + s |sigma_n|`` balance the load. c and s bound the law from above, and a cap gives a
+    second pair (c = cap, s = 0), so the test never refuses a load that contact can balance. Unsolvable loads that it
+    does not find end in a status of the solver.
     """
     motions = as_rows(problem.body.rigid_motions())
     if not motions.shape[0]:
@@ -127,8 +127,8 @@ def find_unsolvable_load(problem: ContactProblem, state: ContactState | None = N
         motion = np.asarray(coefficients @ motions).reshape(-1, 2)
         work = float(load @ coefficients) - force_scale * float(resistance @ np.abs(motion[:, 1]))
         if work > _RELATIVE_WORK * force_scale:
-            size = float(np.abs(motion).max())
-            motion, work = motion / size, work / size
+            largest = float(np.abs(motion).max())
+            motion, work = motion / largest, work / largest
             lift = np.where(touches, -motion[:, 0] - slope * np.abs(motion[:, 1]), np.nan)
             if best is None or work > best.work:
                 moved = coefficients / unit
@@ -138,44 +138,44 @@ def find_unsolvable_load(problem: ContactProblem, state: ContactState | None = N
 
 
 def _presses(motion: FloatArray, load: FloatArray, touches: BoolArray) -> bool:
-    """Whether the only motion (1, 2 n_contact) presses into the obstacle where it follows the load (1,)."""
+    """Whether the only motion (1, 2 n_contact), in the direction of the load (1,), presses into the obstacle."""
     return bool(np.any(np.sign(load) * motion[0, 0::2][touches] > _PRESSES))
 
 
 def needs_contact(problem: ContactProblem) -> bool:
-    """Whether the load does work on a rigid motion, far more than round-off could: then the body needs contact.
+    """Whether the load does more work on a rigid motion than round-off, so that only contact can balance it.
 
-    No response is computed for it. False does not say that the load is balanced.
+    It takes no response. False does not imply that the load is balanced.
     """
     motions = as_rows(problem.body.rigid_motions())
     if not motions.shape[0]:
         return False
     load, force_scale = _rigid_load(problem, largest_components(motions))
-    # forces of a body strained by as much as it moves
+    # forces of a body that strains as much as it moves
     carried = problem.modulus * float(np.abs(problem.sticking_state.displacement).max())
     return bool(np.abs(load).max() > _PLAIN * max(force_scale, _PLAIN * carried))
 
 
 def _rigid_load(problem: ContactProblem, unit: FloatArray) -> tuple[FloatArray, float]:
-    """Return the work (n_motions,) of the load on rigid motions of unit size, and a force to compare it with."""
+    """Return the work (n_motions,) of the load on rigid motions of unit size, and a scale of force."""
     load = problem.body.rigid_load() / unit
     forces = problem.body.weights[:, None] * problem.sticking_state.traction
     return load, max(float(np.abs(load).max()), float(np.abs(forces).sum()))
 
 
 def find_long_motion(problem: ContactProblem) -> float | None:
-    """Return how far the load moves the body before an obstacle can hold it, if that is too far to resolve deformation.
+    """Return the relative rigid motion to an obstacle, if it is too long to resolve the deformation.
 
     Parameters
     ----------
     problem : ContactProblem
-        With a load that the obstacle can hold; see `find_unsolvable_load`.
+        Problem with a load that contact can balance; see `find_unsolvable_load`.
 
     Returns
     -------
     float or None
-        Smallest gap that must close, relative to the displacement that the tractions of the sticking state cause at one
-        node; None if displacements hold enough digits for both the travel and the deformation.
+        Smallest gap that must close, relative to the displacement of one node by the tractions of the sticking state;
+        None if displacements have enough digits for rigid motion and deformation.
     """
     deformation = float(np.abs(problem.sticking_state.traction).max()) / problem.body.stiffness_scale
     is_far = problem.gap > _FARTHEST * deformation
@@ -194,16 +194,16 @@ def friction_envelopes(problem: ContactProblem) -> list[tuple[FloatArray, FloatA
 def envelopes_of(
     bound: Callable[[FloatArray], FloatArray], slope: FloatArray, pressure: float
 ) -> list[tuple[FloatArray, FloatArray]]:
-    """Return pairs (c, s) of (n,) arrays with ``bound <= c + s |sigma_n|`` for the pressures tried.
+    """Return pairs (c, s) of (n,) arrays with ``bound <= c + s |sigma_n|`` at sampled pressures.
 
     Parameters
     ----------
     bound : callable
         (n,) normal tractions [Pa] -> (n,) bounds [Pa].
     slope : (n,) array [-]
-        Growth of the bound with the pressure where this is zero.
+        Slope of the bound at zero pressure.
     pressure : float [Pa]
-        A typical one.
+        Typical pressure.
     """
     none = np.zeros(slope.size)
     cohesion, slopes = bound(none), [slope]
@@ -218,18 +218,18 @@ def envelopes_of(
 def _largest_mechanism(
     motions: RigidMotions, load: FloatArray, resistance: FloatArray, slope: FloatArray
 ) -> FloatArray:
-    """Return (n_motions,) coefficients of the mechanism on which the load does most work, zeros if none.
+    """Return the coefficients (n_motions,) of the mechanism on which the load does most work; zeros if there is none.
 
-    Their absolute values add up to one at most, which favours mechanisms with a single motion, the simplest to name.
-    `slope` is nan at nodes that never touch.
+    The sum of their absolute values is at most one, which favours mechanisms of a single motion. `slope` is nan at
+    nodes that never touch.
 
     Notes
     -----
-    This solves the dual problem: find the contact forces p within friction that have the smallest residual
-    ``r = M p + load``, M the work of unit forces on the motions. The multipliers of these equations are the mechanism.
-    The size of r is its largest component, so that absolute values of the multipliers add up to one; with many motions
-    it is the sum of all components, so that no multiplier exceeds one. Forces are sums of those on both edges of the
-    friction cone and of tangential ones that need no pressure. So all conditions on p are bounds, and M is sparse.
+    The dual problem is solved: find contact forces p within the friction cones with the smallest residual ``r = M p +
+    load``, with the work M of unit forces on the motions. The multipliers of these equations are the mechanism. The
+    norm of r is its largest component, so that the absolute values of the multipliers add up to one; with many motions
+    it is the sum of components, so that no multiplier exceeds one. Forces are combinations of the edges of the friction
+    cones and of cohesive tangential forces. So all conditions on p are bounds, and M is sparse.
     """
     touches = np.isfinite(slope)
     if motions.shape[0] == 1 and isinstance(motions, np.ndarray):
@@ -252,21 +252,21 @@ def with_violated_nodes(
     slope: FloatArray,
     programme: Callable[[FloatArray], tuple[Result, FloatArray | None]],
 ) -> Result:
-    """Return the result of a linear programme of contact forces, whose multipliers are a mechanism.
+    """Solve a linear programme of contact forces whose multipliers are a mechanism, adding violated nodes.
 
     Parameters
     ----------
     motions : RigidMotions
     resistance, slope : (n_contact,) arrays
-        As for `contact_forces`; the slope is nan at nodes that never touch.
+        See `contact_forces`; the slope is nan at nodes that never touch.
     programme : callable
-        Slopes (n_contact,), nan at nodes that take no part -> the result, and the velocities (n_motions,) of the
-        mechanism; None for velocities if there is none.
+        Slopes (n_contact,), nan at excluded nodes -> result and velocities (n_motions,) of the mechanism, or None if
+        there is no mechanism.
 
     Notes
     -----
-    Where two bodies meet, the extreme nodes nearly always suffice. Nodes between them join if the mechanism presses
-    them, all of them if there is no mechanism.
+    The extreme nodes of a contact nearly always suffice. Other nodes are added if the mechanism presses them, and all
+    of them if there is no mechanism.
     """
     touches = np.isfinite(slope)
     takes_part = touches if isinstance(motions, np.ndarray) else extreme_nodes(motions, touches)
@@ -281,14 +281,14 @@ def with_violated_nodes(
 
 
 def violated(motions: RigidMotions, velocities: FloatArray, resistance: FloatArray, slope: FloatArray) -> BoolArray:
-    """Return (n_contact,) bool: nodes that a motion presses into the obstacle, or that resist it without pressure."""
+    """Return a mask (n_contact,) of nodes that a motion presses into the obstacle or that resist it by cohesion."""
     motion = np.asarray(velocities @ motions).reshape(-1, 2)
     is_pressed = motion[:, 0] + slope * np.abs(motion[:, 1]) > _MEETS * np.abs(motion).max()
     return np.asarray(is_pressed | ((resistance > 0.0) & (motion[:, 1] != 0.0)))
 
 
 def extreme_nodes(motions: csr_array, touches: BoolArray) -> BoolArray:
-    """Return (n_contact,) bool: the first and the last of the nodes at which the same motions meet."""
+    """Return a mask (n_contact,) of the first and last node of each contact between the same motions."""
     nodes = np.flatnonzero(touches)
     works = (abs(motions.T)).tocsr()
     merged = works[2 * nodes] + works[2 * nodes + 1]
@@ -303,7 +303,7 @@ def extreme_nodes(motions: csr_array, touches: BoolArray) -> BoolArray:
 
 
 def _mechanism_of(motions: RigidMotions, load: FloatArray, resistance: FloatArray, slope: FloatArray) -> FloatArray:
-    """Return the coefficients of `_largest_mechanism` for the nodes whose slope is a number."""
+    """Return the coefficients of `_largest_mechanism` with forces at nodes whose slope is a number."""
     from scipy import sparse
     from scipy.optimize import linprog
 
@@ -328,29 +328,29 @@ def _mechanism_of(motions: RigidMotions, load: FloatArray, resistance: FloatArra
         bounds=limits,
         method="highs",
     )
-    if result.x is None:  # leaving all of the load is admissible, so this is the solver's failure: do not condemn it
+    if result.x is None:  # p = 0 is feasible, so the solver has failed: do not refuse the load
         return np.zeros(n_motions)
     return -np.asarray(result.eqlin.marginals, dtype=float)
 
 
 def contact_forces(motions: RigidMotions, resistance: FloatArray, slope: FloatArray) -> tuple[csc_array, FloatArray]:
-    """Return the forces that friction allows at the nodes whose slope is a number, as sums of simple ones.
+    """Return basic forces whose combinations are the admissible contact forces at nodes whose slope is a number.
 
     Parameters
     ----------
     motions : RigidMotions
     resistance : (n_contact,) array [N]
-        What friction holds without pressure.
+        Cohesion: friction without pressure.
     slope : (n_contact,) array [-]
-        Further friction by pressure.
+        Friction coefficient.
 
     Returns
     -------
     works : (n_motions, n_forces) sparse array
-        Work of each simple force on each motion: those on both edges of the cones of friction, then the tangential ones
-        that need no pressure.
+        Work of each basic force on each motion: forces on both edges of the friction cones, then cohesive tangential
+        forces.
     bounds : (n_forces, 2) array
-        Least and largest factor of each.
+        Smallest and largest factor of each.
     """
     from scipy import sparse
 

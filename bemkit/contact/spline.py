@@ -16,22 +16,22 @@ if TYPE_CHECKING:
     from scipy.interpolate import CubicSpline
 
 _SAMPLES = 8
-"""Samples of each span among which the nearest point is looked for first."""
+"""Samples of each span, among which the search for the nearest point begins."""
 _MOST_STEPS = 60
-"""Steps that refine it; pure bisection would need fewer than these."""
+"""Largest number of steps that refine the nearest point; bisection takes fewer."""
 
 
 @dataclass(frozen=True)
 class RigidSpline:
     """The obstacle fills the left side of a smooth curve through points.
 
-    So a closed curve is filled inside if its points run anticlockwise, and outside (a cavity) if they run clockwise. An
-    open curve goes on straight beyond its ends.
+    The obstacle is inside of a closed curve with anticlockwise points, and outside (a cavity) with clockwise points. An
+    open curve continues along straight lines beyond its ends.
 
     Parameters
     ----------
     points : sequence of (x, y) [m]
-        In order along the curve, which must not cross itself; the first one is not repeated at the end.
+        In order along the curve, which must not cross itself; the first point is not repeated at the end.
     is_closed : bool
 
     Raises
@@ -41,8 +41,8 @@ class RigidSpline:
 
     Notes
     -----
-    A cubic spline with continuous curvature, parametrised by the length of chords. A curve of bounded fourth derivative
-    is approximated to the fourth power of the distance of its points.
+    The curve is a cubic spline with continuous curvature, parametrised by chord length. The error of approximation of a
+    smooth curve is of fourth order in the distance of the points.
     """
 
     points: tuple[tuple[float, float], ...]
@@ -51,13 +51,13 @@ class RigidSpline:
     def __post_init__(self) -> None:
         if len(self.points) < 3:
             raise InputError(f"points has {len(self.points)} entries: give at least three")
-        for number, point in enumerate(self.points):
-            check_pair(f"points[{number}]", point)
-            if tuple(point) == tuple(self.points[number - 1]) and (number or self.is_closed):
-                raise InputError(f"points[{number}] is {point}, as is the one before it: remove one of them")
+        for index, point in enumerate(self.points):
+            check_pair(f"points[{index}]", point)
+            if tuple(point) == tuple(self.points[index - 1]) and (index or self.is_closed):
+                raise InputError(f"points[{index}] is {point}, as is the one before it: remove one of them")
 
     def gap(self, points: FloatArray, normals: FloatArray) -> FloatArray:
-        """Measure the distance from the curve; see `Obstacle.gap`."""
+        """Return the distance from the curve; see `Obstacle.gap`."""
         nearest, outward = self._nearest(points)
         return np.asarray(np.sum((points - nearest) * outward, axis=1))
 
@@ -85,7 +85,7 @@ class RigidSpline:
         return np.append((knots[:-1, None] + share * np.diff(knots)[:, None]).ravel(), knots[-1])
 
     def _nearest(self, points: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return the nearest points (n, 2) of the curve, and the unit normals (n, 2) there, out of the obstacle."""
+        """Return the nearest points (n, 2) of the curve, and the outward unit normals (n, 2) there."""
         from scipy.spatial import KDTree
 
         spline, samples = self._spline, self._samples(_SAMPLES)
@@ -98,7 +98,7 @@ class RigidSpline:
         else:
             low, high = samples[np.maximum(nearest_sample - 1, 0)], samples[np.minimum(nearest_sample + 1, last)]
         for _ in range(_MOST_STEPS):
-            # Newton's method, with bisection outside the bracket, on half the derivative of the squared distance
+            # Newton's method for the derivative of half the squared distance, with bisection outside of the bracket
             offset, along = spline(s) - points, slope(s)
             first = np.sum(offset * along, axis=1)
             low, high = np.where(first < 0.0, s, low), np.where(first > 0.0, s, high)

@@ -59,7 +59,7 @@ def test_laws_of_parts_see_the_slip_of_their_own_nodes() -> None:
     ("make", "message"),
     [
         (lambda: SlipWeakening(0.3, 0.2, 0.0), r"slip_distance = 0: give a positive length"),
-        (lambda: SlipWeakening(0.3, 0.4, 1.0), r"kinetic_friction = 0\.4 lies above static_friction = 0\.3"),
+        (lambda: SlipWeakening(0.3, 0.4, 1.0), r"kinetic_friction = 0\.4 is larger than static_friction = 0\.3"),
         (lambda: RateStrengthening(0.3, 0.4, 0.0), r"reference_rate = 0: give a positive speed"),
         (lambda: RateStrengthening(0.3, -0.4, 1.0), r"rate_coefficient = -0\.4; give a number >= 0"),
     ],

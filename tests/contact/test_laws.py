@@ -187,7 +187,7 @@ def test_the_check_finds_broken_laws(law, complaint):
         (lambda: Coulomb(float("inf")), "friction_coefficient = inf"),
         (lambda: Tresca(-1.0), "bound_value = -1"),
         (lambda: CohesiveCoulomb(0.1, -1.0), "cohesion = -1"),
-        (lambda: CohesiveCoulomb(0.1, 2.0, 1.0), "cap = 1 lies below cohesion = 2"),
+        (lambda: CohesiveCoulomb(0.1, 2.0, 1.0), "cap = 1 is less than cohesion = 2"),
         (lambda: Coulomb(0.1).scaled(0.0), "stress_scale = 0; give a positive finite stress"),
     ],
 )

@@ -136,7 +136,7 @@ def test_units_do_not_matter(scale: float) -> None:
         (lambda: SignedDistance(Expression("x > 0")), "distance = 'x > 0' is a condition"),
         (
             lambda: SignedDistance(Expression("1 + 0 * x")).gap(AROUND, UP),
-            "distance is level at .*: give a function that grows away from the obstacle",
+            "distance has no slope at .*: give a function that increases away from the obstacle",
         ),
         (
             lambda: SignedDistance(Expression("x**2 + y**2 + 1")).gap(AROUND, UP),

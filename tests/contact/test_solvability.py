@@ -63,7 +63,7 @@ def test_the_edge_of_sliding_is_left_to_the_driver():
 def test_an_obstacle_that_is_nowhere():
     problem = block_problem(Coulomb(0.5))
     nowhere = replace(problem, gap=np.full(problem.n_contact, np.inf))
-    assert "moves the body where no obstacle can meet it" in find_unsolvable_load(nowhere).description
+    assert "moves the body where no obstacle stops it" in find_unsolvable_load(nowhere).description
 
 
 def test_no_load_is_no_trouble():

@@ -53,7 +53,7 @@ def test_laws_without_formulas_are_themselves_everywhere():
         ),
         (lambda: Coulomb(Expression("x")).bound(PRESSURE), r"friction_coefficient is a function .*law.at\(points\)"),
         (lambda: Tresca(Expression("x")).scaled(2.0), "bound_value is a function of the coordinates"),
-        (lambda: CohesiveCoulomb(0.1, Expression("x"), 0.5).at(POINTS), "cap = 0.5 lies below cohesion = 1"),
+        (lambda: CohesiveCoulomb(0.1, Expression("x"), 0.5).at(POINTS), "cap = 0.5 is less than cohesion = 1"),
     ],
 )
 def test_refusals(call, message):

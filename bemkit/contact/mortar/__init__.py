@@ -1,1 +1,1 @@
-"""Mortar coupling of bodies whose meshes do not match, with dual multipliers of every degree."""
+"""Mortar coupling of bodies with non-matching meshes by dual multipliers of any degree."""

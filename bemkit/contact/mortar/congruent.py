@@ -1,4 +1,4 @@
-"""Couplings of sides, computed once for all pairs in the same relative position: a wall of blocks has few of them."""
+"""Couplings of sides that congruent pairs share; a wall of blocks has few different ones."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.placement import Placement
 
 _DIGITS = 12
-"""Decimals of distances, relative to the coordinates of the pair, to which congruent pairs agree."""
+"""Decimals of distances, relative to the coordinates of the pair, that agree in congruent pairs."""
 _DIGITS_OF_SUMS = 9
-"""The same for sums that distinguish meshes with equal elements and different nodes."""
+"""Decimals of sums that distinguish meshes with equal elements and different nodes."""
 _FAR = 4.0
-"""Reach, in sizes of a pair, beyond which it makes no difference."""
+"""Largest distance, relative to the extent of a pair, that affects the coupling."""
 
 
 @dataclass(frozen=True, eq=False)
 class PlacedSide:
-    """A side of a body and the placement of the body.
+    """A contact side and the placement of its body.
 
     Parameters
     ----------
@@ -39,7 +39,7 @@ class PlacedSide:
 
 @dataclass(frozen=True)
 class CongruentCouplings:
-    """Couples sides, and keeps couplings for pairs of the same meshes in the same relative position."""
+    """Couples sides, with a cache for congruent pairs."""
 
     _known: dict[Hashable, tuple[Placement, MortarCoupling]] = field(default_factory=dict)
 
@@ -66,14 +66,14 @@ def _key(non_mortar: PlacedSide, mortar: PlacedSide, without: IntArray, reach: f
 
 
 def congruence_key(one: tuple[BoundaryMesh, Placement], two: tuple[BoundaryMesh, Placement], reach: float) -> Hashable:
-    """Return a key that is equal for pairs of meshes that are copies of each other, moved as a whole.
+    """Return a key that is equal for pairs of meshes that differ by a rigid motion of the whole pair.
 
     Parameters
     ----------
     one, two : (BoundaryMesh, Placement)
-        In the coordinates of the scene, and the placements that brought them there.
+        Meshes in the coordinates of the scene, and their placements.
     reach : float [m]
-        A distance that has to be the same as well.
+        A distance that is part of the key.
     """
     (mesh, place), (other, other_place) = one, two
     shift = place.turned_back(np.subtract(other_place.shift, place.shift))
@@ -84,7 +84,7 @@ def congruence_key(one: tuple[BoundaryMesh, Placement], two: tuple[BoundaryMesh,
 
 
 def _shape(mesh: BoundaryMesh, placement: Placement, size: float) -> tuple[float, ...]:
-    """Return a key of copies of a mesh: the identity of the array of elements, and weighted sums of its points."""
+    """Return a key that copies of a mesh share: the identity of the array of elements, and weighted sums of points."""
     points = np.concatenate([mesh.start, mesh.centres])
     weights = spread_fractions(len(points))
     sums = placement.turned_back(weights @ (points - points[0]))
@@ -92,7 +92,7 @@ def _shape(mesh: BoundaryMesh, placement: Placement, size: float) -> tuple[float
 
 
 def _moved(coupling: MortarCoupling, before: Placement, now: Placement) -> MortarCoupling:
-    """Return a coupling whose bodies have moved together."""
+    """Return the coupling of a pair after a rigid motion of both bodies."""
     frame = now.turned(before.turned_back(coupling.frame))
     points, deepest = (now.forward(before.back(points)) for points in (coupling.points, coupling.deepest))
     return replace(coupling, points=points, deepest=deepest, frame=frame)

@@ -1,17 +1,17 @@
-"""Coupling of two sides whose meshes do not match: means of the relative displacement, one for each multiplier.
+"""Mortar coupling of two sides with non-matching meshes: a mean relative displacement for each multiplier.
 
-Multipliers live on the covered part of the non-mortar side. On an element that is wholly covered, all of whose nodes
-carry multipliers, they are the dual basis [Wohlmuth2000]: ``int psi_i phi_j = delta_ij int phi_i``, polynomials
-of the degree of the displacements. Their integrals are those of the displacements' basis, which at Gauss-Lobatto points
-are positive for every degree.
+Multipliers are defined on the covered part of the non-mortar side. On a completely covered element, all of whose nodes
+carry multipliers, they are the dual basis [Wohlmuth2000], ``int psi_i phi_j = delta_ij int phi_i``: polynomials of the
+degree of the displacements. Their integrals equal those of the displacement basis, which are positive for every degree
+at Gauss-Lobatto points.
 
-On any other element the multipliers are integrated only over the covered part [CichoszBischoff2011], where the dual
-basis does not work: the integrals of quadratic and higher basis functions over a part may be negative, and a node far
-from a short part would depend on an extrapolation. Instead the nodes in the covered part that may carry a multiplier
-have hat functions: linear between these nodes, constant beyond the last of them. If there is no such node, the nearest
-one takes the whole part. Hats are not negative, so that weights are positive. They sum to one like the dual basis, so
-that uniform tractions are transmitted exactly. No combination of them is orthogonal to all polynomials of the
-displacements, so that constraints are independent.
+On other elements the multipliers are integrated over the covered part only [CichoszBischoff2011]. The dual basis is not
+suitable there: integrals of quadratic and higher basis functions over a part may be negative, and a node far from a
+short part would depend on an extrapolation. Instead, nodes in the covered part that may carry a multiplier have hat
+functions, linear between these nodes and constant beyond the last ones. If there is no such node, the nearest node
+takes the whole part. Hats are not negative, so weights are positive. Their sum is one, so uniform tractions are
+transmitted exactly. No combination of hats is orthogonal to all displacement polynomials, so constraints are
+independent.
 """
 
 from __future__ import annotations
@@ -33,19 +33,19 @@ if TYPE_CHECKING:
     from scipy.sparse import csr_matrix
 
 _AT_THE_EDGE = 1e-9
-"""Distance from the covered part, in local coordinates, up to which a node counts as covered."""
+"""Largest distance of a covered node from the covered part, in local coordinates."""
 _LEAST_SHARE = 0.01
-"""Weight of a node, relative to the integral of its basis function, below which its neighbours take it over."""
+"""Weight of a node, relative to the integral of its basis function, below which its neighbours take its share."""
 
 
 def modified_rows(segments: Segments, may_carry: BoolArray) -> BoolArray:
-    """Return (m,) bool: elements that are partly covered, or that have nodes without a multiplier.
+    """Return a mask (m,) of elements that are partly covered or have nodes without a multiplier.
 
     Parameters
     ----------
     segments : Segments
     may_carry : (m, n_local) bool array
-        Nodes of each element of the non-mortar side.
+        Nodes of each element of the non-mortar side that may carry a multiplier.
     """
     is_modified = np.asarray(~may_carry.all(axis=1))
     is_modified[segments.row[~segments.is_covered]] = True
@@ -62,17 +62,17 @@ def multiplier_functions(
     side : ContactSide
         The non-mortar side.
     segments : Segments
-        Those of `modified_rows` cut at the nodes.
+        Segments; elements of `modified_rows` are cut at their nodes.
     quadrature : MortarQuadrature
-        On these.
+        Quadrature on the segments.
     may_carry : (m, n_local) bool array
 
     Returns
     -------
     psi : (s, n_local, q) array
-        At the points of the quadrature.
+        Functions at the points of the quadrature.
     rows : (r,) int array
-        Positions of the elements that are covered at least in part.
+        Positions of the elements that are at least partly covered.
     integrals : (r, n_local, n_local) array [m]
         ``int psi_i phi_j``.
     """
@@ -87,7 +87,7 @@ def multiplier_functions(
     is_modified = modified_rows(segments, may_carry)[rows]
     mass = integrate(phi)
     integrals = np.eye(phi.shape[1]) * mass.sum(axis=2)[:, :, None]
-    mass[is_modified] = np.eye(phi.shape[1])  # that of a short piece is singular
+    mass[is_modified] = np.eye(phi.shape[1])  # the mass matrix of a short piece is singular
     psi = np.matmul((integrals @ np.linalg.inv(mass))[number], phi)
     nodes = side.space.local_nodes
     for k in np.flatnonzero(is_modified):
@@ -100,7 +100,7 @@ def multiplier_functions(
 
 
 def carrying_nodes(nodes: FloatArray, may_carry: BoolArray, low: FloatArray, high: FloatArray) -> BoolArray:
-    """Return (n_local,) bool: which nodes of an element share the multipliers of its covered part.
+    """Return a mask (n_local,) of the nodes of an element that carry the multipliers of its covered part.
 
     Parameters
     ----------
@@ -108,7 +108,7 @@ def carrying_nodes(nodes: FloatArray, may_carry: BoolArray, low: FloatArray, hig
         Local coordinates.
     may_carry : (n_local,) bool array
     low, high : (k,) arrays
-        The pieces that are covered.
+        Covered pieces.
 
     Returns
     -------
@@ -123,9 +123,9 @@ def carrying_nodes(nodes: FloatArray, may_carry: BoolArray, low: FloatArray, hig
 
 
 def hats(nodes: FloatArray, carries: BoolArray, xi: FloatArray) -> FloatArray:
-    """Return functions (s, n_local, q) at xi (s, q): linear between the marked nodes, constant beyond the last ones.
+    """Return hat functions (s, n_local, q) at xi (s, q): linear between marked nodes, constant beyond the last ones.
 
-    Each is one at its own node; those of other nodes are zero.
+    Each hat is one at its node; unmarked nodes have zero functions.
     """
     values = np.zeros((len(xi), nodes.size, xi.shape[1]))
     marked = np.flatnonzero(carries)
@@ -136,43 +136,43 @@ def hats(nodes: FloatArray, carries: BoolArray, xi: FloatArray) -> FloatArray:
 
 
 class NotFacingError(GeometryError):
-    """Two sides that do not face each other anywhere."""
+    """Two sides do not face each other."""
 
 
 @dataclass(frozen=True, eq=False)
 class MortarCoupling:
-    """Relative displacement of two sides, and where their multipliers act.
+    """Relative displacements of two sides at the nodes of their multipliers.
 
-    At the multiplier node i it is ``frame[i] @ (on_non_mortar[i] @ u1 - on_mortar[i] @ u2)``, with the displacements
-    (n_scalar, 2) of both bodies in x and y. A traction t_i there, in the frame, presses the nodal forces
-    ``weights[i] * outer(on_non_mortar[i], t_i @ frame[i])`` onto the non-mortar body, and those with ``on_mortar``,
-    reversed, onto the mortar body.
+    The relative displacement of node i is ``frame[i] @ (on_non_mortar[i] @ u1 - on_mortar[i] @ u2)``, with the
+    displacements (n_scalar, 2) of both bodies in x and y. A traction t_i, in the frame, exerts the nodal forces
+    ``weights[i] * outer(on_non_mortar[i], t_i @ frame[i])`` on the non-mortar body, and the opposite forces with
+    ``on_mortar`` on the mortar body.
 
     Parameters
     ----------
     nodes : (n,) int array
         Scalar dofs of the non-mortar space that carry a multiplier, in order along the side.
     points : (n, 2) array [m]
-        Where they are.
+        Positions of the nodes.
     arc_length : (n,) array [m]
-        From the start of the side.
+        Arc length of the nodes from the start of the side.
     frame : (n, 2, 2) array
-        Rows are the direction d of contact, the mean of both normals, out of the non-mortar body and into the mortar
-        body, and the tangent ``(-d_y, d_x)``.
+        Rows are the direction d of contact, which is the mean of both normals and points out of the non-mortar body,
+        and the tangent ``(-d_y, d_x)``.
     weights : (n,) array [m]
-        Positive: ``int psi_i`` over the covered part of the non-mortar side.
+        ``int psi_i`` over the covered part of the non-mortar side; positive.
     gap : (n,) array [m]
-        Mean of the distance along d, weighted by psi_i.
+        Mean distance along d, weighted by psi_i.
     overlap : float [m]
-        How deep the sides lie in each other at the deepest place, not a mean; zero if they do not.
+        Largest depth of overlap of the sides; zero without overlap.
     deepest : (2,) array [m]
-        Where that is.
+        Point of the largest depth.
     facing : (n,) array
         Cosine of the angle between d and the normal of the non-mortar body.
     on_non_mortar : (n, n_scalar) csr_matrix
         ``int psi_i phi_j / weights_i`` with the basis of the non-mortar space; rows sum to one.
     on_mortar : (n, n_scalar) csr_matrix
-        The same with the basis of the mortar space, at the projected points; rows sum to one.
+        The same with the basis of the mortar space at the projected points; rows sum to one.
     """
 
     nodes: IntArray
@@ -199,27 +199,26 @@ def couple(
         The side that carries the multipliers; see `bemkit.contact.mortar.facing.is_non_mortar`.
     mortar : ContactSide
     without : (k,) int array, optional
-        Scalar dofs of the non-mortar space that carry no multiplier, because a support holds them or several bodies
-        meet there. Their share is handed to the other nodes of their elements.
+        Scalar dofs of the non-mortar space without a multiplier, because a support holds them or several bodies meet
+        there. The other nodes of their elements take their share.
     reach : float [m]
-        Largest distance along the direction of contact at which the sides face each other.
+        Largest distance of facing sides along the direction of contact.
 
     Returns
     -------
     MortarCoupling
-        Only of nodes whose elements the mortar side covers at least in part.
+        Coupling of the nodes whose elements are at least partly covered.
 
     Raises
     ------
     NotFacingError
-        If the sides face each other nowhere, or only where no node may carry a multiplier.
+        If the sides do not face each other, or only where no node may carry a multiplier.
 
     Notes
     -----
-    The projection follows the mean of both normals, interpolated along the non-mortar side [PusoLaursen2004],
-    [PoppEtAl2010]. A node whose weight would be less than a hundredth of the integral of its basis function, because
-    only a sliver beside it is covered, hands it over like those `without` a multiplier; slivers that have no other node
-    are left uncovered.
+    The projection is along the mean of both normals, interpolated along the non-mortar side [PusoLaursen2004],
+    [PoppEtAl2010]. If the weight of a node is less than a hundredth of the integral of its basis function, because only
+    a sliver of its elements is covered, other nodes take its share; slivers without other nodes are not covered.
     """
     directions, segments = facing_segments(non_mortar, mortar, reach)
     may_carry = np.ones(non_mortar.dofs.shape, bool) if without is None else ~np.isin(non_mortar.dofs, without)
@@ -260,13 +259,13 @@ def _integrate(
     side: ContactSide, mortar: ContactSide, directions: FloatArray, segments: Segments, may_carry: BoolArray
 ) -> tuple[MortarCoupling, IntArray]:
     """Return the coupling with multipliers at some nodes (m, n_local), and dofs (k,) whose share is a sliver."""
-    # integrals of the multipliers over the segments that both sides cover
+    # integrals of the multipliers over the covered segments
     segments = segments.cut(modified_rows(segments, may_carry), side.space.local_nodes)
     quadrature = quadrature_on(segments, side, mortar, directions)
     psi, elements, integrals = multiplier_functions(side, segments, quadrature, may_carry)
-    # a node with a tiny part of its full weight is a sliver; the others are the rows of the coupling
+    # nodes with a tiny part of their full weight are slivers; the others are the rows of the coupling
     rows, slivers = _MultiplierRows.from_integrals(side, elements, integrals)
-    # means of the gap vector over each multiplier, along the direction of contact of its node
+    # mean of the gap vector for each multiplier, along the direction of contact of its node
     weighted_psi = psi * quadrature.weights[:, None]
     gap = rows.summed(quadrature.row, np.matmul(weighted_psi, quadrature.gap))
     node_xi = side.space.local_nodes[rows.local][:, None]
@@ -297,16 +296,16 @@ def _integrate(
 
 @dataclass(frozen=True, eq=False)
 class _MultiplierRows:
-    """The nodes with a multiplier, in order of the arc length: rows of the coupling.
+    """The nodes with a multiplier in the order of the arc length, which are the rows of the coupling.
 
     Parameters
     ----------
     dofs, element, local : (n,) int arrays
-        Scalar dof of each node, and one element of the side on which it is the local node.
+        Scalar dof of each node, an element that contains it, and its local index there.
     weights : (n,) array [m]
-        Positive integrals of the multipliers.
+        Integrals of the multipliers; positive.
     row_of : (m, n_local) int array
-        Row of each node of each element; -1 without a multiplier.
+        Row of each node of each element; -1 for nodes without a multiplier.
     """
 
     dofs: IntArray
@@ -319,7 +318,7 @@ class _MultiplierRows:
     def from_integrals(
         cls, side: ContactSide, elements: IntArray, integrals: FloatArray
     ) -> tuple[_MultiplierRows, IntArray]:
-        """Return the rows of nodes with a weight, and the dofs whose weight is only a sliver of the full one."""
+        """Return the rows of nodes with sufficient weight, and the dofs whose weight is a sliver."""
         dofs, first, index = np.unique(side.dofs, return_index=True, return_inverse=True)
         node_of = index.reshape(side.dofs.shape)
         weights = np.zeros(dofs.size)

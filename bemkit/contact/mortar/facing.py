@@ -1,4 +1,4 @@
-"""Which sides of many bodies face each other, and which of two carries the multipliers."""
+"""Search for facing sides of many bodies, and choice of the non-mortar side."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from bemkit.contact.mortar.sides import ContactSide, faces_away
 from bemkit.geometry.vectors import cross, norms, turned_right
 
 _LEAST_OPPOSITION = 0.5
-"""Cosine of the angle, 60 degrees, between one normal and the other one reversed, below which elements do not face."""
+"""Smallest cosine of the angle (60 degrees) between one normal and the reversed other normal of facing elements."""
 _LEAST_COVER = 0.01
-"""Shared length, relative to an average element of the finer side, below which sides only touch at a corner."""
+"""Common length, relative to the mean element of the finer side, below which sides only touch at a corner."""
 _WHOLE = 1.0 - 1e-6
-"""Share from which on a side counts as wholly covered, because of round-off."""
+"""Covered share of a completely covered side, with round-off."""
 _WHOLE_CURVED = 0.98
-"""The same of curved sides. Chords and an interference change lengths by less on any mesh, so that all meshes of one
-scene have their multipliers on the same side."""
+"""Covered share of a completely covered curved side. Chords and an interference change lengths by less on any mesh, so
+that all meshes of a scene have the same non-mortar side."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,24 +54,24 @@ def find_facing(
     Parameters
     ----------
     sides : sequence of ContactSide
-        Of many bodies in place.
+        Sides of placed bodies.
     distance : float [m]
-        Largest distance or overlap of sides that face each other.
+        Largest distance or overlap of facing sides.
     owners : sequence of int, optional
-        The body of each side; sides of one body are not a pair. By default each side is a body of its own.
+        The body of each side; sides of one body are no pair. By default all sides belong to different bodies.
     has_friction : bool
         Whether friction acts between them.
 
     Returns
     -------
     list of (int, int)
-        Non-mortar and mortar side, see `is_non_mortar`, by the smaller and then the larger number of the two.
+        Non-mortar and mortar side, see `is_non_mortar`; sorted by the smaller, then the larger index.
 
     Notes
     -----
-    Elements face each other if their normals differ from opposite ones by 60 degrees at most, and if the chords overlap
-    when they are projected along the mean of both normals. A pair covers at least a hundredth of an average element of
-    its finer side; less is a corner that touches.
+    Elements face each other if their normals are opposite up to 60 degrees, and if their chords overlap in projection
+    along the mean of both normals. The common length of a pair of sides is at least a hundredth of a mean element of
+    the finer side; less is a corner that touches.
     """
     if not sides:
         return []
@@ -97,34 +97,33 @@ def is_non_mortar(one: ContactSide, two: ContactSide, distance: float = np.inf, 
     ----------
     one, two : ContactSide
     distance : float [m]
-        The sides face each other where they are not farther apart than this.
+        Largest distance of facing elements.
     has_friction : bool
         Whether friction acts between them.
 
     Returns
     -------
     bool
-        Whether the second side covers the first one wholly and the first one does not cover the second one; if that
-        holds of both sides or of neither, whether the nodes of the first side are closer together, on average, than
-        those of the second, or as close. Of curved linear sides with friction that cover each other the coarser one
-        carries the multipliers.
+        True if only the first side is completely covered. If both or none are, true if the mean distance of nodes on
+        the first side is not larger than on the second one. Of curved linear sides with friction that cover each other,
+        the coarser side carries the multipliers.
 
     Notes
     -----
-    A side that is wholly covered has multipliers of full size at all nodes, and fine multipliers resolve both sides
-    [Wohlmuth2000]. The stiffness of the bodies does not count: where a stiff body with the finer mesh presses a soft
-    one, the side of the soft one would be the better choice.
+    A completely covered side has multipliers of full weight at all nodes, and fine multipliers resolve both sides
+    [Wohlmuth2000]. The choice ignores the stiffness of the bodies: if a stiff body with the finer mesh presses a soft
+    body, the side of the soft body would be better.
 
-    Linear elements on curved sides that fit move too far inwards between their nodes. Multipliers of the finer side
-    follow that error; each multiplier of the coarser side averages over it: the pressure of a disc in a ring with
-    elements of 1 to 3 is uniform to 1e-5 instead of 2e-2. Without friction such a disc would turn nearly freely.
+    Linear elements on conforming curved sides move too far inwards between their nodes. Multipliers of the finer side
+    resolve that error, those of the coarser side average over it: the pressure of a disc in a ring with three times
+    longer elements is uniform to 1e-5 instead of 2e-2. Without friction such a disc would rotate nearly freely.
     """
     _, _, cover = _facing_elements(_Elements.of([one, two], [0, 1]), distance)
     return _is_first_non_mortar(one, two, float(cover.sum()), has_friction=has_friction)
 
 
 def _is_first_non_mortar(one: ContactSide, two: ContactSide, cover: float, *, has_friction: bool) -> bool:
-    """Apply the rule of `is_non_mortar` to sides that share a length [m]."""
+    """Apply the rule of `is_non_mortar` to sides with a common length [m]."""
     fits = has_friction and not any(side.is_straight or side.space.degree != 1 for side in (one, two))
     share = _WHOLE_CURVED if fits else _WHOLE
     is_whole = [cover >= share * float(side.lengths.sum()) for side in (one, two)]
@@ -139,7 +138,7 @@ def _mean_length(side: ContactSide) -> float:
 
 
 def _facing_elements(elements: _Elements, distance: float) -> tuple[IntArray, IntArray, FloatArray]:
-    """Return pairs of elements, those of the lower side first, and the length (k,) [m] that they share."""
+    """Return pairs of elements, first that of the lower side, and their common length (k,) [m]."""
     first, second = _near_elements(elements, distance)
     is_pair = elements.owner[first] != elements.owner[second]
     swap = elements.side[first] > elements.side[second]
@@ -157,7 +156,7 @@ def _facing_elements(elements: _Elements, distance: float) -> tuple[IntArray, In
         for which in (first, second)
     )
     low, high = np.maximum(a1, a2), np.minimum(b1, b2)
-    # the normal (t_y, -t_x) out of the first body, and how far along it both chords lie at the ends of the overlap
+    # outward normal (t_y, -t_x) of the first body, and positions of both chords along it at the ends of the overlap
     at = np.stack([low, high])
     ahead1 = (at - a1) / (b1 - a1) * -cross(tangent, end[first] - origin)
     ahead2 = (at - a2) / (b2 - a2) * cross(tangent, end[second] - start[second]) - cross(tangent, end[second] - origin)
@@ -167,7 +166,7 @@ def _facing_elements(elements: _Elements, distance: float) -> tuple[IntArray, In
     is_near = (high > low) & (nearest <= distance + slack)
     middle = origin + at.mean(axis=0)[:, None] * tangent
     middle += 0.5 * (ahead1 + ahead2).mean(axis=0)[:, None] * turned_right(tangent)
-    # sides that seem to overlap may face away from each other; they are few, and examined one by one
+    # sides that seem to overlap may face away from each other; they are few and are checked separately
     depth, sides = gaps.mean(axis=0), np.stack([elements.side[first], elements.side[second]], axis=1)
     behind = np.flatnonzero(is_near & (depth < -2.0 * slack))
     for one, two in np.unique(sides[behind], axis=0):
@@ -179,12 +178,12 @@ def _facing_elements(elements: _Elements, distance: float) -> tuple[IntArray, In
 
 
 def _near_elements(elements: _Elements, distance: float) -> tuple[IntArray, IntArray]:
-    """Return all pairs of elements whose circumscribed circles are nearer than a distance.
+    """Return all pairs of elements whose circumscribed circles are closer than a distance.
 
     Notes
     -----
-    Elements are sorted by size, a factor of two to a class, with a tree for each class, so that neither one long nor
-    many tiny elements make the search long.
+    Each class of element lengths, with ratio two, has its own tree, so that neither a long element nor many tiny ones
+    slow down the search.
     """
     from scipy.spatial import cKDTree
 

@@ -12,30 +12,30 @@ from bemkit.geometry.vectors import angles_between, cross, norms, turned_left
 
 _MOST_STEPS = 100
 _MOST_PASSES = 8
-"""Passes of `mean_directions`: the first projects along normals, the others along the mean directions of the last."""
+"""Largest number of passes of `mean_directions`; the first projects along normals, others along mean directions."""
 _SETTLED = 1e-13
-"""Change of directions [rad] from one pass to the next below which there is no further pass."""
+"""Change of directions [rad] in a pass below which the iteration ends."""
 
 
 def bracketed_roots(function: Callable[[FloatArray], FloatArray], n_roots: int, tolerance: float) -> FloatArray:
-    """Return where functions of [-1, 1] vanish, by the Illinois variant of regula falsi.
+    """Return roots of functions in [-1, 1] by the Illinois variant of regula falsi.
 
     Parameters
     ----------
     function : callable
-        (n_roots,) arguments, one of each function -> (n_roots,) values.
+        (n_roots,) arguments, one for each function -> (n_roots,) values.
     n_roots : int
     tolerance : float
-        Values of this size are zero.
+        Largest value that counts as zero.
 
     Returns
     -------
     (n_roots,) array
-        In [-1, 1]; the nearest end where a function does not change sign.
+        Roots in [-1, 1]; the nearest end if a function does not change sign.
     """
     a, b = np.full(n_roots, -1.0), np.full(n_roots, 1.0)
     f_a, f_b = function(a), function(b)
-    # without a change of sign both ends of the bracket become the nearer one
+    # without a change of sign the bracket shrinks to the nearer end
     has_no_root = f_a * f_b > 0.0
     nearer, f_nearer = np.where(np.abs(f_a) < np.abs(f_b), (a, f_a), (b, f_b))
     a, b = np.where(has_no_root, nearer, a), np.where(has_no_root, nearer, b)
@@ -55,27 +55,27 @@ def bracketed_roots(function: Callable[[FloatArray], FloatArray], n_roots: int, 
 def project(
     points: FloatArray, directions: FloatArray, side: ContactSide, reach: float, slack: float = 0.0
 ) -> tuple[IntArray, FloatArray]:
-    """Find the points of a side that lie ahead of, or behind, other points.
+    """Project points onto a side, ahead or behind.
 
     Parameters
     ----------
     points, directions : (n, 2) arrays [m], [-]
-        Directions are unit vectors out of the body of the points; the side has to run against them.
+        Directions are unit vectors out of the body of the points, against which the side must face.
     side : ContactSide
     reach : float [m]
         Largest distance along the direction.
     slack : float [m]
-        How far points that meet no element may lie beside the nearest one.
+        Largest distance from the nearest element of points that meet no element.
 
     Returns
     -------
     rows : (n,) int array
-        Position in the side of the nearest element that is met, -1 if there is none.
+        Position in the side of the nearest element on the line, -1 if there is none.
     xi : (n,) array
-        Where it is met.
+        Local coordinate of the projection.
     """
     to_start, to_end = side.start - points[:, None], side.end - points[:, None]
-    # along the tangent, against which a side that faces the direction runs
+    # positions along the tangent; a facing side runs against it
     start, end = cross(directions[:, None], to_start), cross(directions[:, None], to_end)
     beside = np.where(end < start, np.maximum(np.maximum(-start, end), 0.0), np.inf)
     share = np.clip(start / np.where(end < start, start - end, 1.0), 0.0, 1.0)
@@ -93,7 +93,7 @@ def project(
 
 
 def meeting_points(points: FloatArray, directions: FloatArray, side: ContactSide, rows: IntArray) -> FloatArray:
-    """Return where (n,) the lines through points (n, 2) along directions (n, 2) meet elements `rows` (n,) of a side."""
+    """Return local coordinates (n,) of the intersections of lines with elements `rows` (n,) of a side."""
     if side.is_straight:
         start = cross(directions, side.start[rows] - points)
         end = cross(directions, side.end[rows] - points)
@@ -112,13 +112,13 @@ def mean_directions(non_mortar: ContactSide, mortar: ContactSide, reach: float) 
     Returns
     -------
     (n_knots, 2) array
-        The normal of the non-mortar side, turned by half of the angle to the reversed normal of the mortar side where
-        it is met. Knots that meet nothing turn like the nearest ones that do.
+        The normal of the non-mortar side, rotated by half of the angle to the reversed normal of the mortar side at the
+        projection. Knots without a projection are rotated like the nearest knots with one.
 
     Notes
     -----
-    With the normals of only one side, two equal cylinders that are pressed together seem to slide by as much as the
-    cube of the distance from their common point, which friction resists; the mean is the same from both sides.
+    With the normals of one side only, two equal cylinders pressed together would have a slip of third order in the
+    distance from their common point, which friction resists. The mean is the same for both sides.
     """
     if non_mortar.flat_normal is not None and mortar.flat_normal is not None:
         mean = non_mortar.flat_normal - mortar.flat_normal
@@ -127,7 +127,7 @@ def mean_directions(non_mortar: ContactSide, mortar: ContactSide, reach: float) 
     rows, local = non_mortar.first_knots
     points = non_mortar.points(rows, non_mortar.knots)[np.arange(rows.size), local]
     normals = directions = non_mortar.normals
-    # the end of a side is met from its end, however the first directions deviate by a small angle
+    # slack: the end of a side is projected onto the end of the other one, although directions deviate slightly
     slack = float(max(non_mortar.lengths.mean(), mortar.lengths.mean()))
     knots, half_angle = np.arange(rows.size), np.zeros(rows.size)
     for _ in range(_MOST_PASSES):

@@ -1,4 +1,4 @@
-"""Common refinement of two sides: pieces on which the functions of both are smooth, and quadrature on them."""
+"""Common refinement of two sides into pieces on which the functions of both are smooth, with quadrature."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from bemkit.geometry.quadrature import gauss_legendre
 from bemkit.geometry.vectors import cross
 
 _SLIVER = 1e-10
-"""Pieces shorter than this, in local coordinates, belong to their neighbours."""
+"""Smallest length of a piece in local coordinates; shorter ones are merged with their neighbours."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,9 +25,9 @@ class Segments:
     row : (s,) int array
         Position of the element in the non-mortar side.
     low, high : (s,) arrays
-        Its part, within [-1, 1].
+        Ends of the piece within [-1, 1].
     partner : (s,) int array
-        Position in the mortar side of the one element that faces it, -1 for none.
+        Position in the mortar side of the facing element, -1 for none.
     """
 
     row: IntArray
@@ -37,7 +37,7 @@ class Segments:
 
     @property
     def is_covered(self) -> BoolArray:
-        """(s,) bool array: whether the mortar side faces the piece."""
+        """(s,) bool array: pieces that the mortar side faces."""
         return self.partner >= 0
 
     def covered(self) -> Segments:
@@ -46,12 +46,12 @@ class Segments:
         return Segments(self.row[chosen], self.low[chosen], self.high[chosen], self.partner[chosen])
 
     def within(self, pieces: IntArray, low: FloatArray, high: FloatArray) -> Segments:
-        """Return parts of pieces (m,), from low (m,) to high (m,) in coordinates that run from -1 to 1 on each."""
+        """Return parts of pieces (m,) from low (m,) to high (m,), in coordinates from -1 to 1 on each piece."""
         middle, half = 0.5 * (self.high + self.low)[pieces], 0.5 * (self.high - self.low)[pieces]
         return Segments(self.row[pieces], middle + half * low, middle + half * high, self.partner[pieces])
 
     def cut(self, is_cut: BoolArray, at: FloatArray) -> Segments:
-        """Return the pieces, those of the elements (m,) marked in `is_cut` cut at the places `at` (k,) as well."""
+        """Return the pieces; those of marked elements (m,) are cut at the local coordinates `at` (k,)."""
         chosen = np.flatnonzero(is_cut[self.row])
         inside = (at > self.low[chosen, None]) & (at < self.high[chosen, None])
         piece, place = np.nonzero(inside)
@@ -65,18 +65,18 @@ class Segments:
 
 @dataclass(frozen=True, eq=False)
 class MortarQuadrature:
-    """Gauss points on covered pieces, and the points of the mortar side that they face.
+    """Gauss points on covered pieces, and their projections on the mortar side.
 
     Parameters
     ----------
     row, partner : (s,) int arrays
-        Positions of the elements in the non-mortar and in the mortar side, the first ascending.
+        Positions of the elements in the non-mortar side (ascending) and the mortar side.
     xi, eta : (s, q) arrays
-        Where on these elements.
+        Local coordinates on these elements.
     weights : (s, q) array [m]
-        Lengths of the non-mortar side.
+        Weights along the non-mortar side.
     gap : (s, q, 2) array [m]
-        From the non-mortar to the mortar side.
+        Vectors from the non-mortar to the mortar side.
     """
 
     row: IntArray
@@ -88,16 +88,16 @@ class MortarQuadrature:
 
 
 def common_refinement(non_mortar: ContactSide, mortar: ContactSide, directions: FloatArray, reach: float) -> Segments:
-    """Cut the elements of the non-mortar side where the ends of elements of the mortar side face them.
+    """Cut the elements of the non-mortar side at the projections of the ends of mortar elements.
 
     Parameters
     ----------
     non_mortar, mortar : ContactSide
     directions : (n_knots, 2) array
-        Of the projection, at the knots of the non-mortar side.
+        Directions of the projection at the knots of the non-mortar side.
     reach : float [m]
-        A piece is covered if the mortar side lies within this distance of its middle: ahead of it, or behind it where
-        the bodies overlap.
+        Largest distance of the mortar side from the midpoint of a covered piece, ahead of it or, where the bodies
+        overlap, behind it.
     """
     n_rows, all_rows = non_mortar.elements.size, np.arange(non_mortar.elements.size)
     resolution = max(non_mortar.resolution, mortar.resolution)
@@ -105,7 +105,7 @@ def common_refinement(non_mortar: ContactSide, mortar: ContactSide, directions: 
     at_ends = non_mortar.directions(directions, all_rows, np.tile([-1.0, 1.0], (n_rows, 1)))
     start = cross(at_ends[:, 0], ends[:, None] - non_mortar.start)
     end = cross(at_ends[:, 1], ends[:, None] - non_mortar.end)
-    # what the tangent sees ahead of the start and behind the end of an element faces its inside
+    # ends that lie between the start and the end of an element along the tangent project into it
     point, row = np.nonzero((start > 0.0) & (end < 0.0))
     elements = non_mortar.elements[row]
 
@@ -141,8 +141,8 @@ def quadrature_on(
 
     Notes
     -----
-    On straight elements with one direction the products of two functions, one of each side, are integrated exactly;
-    otherwise four more points see what curves and directions add to them.
+    On straight elements with uniform direction, products of functions of both sides are integrated exactly. Otherwise
+    four more points resolve curves and directions.
     """
     is_plane = non_mortar.is_straight and mortar.is_straight and bool(np.all(directions == directions[0]))
     rule = gauss_legendre(max(non_mortar.space.degree, mortar.space.degree) + (2 if is_plane else 6))
@@ -157,7 +157,7 @@ def facing_points(
     reference: FloatArray,
     reference_weights: FloatArray,
 ) -> MortarQuadrature:
-    """Return points of the covered pieces, given with their weights by (q,) places in [-1, 1], and what they face."""
+    """Return the points of covered pieces at reference coordinates (q,) in [-1, 1], and their projections."""
     chosen = np.flatnonzero(segments.is_covered)
     row, partner, low, high = (
         segments.row[chosen],
@@ -175,7 +175,7 @@ def facing_points(
 
 
 def _ends(row: IntArray, low: FloatArray) -> FloatArray:
-    """Return where pieces end that begin at `low`: where the next one of the same element begins, or at 1."""
+    """Return the ends of pieces that begin at `low`: the beginning of the next piece of the element, or 1."""
     high = np.ones(low.size)
     follows = row[1:] == row[:-1]
     high[:-1][follows] = low[1:][follows]

@@ -1,4 +1,4 @@
-"""One side of a contact: elements of a body in order, directions that turn continuously along them, what is behind."""
+"""One side of a contact: ordered elements of a body, continuous normals along them, and tests of what is inside."""
 
 from __future__ import annotations
 
@@ -15,24 +15,24 @@ from bemkit.geometry.spaces import BoundarySpace
 from bemkit.geometry.vectors import angles_between, norms, turned_right
 
 _RESOLUTION = 32.0 * np.finfo(float).eps
-"""Positions that differ by less than this share of the largest coordinate are the same."""
+"""Largest difference of equal positions, relative to the largest coordinate."""
 
 
 @dataclass(frozen=True, eq=False)
 class ContactSide:
-    """Elements of a body that face another one.
+    """Elements of a body that face another body.
 
     Parameters
     ----------
     space : BoundarySpace
-        Space of the displacements, on the mesh of the body in place, in physical units.
+        Displacement space on the placed mesh of the body, in physical units.
     elements : (m,) int array
-        Elements of the side; kept in order along the boundary.
+        Elements of the side; sorted along the boundary.
 
     Raises
     ------
     GeometryError
-        If there are no elements, or one is named twice or does not exist.
+        If there are no elements, or an element is repeated or does not exist.
     """
 
     space: BoundarySpace
@@ -45,7 +45,7 @@ class ContactSide:
         if elements.min() < 0 or elements.max() >= n_elements or np.unique(elements).size < elements.size:
             raise GeometryError(
                 f"ContactSide: elements {elements.tolist()[:8]} of a mesh of {n_elements}: "
-                f"name different numbers from 0 to {n_elements - 1}"
+                f"give different indices from 0 to {n_elements - 1}"
             )
         object.__setattr__(self, "elements", along_boundary(self.space.mesh, elements))
 
@@ -81,30 +81,30 @@ class ContactSide:
 
     @cached_property
     def sagittas(self) -> FloatArray:
-        """(m,) array [m]: distances of the middles of the elements from those of their chords."""
+        """(m,) array [m]: distances of the midpoints of the elements from those of their chords."""
         if self.is_straight:
             return np.zeros(self.elements.size)
         return norms(self.mesh.centres[self.elements] - 0.5 * (self.start + self.end))
 
     @cached_property
     def resolution(self) -> float:
-        """Distance [m] that the coordinates of the side cannot resolve."""
+        """Round-off of positions on the side [m]."""
         return _RESOLUTION * float(max(np.abs(self.start).max(), np.abs(self.end).max()))
 
     @cached_property
     def arc_length(self) -> FloatArray:
-        """(m, n_local) array [m]: distance of the nodes from the start of the side, along its elements."""
+        """(m, n_local) array [m]: arc length of the nodes from the start of the side."""
         before = np.cumsum(self.lengths) - self.lengths
         return before[:, None] + 0.5 * self.lengths[:, None] * (1.0 + self.space.local_nodes)
 
     @cached_property
     def knots(self) -> FloatArray:
-        """(k,) array: where in [-1, 1] directions are given on each element: at nodes of the space, or at both ends."""
+        """(k,) array: local coordinates of the knots of directions: nodes of the space, or both ends."""
         return self.space.local_nodes if self.space.degree else np.array([-1.0, 1.0])
 
     @cached_property
     def knot_numbers(self) -> IntArray:
-        """(m, k) array: numbers of the knots, which neighbours share, in order along the side."""
+        """(m, k) array: indices of the knots along the side; neighbouring elements share knots."""
         if not self.space.degree:
             keys = self.mesh.elements[self.elements]
         else:
@@ -116,17 +116,16 @@ class ContactSide:
 
     @cached_property
     def first_knots(self) -> tuple[IntArray, IntArray]:
-        """Two (n_knots,) arrays: an element of the side, by its position, that has the knot, and which one there."""
+        """Two (n_knots,) arrays: position of an element that has the knot, and local index of the knot there."""
         _, first = np.unique(self.knot_numbers.ravel(), return_index=True)
         element, local = np.divmod(first, self.knots.size)
         return element, local
 
     @cached_property
     def flat_normal(self) -> FloatArray | None:
-        """(2,) array: outward unit normal if all elements lie on one line, else None.
+        """(2,) array: outward unit normal if all elements and their images lie on one line, otherwise None.
 
-        None, too, of a side that goes on behind a symmetry line in another direction.
-        It is free of the round-off in the directions of short elements.
+        It has no round-off from the directions of short elements.
         """
         along = (self.end - self.start).sum(axis=0)
         size = float(norms(along))
@@ -146,26 +145,26 @@ class ContactSide:
 
     @cached_property
     def normals(self) -> FloatArray:
-        """(n_knots, 2) array: outward unit normals, the mean of both elements where two meet."""
+        """(n_knots, 2) array: outward unit normals; means of both elements at common knots."""
         if self.flat_normal is not None:
             return np.tile(self.flat_normal, (int(self.knot_numbers.max()) + 1, 1))
         at_knots = self.mesh.normals_at(self.elements, self.knots)
         total = np.zeros((int(self.knot_numbers.max()) + 1, 2))
         np.add.at(total, self.knot_numbers, at_knots)
-        # the image of an element that ends on a symmetry line takes part in the mean
+        # at a symmetry line the mean includes the image of the element
         is_across = np.zeros(total.shape, bool)
         np.logical_or.at(is_across, self.knot_numbers[:, [0, -1]], self._ends_on_lines)
         total[is_across] = 0.0
         size = norms(total)
-        # elements that fold back onto each other leave no mean
+        # elements that fold back onto each other have no mean
         return (
             np.where(size[:, None] > 0.0, total, at_knots[self.first_knots]) / np.where(size > 0.0, size, 1.0)[:, None]
         )
 
     def smooth_normals(self, rows: IntArray, xi: FloatArray) -> FloatArray:
-        """Return outward unit normals (r, 2) at xi (r,) of the elements at the positions `rows` (r,).
+        """Return outward unit normals (r, 2) at xi (r,) on elements at the positions `rows` (r,).
 
-        Those of straight elements turn from one to the next by interpolation.
+        Normals of straight elements are interpolated between knots.
         """
         normals = self.directions(self.normals, rows, xi[:, None])[:, 0]
         if self.is_straight:
@@ -175,7 +174,7 @@ class ContactSide:
         return normals
 
     def points(self, rows: IntArray, xi: FloatArray) -> FloatArray:
-        """Return points (r, q, 2) [m] at xi, (q,) or (r, q), of the elements at the positions `rows` (r,)."""
+        """Return points (r, q, 2) [m] at xi, (q,) or (r, q), on elements at the positions `rows` (r,)."""
         return self.mesh.points(self.elements[rows], xi)
 
     def directions(self, at_knots: FloatArray, rows: IntArray, xi: FloatArray) -> FloatArray:
@@ -206,7 +205,7 @@ class ContactSide:
 
 
 def encloses(mesh: BoundaryMesh, points: FloatArray) -> BoolArray:
-    """Return (k,) bool: whether the body bounded by the chords of a mesh contains points (k, 2), by winding numbers."""
+    """Return a mask (k,) of points (k, 2) inside the body bounded by the chords of a mesh, by winding numbers."""
     whole = mesh.whole
     to_points = points[:, None]
     angles = angles_between(whole.start - to_points, whole.end - to_points).sum(axis=1)
@@ -214,27 +213,27 @@ def encloses(mesh: BoundaryMesh, points: FloatArray) -> BoolArray:
 
 
 def faces_away(
-    one: BoundaryMesh, two: BoundaryMesh, middle: FloatArray, distance: FloatArray, slack: FloatArray
+    first: BoundaryMesh, second: BoundaryMesh, middle: FloatArray, distance: FloatArray, slack: FloatArray
 ) -> BoolArray:
-    """Find places where sides lie behind each other although their bodies do not overlap.
+    """Return a mask of points with a negative distance whose bodies do not overlap: the sides face away.
 
     Parameters
     ----------
-    one, two : BoundaryMesh
+    first, second : BoundaryMesh
     middle : (k, 2) array [m]
-        Halfway between a point of the first side and what it is projected onto on the second one.
+        Midpoints between points of the first side and their projections on the second side.
     distance : (k,) array [m]
-        From the one to the other along the direction out of the first body.
+        Distances from the first to the second side along the outward direction of the first body.
     slack : (k,) array [m]
-        Depth of an overlap that is not looked into, because coordinates or chords do not resolve it.
+        Largest depth of overlap that is not checked, because coordinates or chords do not resolve it.
 
     Returns
     -------
     (k,) bool array
-        Where the distance is negative and the middle does not belong to both bodies.
+        True where the distance is negative and the midpoint is not inside both bodies.
     """
     behind = np.flatnonzero(distance < -slack)
     result = np.zeros(len(middle), bool)
     if behind.size:
-        result[behind] = ~(encloses(one, middle[behind]) & encloses(two, middle[behind]))
+        result[behind] = ~(encloses(first, middle[behind]) & encloses(second, middle[behind]))
     return result
