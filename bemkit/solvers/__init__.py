@@ -1,1 +1,1 @@
-"""Drivers for contact problems as strategy objects, and the one loop that runs them."""
+"""Solvers of contact problems as strategy objects, and the loop that runs them."""

@@ -1,4 +1,4 @@
-"""Active sets: which nodes are closed, and which of them slip which way."""
+"""Active sets: closed nodes and their slip directions."""
 
 from dataclasses import dataclass
 from enum import IntEnum
@@ -24,21 +24,21 @@ class NodeStatus(IntEnum):
     SEPARATED = 0
     STICK = 1
     SLIP_FORWARD = 2
-    """Slips along the tangent, ``u_t > 0``; also a node that touches without any friction and happens to rest."""
+    """Slips along the tangent, ``u_t > 0``; also a closed frictionless node at rest."""
     SLIP_BACKWARD = 3
     """Slips against the tangent, ``u_t < 0``."""
 
 
 @dataclass(frozen=True, eq=False)
 class ActiveSets:
-    """The active sets of Algorithm 2, node by node.
+    """The active sets of Algorithm 2 for each node.
 
     Parameters
     ----------
     is_closed : (n_contact,) bool array
         Whether ``u_n = g`` holds; open nodes carry no normal traction.
     direction : (n_contact,) int array
-        +1 or -1 for slip along or against the tangent, 0 for stick; of open nodes that of the projection (16).
+        +1 or -1 for slip along or against the tangent, 0 for stick; at open nodes from the projection (16).
     """
 
     is_closed: BoolArray
@@ -53,11 +53,11 @@ class ActiveSets:
 
     @property
     def key(self) -> bytes:
-        """A value that is equal for equal sets and only then."""
+        """A key that is equal for equal sets only."""
         return self.is_closed.tobytes() + self.direction.astype(np.int8).tobytes()
 
     def n_changed(self, other: "ActiveSets") -> int:
-        """Return at how many nodes the sets differ."""
+        """Return the number of nodes at which the sets differ."""
         return int(np.count_nonzero((self.is_closed != other.is_closed) | (self.direction != other.direction)))
 
 
@@ -69,7 +69,7 @@ class Residual:
     ----------
     state : ContactState
     sets : ActiveSets
-        From the generalised derivatives of the projections: a node at a tie counts as separated, or as sticking.
+        Sets from the generalised derivatives of the projections; at a tie a node counts as separated or sticking.
     bound, slope : (n_contact,) arrays [Pa], [-]
         Friction bound and its derivative at `predicted_sigma_n`.
     predicted_sigma_n : (n_contact,) array [Pa]
@@ -87,7 +87,7 @@ class Residual:
 
     @property
     def is_free(self) -> BoolArray:
-        """(n_contact,) bool array: nodes without friction, whose bound and its derivative vanish."""
+        """(n_contact,) bool array: frictionless nodes, whose bound and its derivative vanish."""
         return np.asarray((self.bound == 0.0) & (self.slope == 0.0))
 
 
@@ -95,7 +95,7 @@ class Residual:
 class ProjectionEquations:
     """Contact and friction as the projection equations (15), (16) of the paper [AlartCurnier1991].
 
-    With the multiplier m, which is the traction itself unless it is held fixed,
+    With the multiplier m, which is the traction unless it is fixed,
 
         sigma_n = -[rho_n (u_n - g) - m_n]_+,    sigma_t = -clip(rho_t slip - m_t, bound(sigma_n)).
 
@@ -105,11 +105,11 @@ class ProjectionEquations:
     rho_n, rho_t : float [Pa/m]
         Ratio of traction to displacement in the projections.
     multiplier : (n_contact, 2) array [Pa], optional
-        Fixed multiplier sigma^(k) of Algorithm 1. Without it the present traction takes its place, and the equations
-        are the exact conditions.
+        Fixed multiplier sigma^(k) of Algorithm 1. By default it is the present traction, and the equations are the
+        exact conditions.
     given_bound : (n_contact,) array [Pa], optional
-        Friction bound held fixed (lagged). Without it the bound follows the predicted normal traction, and the
-        Newton matrix contains its derivative.
+        Fixed (lagged) friction bound. By default the bound depends on the predicted normal traction, and the Newton
+        matrix contains its derivative.
     """
 
     problem: ContactProblem
@@ -125,13 +125,13 @@ class ProjectionEquations:
         ----------
         state : ContactState
         touches : (n_contact,) bool array, optional
-            Nodes that count as closed at a tie, where neither pressure nor clearance says so.
+            Nodes that count as closed at a tie, without pressure and clearance.
         """
         problem = self.problem
         multiplier = state.traction if self.multiplier is None else self.multiplier
         towards_obstacle = self.rho_n * (state.u_n - problem.gap) - multiplier[:, 0]
         along_obstacle = self.rho_t * (state.u_t - problem.slip_origin) - multiplier[:, 1]
-        # where the tangent follows, slip is not an unknown: it has its direction for any friction
+        # a tangent that follows is not an unknown: its slip direction does not depend on friction
         follows = problem.body.tangent_follows
         if follows.any():
             along_obstacle = np.where(follows, problem.given_direction(state) * _FAR, along_obstacle)
@@ -157,9 +157,9 @@ class ProjectionEquations:
         Parameters
         ----------
         residual : Residual
-            Where the friction bound is linearised.
+            Residual at which the friction bound is linearised.
         sets : ActiveSets
-            Those of the residual, or those of `through_stick`. Nodes without friction slide, in any direction.
+            Sets of the residual, or of `through_stick`. Frictionless nodes slide in either direction.
         """
         problem = self.problem
         if self.multiplier is None:
@@ -172,10 +172,10 @@ class ProjectionEquations:
         return problem.possible(of_statuses(sets.is_closed, slides, sticking, sliding))
 
     def through_stick(self, residual: Residual, previous: ActiveSets) -> ActiveSets:
-        """Return the sets of `residual` with every direct change of slip direction replaced by stick.
+        """Return the sets of `residual` with direct changes of slip direction replaced by stick.
 
-        Otherwise the active sets of stiff bodies alternate between slip in both directions for ever. The direction of
-        nodes without friction does not matter; it is set to zero, so that equal sets give equal steps.
+        Without this rule, the active sets of stiff bodies may alternate between both slip directions. The direction of
+        frictionless nodes is set to zero, so that equal sets give equal steps.
         """
         sets = residual.sets
         reverses = sets.direction * previous.direction < 0
@@ -185,8 +185,8 @@ class ProjectionEquations:
 def contact_sets(problem: ContactProblem, state: ContactState) -> ActiveSets:
     """Return the active sets of a state by the exact conditions, with the stiffness scale of the body as rho.
 
-    A closed node without friction counts as slipping even if it happens not to move. A node without pressure counts as
-    closed if cohesion holds it; see `coheres`.
+    A closed frictionless node counts as slipping. A node without pressure counts as closed if cohesion holds it; see
+    `coheres`.
     """
     rho = problem.body.stiffness_scale
     residual = ProjectionEquations(problem, rho, rho).evaluate(state, coheres(problem, state))
@@ -195,9 +195,9 @@ def contact_sets(problem: ContactProblem, state: ContactState) -> ActiveSets:
 
 
 def coheres(problem: ContactProblem, state: ContactState) -> BoolArray:
-    """Return (n_contact,) bool: nodes that cohesion holds, which is friction that needs contact but no pressure.
+    """Return a mask (n_contact,) of nodes that cohesion holds without pressure.
 
-    As in the certificate a node is open if its tangential traction is less than what would close its clearance.
+    As in the certificate, a node is open if its tangential traction is less than that which would close its clearance.
     """
     has_cohesion = (problem.cohesion > 0.0) & ~np.asarray(problem.law.acts_across_gap)
     clearance = problem.body.stiffness_scale * np.abs(problem.gap - state.u_n)

@@ -1,4 +1,4 @@
-"""Augmented Lagrangian method: Algorithm 1 of the paper, corrected."""
+"""Augmented Lagrangian method: Algorithm 1 of the paper with corrections."""
 
 from dataclasses import dataclass, field, replace
 from enum import Enum
@@ -15,18 +15,18 @@ from bemkit.solvers.progress import OuterIterate
 from bemkit.solvers.ssn import NewtonIterate, newton_start, newton_step
 
 _AUTOMATIC_RHO = 100.0
-"""In units of the body's stiffness scale. Large enough that the multipliers gain two digits a step, so that the rate of
-the outer iteration is that of the lagged friction bound; small enough not to cost digits."""
+"""Automatic rho in units of the stiffness scale. Multipliers then gain two digits in each step, so that the lagged
+friction bound determines the rate of the outer iteration, and rho costs no digits."""
 
 
 @dataclass(frozen=True)
 class InnerNewton:
-    """Algorithm 2 with fixed multiplier, as printed: repeat Steps 1 to 3 until the active sets stay.
+    """Algorithm 2 with fixed multiplier, as printed: repeat Steps 1 to 3 until the active sets do not change.
 
     Parameters
     ----------
     max_steps : int
-        Steps allowed in one outer step; a few are usual.
+        Largest number of steps in one outer step; a few are usual.
     """
 
     max_steps: int = 100
@@ -35,12 +35,12 @@ class InnerNewton:
         check_max_steps(self.max_steps)
 
     def solved(self, equations: ProjectionEquations, start: ContactState) -> Iterate:
-        """Return the iterate that solves the equations; one that has ended, with a message, if none was found.
+        """Return the iterate that solves the equations, or an ended iterate with a message.
 
         Parameters
         ----------
         equations : ProjectionEquations
-            Their multiplier is fixed; their bound is fixed, or follows the normal traction.
+            Equations with a fixed multiplier; the bound is fixed or depends on the normal traction.
         start : ContactState
             A response of the body.
         """
@@ -54,39 +54,39 @@ class InnerNewton:
 
 
 class BoundUpdate(Enum):
-    """Which normal traction the friction bound of an outer step comes from."""
+    """The normal traction from which the friction bound of an outer step is computed."""
 
     LAGGED = "lagged"
     """The multiplier of the last outer step, as printed in Algorithm 1: each outer step solves a Tresca problem."""
 
     CURRENT = "current"
-    """The present one, differentiated inside the inner Newton iteration. The outer iteration then converges at the rate
-    only of the augmentation."""
+    """The present traction, differentiated in the inner Newton iteration. The augmentation then determines the rate of
+    the outer iteration."""
 
 
 @dataclass(frozen=True)
 class AugmentedLagrangian:
-    """Algorithm 1 of the paper: solve with fixed multipliers, and take the tractions as the next multipliers.
+    """Algorithm 1 of the paper: solve with fixed multipliers; the tractions are the next multipliers.
 
     Parameters
     ----------
     rho_n, rho_t : float, optional
-        rho_1 and rho_2 of the paper as ratios of traction to displacement [Pa/m]; a body in units of E' and L takes
-        them in units of E'/L. By default 100 times the stiffness scale of the body.
+        rho_1 and rho_2 of the paper: ratios of traction to displacement [Pa/m], in the units of the body. By default
+        100 times the stiffness scale of the body.
     inner : InnerNewton
-        Solves Step 1: Algorithm 2, or any object with its method `solved`.
+        Solver of Step 1: Algorithm 2, or any object with the method `solved`.
     bound : BoundUpdate
-        Whether the friction bound of an outer step comes from the multiplier or from the present normal traction.
+        Source of the friction bound of an outer step.
     max_steps : int
-        Outer steps allowed.
+        Largest number of outer steps.
 
     Notes
     -----
     Deviations from the print: the bound is ``s |sigma_n^(k)|``; slip tractions are ``-bound sign(rho u_t - sigma_t)``;
-    the multiplier stays fixed during the inner loop; a node changes its direction of slip only by way of stick; and
-    the first multiplier is the traction of the body with all nodes held, since zero multipliers would start from an
-    empty contact set. For Tresca's law each step reduces the distance of the multipliers to the solution (Theorem 1);
-    for Coulomb's law the lagged bound converges for moderate friction only.
+    the multiplier is fixed in the inner loop; a node reverses its slip direction only through stick; and the first
+    multiplier is the traction of the body with all nodes held, because zero multipliers would give an empty contact
+    set. For Tresca's law each step reduces the distance of the multipliers from the solution (Theorem 1); for Coulomb's
+    law the lagged bound converges for moderate friction only.
 
     References
     ----------
@@ -105,11 +105,11 @@ class AugmentedLagrangian:
         check_max_steps(self.max_steps)
 
     def init(self, problem: ContactProblem, start: ContactState) -> OuterIterate:
-        """Do Step 0: take the tractions of the start as multipliers."""
+        """Perform step 0: the tractions of the start are the multipliers."""
         return OuterIterate.begun(problem, start)
 
     def step(self, problem: ContactProblem, iterate: Iterate) -> OuterIterate:
-        """Do Steps 1 and 2 once."""
+        """Perform steps 1 and 2."""
         if not isinstance(iterate, OuterIterate):
             raise TypeError(f"iterate is a {type(iterate).__name__}; give a result of init or step of this solver")
         # Step 1: solve with the multiplier sigma^(k) = present traction fixed, and its bound
@@ -143,7 +143,7 @@ def _solves(equations: ProjectionEquations, iterate: NewtonIterate, following: N
     # The round-off of displacements times a large rho may be larger, so compare what was linearised instead.
     linearised = before.bound + before.slope * (reached.predicted_sigma_n - before.predicted_sigma_n)
     is_exact = bool(np.all(np.abs(reached.bound - linearised)[iterate.sets.direction != 0] <= tolerance))
-    # nodes without friction slide, in any direction
+    # frictionless nodes slide in either direction
     keeps_direction = (reached.sets.direction == iterate.sets.direction) | reached.is_free
     keeps_sets = bool(np.all((reached.sets.is_closed == iterate.sets.is_closed) & keeps_direction))
     return keeps_sets and is_exact and not following.is_regularised

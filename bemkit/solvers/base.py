@@ -1,4 +1,4 @@
-"""The one loop that all solvers share: steps, certificate, status, history."""
+"""The common loop of all solvers: steps, certificate, status, history."""
 
 import math
 from collections.abc import Callable
@@ -19,7 +19,7 @@ from bemkit.solvers.newton import FloatingResponse, consistent_state, contact_fr
 
 
 class Status(Enum):
-    """How a solve ended; the value is a sentence of advice."""
+    """Outcome of a solve; the value is a sentence of advice."""
 
     CONVERGED = "The state satisfies contact and friction to the tolerance."
     MAX_STEPS = "The steps ran out before the certificate was met; raise max_steps or start from a nearby solution."
@@ -61,18 +61,18 @@ class Status(Enum):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Iterate:
-    """One state of an iteration; solvers that remember more derive their own iterates from it.
+    """State of an iteration; solvers with more data derive their own iterates.
 
     Parameters
     ----------
     state : ContactState
         A response of the body.
     linear_solves : int
-        Linear systems spent since `init`.
+        Linear systems solved since `init`.
     ended : Status or None
-        Why the solver cannot go on; None while it can.
+        Reason why the solver cannot continue; None if it can.
     message : str
-        The reason in words, or a note on the step for the history.
+        Explanation of the reason, or a note on the step for the history.
     """
 
     state: ContactState
@@ -84,12 +84,12 @@ class Iterate:
 class ContactSolver(Protocol):
     """A contact solver: frozen options and two pure functions.
 
-    A solver never decides that it has converged; `solve` does, by the certificate.
+    Solvers do not decide on convergence; `solve` does, by the certificate.
     """
 
     @property
     def max_steps(self) -> int:
-        """Default number of steps of `solve`."""
+        """Default largest number of steps in `solve`."""
         ...
 
     def init(self, problem: ContactProblem, start: ContactState) -> Iterate:
@@ -110,35 +110,35 @@ class ContactSolver(Protocol):
         ----------
         problem : ContactProblem
         iterate : Iterate
-            What `init` or `step` of the same solver returned.
+            Result of `init` or `step` of the same solver.
 
         Raises
         ------
         SingularResponse
-            If the body does not respond; `solve` turns it into a status.
+            If the body has no response; `solve` converts it to a status.
         """
         ...
 
 
 @dataclass(frozen=True)
 class StepRecord:
-    """One line of the convergence table.
+    """One row of the convergence table.
 
     Parameters
     ----------
     step : int
-        Zero is the start.
+        Zero for the start.
     linear_solves : int
-        Linear systems spent so far.
+        Linear systems solved so far.
     certificate : Certificate
     relative_change : float
-        ``max|u - u_previous| / max|u|``, by which the paper decides when to stop (infinite at the start).
+        ``max|u - u_previous| / max|u|``, the stopping criterion of the paper; infinite at the start.
     n_separated, n_stick, n_slip : int
         Number of nodes in each status.
     n_changed : int
-        Nodes whose status changed in this step.
+        Number of nodes whose status changed in this step.
     message : str
-        The solver's remark on the step.
+        Note of the solver on the step.
     """
 
     step: int
@@ -159,15 +159,15 @@ class ContactSolution:
     Parameters
     ----------
     state : ContactState
-        Displacements and tractions; NaN if the solve ended before there was a state.
+        Displacements and tractions; NaN if the solve ended before the first state.
     status : Status
     certificate : Certificate
-        Of `state`.
+        Certificate of `state`.
     node_status : (n_contact,) array of `NodeStatus` values
     steps, linear_solves : int
-        Steps of the solver, and linear systems solved in all of them and at the start.
+        Steps of the solver, and all linear systems including those at the start.
     message : str
-        One sentence on how the solve ended.
+        A sentence on the outcome.
     history : tuple of StepRecord
     """
 
@@ -187,7 +187,7 @@ class ContactSolution:
 
 
 class ContactFailure(NoResultError):  # noqa: N818 - an outcome of the mathematics, not an error of the program
-    """A solve ended without a certified solution; `solution` holds what it reached."""
+    """A solve ended without a certified solution; `solution` is its last result."""
 
     def __init__(self, solution: ContactSolution) -> None:
         super().__init__(f"{solution.status.name}: {solution.message}")
@@ -212,20 +212,20 @@ def solve(
     problem : ContactProblem
     solver : ContactSolver
     start : ContactState, optional
-        Guess, in equilibrium or not. The cold start has every node in contact and sticking.
+        Initial guess, in equilibrium or not. In the cold start, the default, all nodes are closed and stick.
     max_steps : int, optional
-        By default what the solver allows.
+        By default that of the solver.
     tolerance : float
-        Bound on every entry of the certificate.
+        Bound of all entries of the certificate.
     throw : bool
-        Raise if the solve does not converge.
+        Whether to raise an error if the solve does not converge.
     callback : callable, optional
-        Receives each `StepRecord` as soon as it exists.
+        Called with each new `StepRecord`.
 
     Raises
     ------
     ContactFailure
-        If `throw` and the status is not CONVERGED; its `solution` is what would have been returned.
+        If `throw` and the status is not CONVERGED; its `solution` is the result.
     LawError
         If the friction law fails.
     ValueError
@@ -251,7 +251,7 @@ def check_rho(name: str, rho: float | None) -> None:
 def check_max_steps(max_steps: int) -> None:
     """Raise ValueError unless `max_steps` is positive."""
     if max_steps < 1:
-        raise InputError(f"max_steps = {max_steps}; allow at least one step")
+        raise InputError(f"max_steps = {max_steps}; give at least 1")
 
 
 @dataclass(frozen=True)
@@ -265,8 +265,8 @@ class _Run:
     callback: Callable[[StepRecord], None] | None
 
     def finish(self, start: ContactState | None) -> ContactSolution:
-        """Run the solver from a start until there is a status."""
-        # Overflow is not warned about: it ends in the status NOT_FINITE.
+        """Run the solver from a start to a status."""
+        # no warnings of overflow: it ends in the status NOT_FINITE
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
             try:
                 contact_free = self._contact_free_response()
@@ -296,7 +296,7 @@ class _Run:
                 status, words = Status.TOO_FAR, f"the travel is {travel:.1e} times the deformation"
                 iterate = replace(iterate, message=f"{words}; {iterate.message}".rstrip("; "))
             certificate = history[-1].certificate
-            # choose among the positions that contact leaves open, unless another contact forbids it
+            # choose among the positions that contact does not determine, unless another contact forbids it
             if status is Status.CONVERGED and sets.is_closed.any():
                 state = with_least_slip(self.problem, iterate.state, sets)
                 moved = certificate if state is iterate.state else certify(self.problem, state)
@@ -306,14 +306,14 @@ class _Run:
         return self._solution(iterate, status, sets, certificate, history)
 
     def _contact_free_response(self) -> FloatingResponse | None:
-        """Return the response without any contact, if there is one; it does not depend on the law."""
+        """Return the response without contact, if there is one; it does not depend on the law."""
         problem = self.problem
         return problem.for_all_laws(
             "contact_free", lambda: None if needs_contact(problem) else contact_free_response(problem.body)
         )
 
     def _first(self, start: ContactState | None, n_before: int) -> Iterate:
-        """Return the iterate of a start, its linear solves and those before it counted."""
+        """Return the first iterate, with all linear solves counted."""
         if start is None:
             state, linear_solves = self.problem.sticking_state, 1
         else:
@@ -324,8 +324,8 @@ class _Run:
     def _without_contact(self, iterate: Iterate, contact_free: FloatingResponse | None) -> Iterate:
         """Return the iterate without contact tractions, if the body needs none at its displacements.
 
-        Solvers only approach tractions that vanish, and where all vanish nothing shows that the rest is small. A body
-        that has moved far may be moved on by a little, out of the obstacle.
+        Solvers converge to zero tractions only approximately, and without other tractions there is no scale to compare
+        them with. A body that has moved far may be moved slightly further, out of the obstacle.
         """
         if contact_free is None or not iterate.state.is_finite:
             return iterate
@@ -352,7 +352,7 @@ class _Run:
         return record
 
     def _status(self, iterate: Iterate, history: list[StepRecord]) -> Status | None:
-        """Return the status with which the solve ends here, None if it goes on."""
+        """Return the status if the solve ends here, otherwise None."""
         if not iterate.state.is_finite:
             return Status.NOT_FINITE
         if history[-1].certificate.is_below(self.tolerance):
@@ -394,7 +394,7 @@ class _Run:
 
 
 def _relative_change(state: ContactState, previous: ContactState) -> float:
-    """Return how far the displacements have moved, relative to their size."""
-    size = float(np.abs(state.displacement).max())
+    """Return the largest change of displacements, relative to the largest displacement."""
+    largest = float(np.abs(state.displacement).max())
     change = float(np.abs(state.displacement - previous.displacement).max())
-    return change / size if size > 0.0 else float(change > 0.0)
+    return change / largest if largest > 0.0 else float(change > 0.0)

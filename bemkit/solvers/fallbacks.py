@@ -1,4 +1,4 @@
-"""Solvers in turn: a solver composed of solvers, and the default of scenes."""
+"""A sequence of solvers as one solver, the default of scenes."""
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
@@ -20,13 +20,13 @@ class FallbackIterate(Iterate):
     Parameters
     ----------
     index : int
-        Of the solver at work.
+        Index of the present solver.
     inner : Iterate
-        Of that solver.
+        Iterate of that solver.
     n_steps : int
-        Its steps so far.
+        Its number of steps so far.
     reasons : tuple of str
-        Why those solvers have ended.
+        Reasons why previous solvers ended.
     """
 
     index: int
@@ -37,18 +37,18 @@ class FallbackIterate(Iterate):
 
 @dataclass(frozen=True)
 class Fallbacks:
-    """Solvers in turn, each from the last state of the one before.
+    """A sequence of solvers, each of which starts from the last state of the previous one.
 
     Parameters
     ----------
     drivers : tuple of ContactSolver
-        By default Newton's method, which suffices nearly always; springs, for many loose bodies; the path of solutions
-        from the statuses reached; and the whole path.
+        By default Newton's method, which is nearly always sufficient; springs, for many loose bodies; the path of
+        solutions from the present statuses; and the whole path.
 
     Notes
     -----
-    A solver that cannot help ends in `init`, and the next one begins. Nothing follows where contact and friction are
-    satisfied, because only solvers of other responses could improve the rest of the certificate.
+    A solver that does not apply ends in `init`, and the next one begins. If contact and friction are fulfilled, no
+    other solver is tried, because only more accurate responses could improve the certificate.
 
     Examples
     --------
@@ -70,7 +70,7 @@ class Fallbacks:
 
     @property
     def max_steps(self) -> int:
-        """Steps of all solvers."""
+        """Sum over all solvers."""
         return sum(driver.max_steps for driver in self.drivers)
 
     def without_whole_path(self) -> "Fallbacks":
@@ -78,7 +78,7 @@ class Fallbacks:
         return self._without(lambda driver: isinstance(driver, SolutionPath) and driver.from_start)
 
     def without_new_starts(self) -> "Fallbacks":
-        """Return the solvers that go on from a given state, without those that begin with all nodes sticking."""
+        """Return the solvers that continue from a given state, without those that begin with all nodes sticking."""
         return self.without_whole_path()._without(lambda driver: isinstance(driver, Springs))
 
     def _without(self, is_excluded: Callable[[ContactSolver], bool]) -> "Fallbacks":
@@ -86,17 +86,17 @@ class Fallbacks:
         return Fallbacks(others) if others else self
 
     def init(self, problem: ContactProblem, start: ContactState) -> FallbackIterate:
-        """Begin with the first solver that can help."""
+        """Begin with the first solver that applies."""
         return self._begun(problem, FallbackIterate(state=start, index=-1, inner=Iterate(state=start)))
 
     def step(self, problem: ContactProblem, iterate: Iterate) -> FallbackIterate:
-        """Take a step of the solver at work; hand on to the next one if it ends."""
+        """Take a step of the present solver; begin the next solver if it ends."""
         if not isinstance(iterate, FallbackIterate):
             raise TypeError(f"iterate is a {type(iterate).__name__}; give a result of init or step of this solver")
         driver, n_steps = self.drivers[iterate.index], iterate.n_steps + 1
         inner = driver.step(problem, iterate.inner)
         if inner.ended is None and n_steps >= driver.max_steps:
-            inner = replace(inner, ended=Status.STALLED, message=f"{n_steps} steps have not led to a solution")
+            inner = replace(inner, ended=Status.STALLED, message=f"no solution after {n_steps} steps")
         following = replace(
             iterate,
             state=inner.state,
@@ -111,7 +111,7 @@ class Fallbacks:
         return self._begun(problem, replace(following, reasons=(*iterate.reasons, self._reason(iterate.index, inner))))
 
     def _begun(self, problem: ContactProblem, iterate: FallbackIterate) -> FallbackIterate:
-        """Return the iterate at the first of the next solvers that can help; the given one, ended, if none can."""
+        """Return the first iterate of the next solver that applies, or the given one, ended, if there is none."""
         ended, reasons = iterate.ended, iterate.reasons
         for index in range(iterate.index + 1, len(self.drivers)):
             inner = self.drivers[index].init(problem, iterate.state)
@@ -130,7 +130,7 @@ class Fallbacks:
 
 
 def drivers_at_work(solver: ContactSolver, messages: Iterable[str]) -> tuple[ContactSolver, ...]:
-    """Return the solvers that have taken part in a solve, by the messages of its history; without any the first one."""
+    """Return the solvers that took part in a solve, from the messages of its history; by default the first one."""
     if not isinstance(solver, Fallbacks):
         return (solver,)
     words = "; ".join(messages)
@@ -142,6 +142,6 @@ def _begins(driver: ContactSolver) -> str:
 
 
 def _is_satisfied(problem: ContactProblem, state: ContactState) -> bool:
-    """Whether contact and friction hold to round-off, so that what is wrong is no matter of solvers."""
+    """Whether contact and friction are fulfilled to round-off, so that no other solver can improve the state."""
     rho = problem.body.stiffness_scale
     return merit(problem, ProjectionEquations(problem, rho, rho).evaluate(state)) <= negligible(problem.body)

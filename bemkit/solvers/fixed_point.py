@@ -12,7 +12,7 @@ from bemkit.solvers.progress import OuterIterate
 
 @dataclass(frozen=True)
 class FixedPoint:
-    """Solve Tresca problems whose bound comes from the normal tractions of the last one.
+    """Solve Tresca problems, each with the bound from the normal tractions of the last one.
 
     Parameters
     ----------
@@ -21,11 +21,11 @@ class FixedPoint:
     inner_tolerance : float
         Certificate of the inner solutions; at least a thousand times the accuracy of the body.
     max_steps : int
-        Outer steps allowed.
+        Largest number of outer steps.
 
     Notes
     -----
-    The iteration of the classical proof of existence [NecasJarusekHaslinger1980]; also the limit of
+    This is the iteration of the classical proof of existence [NecasJarusekHaslinger1980], and the limit of
     `AugmentedLagrangian` for large rho. It converges for moderate friction only; otherwise it ends with CYCLING or
     STALLED.
     """
@@ -40,7 +40,7 @@ class FixedPoint:
             raise InputError(f"inner_tolerance = {self.inner_tolerance}; give a number between 0 and 1")
 
     def init(self, problem: ContactProblem, start: ContactState) -> OuterIterate:
-        """Take the bound from the normal tractions of the start."""
+        """Compute the bound from the normal tractions of the start."""
         return OuterIterate.begun(problem, start)
 
     def step(self, problem: ContactProblem, iterate: Iterate) -> OuterIterate:

@@ -1,15 +1,15 @@
 """Lemke's complementary pivoting on a body: follow exact solutions while an artificial load decreases to zero.
 
-With enough extra pressure and friction at the contact nodes every node is closed and sticks. These extras are the
-covering vector times the artificial variable. Between two changes of a node's status the response is linear in the
-artificial variable. So the path from there to the problem itself consists of straight segments: at each pivot one node
-changes its status, and the artificial variable goes on falling, or rises for a while where the path folds. A segment
-without end is a ray; then the path leads to no solution. At folds Newton's method and plain continuation fail; this
-method does not. It is [Lemke1965] with the responses of a body in place of a tableau.
+With sufficient additional pressure and friction every contact node is closed and sticks. The additions are the covering
+vector times the artificial variable. Between two changes of status the response is linear in the artificial variable.
+So the path to the original problem consists of straight segments. At each pivot one node changes its status, and the
+artificial variable decreases, or increases where the path folds. A segment without end is a ray, which leads to no
+solution. Newton's method and continuation fail at folds; this method does not. It is Lemke's algorithm [Lemke1965] with
+responses of a body in place of a tableau.
 
-The path may also start with other statuses, such as those at which Newton's method gives up. Then the covering vector
-has entries (of pressure, friction, gap or slip) only at nodes that violate an inequality. These are few, and the path
-is short.
+The path may also start with other statuses, such as the last ones of Newton's method. Then the covering vector has
+entries (of pressure, friction, gap or slip) only at nodes that violate an inequality. These are few, and the path is
+short.
 """
 
 from dataclasses import dataclass
@@ -25,7 +25,7 @@ from bemkit.solvers.active_sets import ActiveSets
 
 
 class _Inequality(IntEnum):
-    """The inequality that a node has to keep, by the segment it is on."""
+    """The inequality of a node, depending on its status."""
 
     PRESSURE = 0  # closed: -sigma_n >= 0
     CLEARANCE = 1  # open: g - u_n >= 0
@@ -36,7 +36,7 @@ class _Inequality(IntEnum):
 
 @dataclass(frozen=True, eq=False)
 class AffineBound:
-    """Friction bound ``slope * sigma_n + intercept``; exact for Coulomb and Tresca, a tangent for other laws.
+    """Friction bound ``slope * sigma_n + intercept``: exact for Coulomb and Tresca, a tangent for other laws.
 
     Parameters
     ----------
@@ -49,14 +49,14 @@ class AffineBound:
 
     @classmethod
     def tangent(cls, problem: ContactProblem, sigma_n: FloatArray) -> "AffineBound":
-        """Return the tangent of the problem's law at the given normal tractions (tension is read as zero)."""
+        """Return the tangent of the law at given normal tractions; tension counts as zero."""
         sigma_n = np.minimum(sigma_n, 0.0)
         slope = problem.friction_slope(sigma_n)
         return cls(slope, problem.friction_bound(sigma_n) - slope * sigma_n)
 
 
 class PathEnd(NamedTuple):
-    """Outcome of `follow_path`; `state` is None if the path does not lead to a solution, for the reason given."""
+    """Result of `follow_path`; `state` is None, with a reason, if the path leads to no solution."""
 
     state: ContactState | None
     linear_solves: int
@@ -69,7 +69,7 @@ class _Segment(NamedTuple):
 
     origin: ContactState
     rate: ContactState
-    is_kept: BoolArray  # (5, n_contact): which inequalities matter
+    is_kept: BoolArray  # (5, n_contact): inequalities that apply
     slack: FloatArray  # (5, n_contact) at the origin
     slack_rate: FloatArray  # (5, n_contact)
 
@@ -77,8 +77,8 @@ class _Segment(NamedTuple):
 def why_no_path(problem: ContactProblem, *, is_short: bool = False) -> str:
     """Return why the path of solutions cannot be followed; empty if it can.
 
-    Unless it is short it takes two responses or more for each contact node. The friction bound has to be continuous
-    where nodes open.
+    A long path takes at least two responses for each contact node. The friction bound must be continuous where nodes
+    open.
     """
     if problem.body.responses_are_expensive and not is_short:
         return "the path of solutions is not followed, because responses of this body are costly"
@@ -96,18 +96,18 @@ def follow_path(
     Parameters
     ----------
     problem : ContactProblem
-        Its law is replaced by `bound`.
+        Problem whose law is replaced by `bound`.
     bound : AffineBound
     start : ActiveSets, optional
         By default all nodes are closed and stick; that path leads to a solution if the body is held. From statuses near
         those of a solution the path is short, but may end on a ray.
     max_segments : int, optional
-        By default ``20 n_contact + 100``; about 1.5 segments a node are usual.
+        By default ``20 n_contact + 100``; about 1.5 segments for each node are usual.
 
     Returns
     -------
     PathEnd
-        Two linear solves a segment. Tractions and displacements are exact up to round-off.
+        The solution, exact up to round-off. Each segment takes two linear solves.
     """
     try:
         path, is_closed, direction, n_solves = _start_of_path(problem, bound, start)
@@ -121,13 +121,13 @@ def follow_path(
 def _start_of_path(
     problem: ContactProblem, bound: AffineBound, start: ActiveSets | None
 ) -> tuple["_Path", BoolArray, IntArray, int]:
-    """Return a path, its first statuses (closed, direction of slip), and the linear solves spent on finding them."""
+    """Return a path, its first statuses (closed, direction of slip), and the linear solves that they took."""
     if start is None:
         at_rest = np.zeros(problem.n_contact, dtype=np.intp)
         return _Path(problem, bound, CoveringVector.everywhere(problem)), np.isfinite(problem.gap), at_rest, 0
     path = _Path(problem, bound, CoveringVector.zero(problem))
     is_closed, n_solves = start.is_closed, 0
-    while True:  # open nodes that slip under tension: extra pressure there would change the friction
+    while True:  # open nodes that slip under tension, because additional pressure would change their friction
         segment = path.segment(is_closed, start.direction)
         n_solves += 2
         is_pulled = is_closed & (start.direction != 0) & (segment.slack[_Inequality.PRESSURE] < 0.0)
@@ -140,10 +140,10 @@ def _start_of_path(
 def _follow_segments(
     path: "_Path", is_closed: BoolArray, direction: IntArray, limit: int
 ) -> tuple[ContactState | None, int, str]:
-    """Return the end of a path (None if it leads to no solution), the number of its segments, and the reason."""
+    """Return the end of a path (None if it leads to no solution), its number of segments, and the reason."""
     artificial, sign, entering = np.inf, -1.0, None
     for n_segments in range(1, limit + 1):
-        # Respond to the statuses, at two values of the artificial variable.
+        # responses to the statuses at two values of the artificial variable
         try:
             segment = path.segment(is_closed, direction)
         except SingularResponse as error:
@@ -161,9 +161,9 @@ def _follow_segments(
         if sign == 0.0 or not np.isfinite(step):
             return None, n_segments, "the path ends on a ray"
         artificial += sign * step
-        # Pivot: the node changes its status.
+        # pivot: the node changes its status
         if inequality is _Inequality.CLEARANCE and path.is_free(is_closed)[node]:
-            direction = direction.copy()  # friction sets in against the slip that the open node has come to
+            direction = direction.copy()  # friction begins against the present slip of the open node
             direction[node] = 1 if path.slip(segment, artificial)[node] > 0.0 else -1
         is_closed, direction, entering = _pivoted(is_closed, direction, inequality, node)
     return None, limit, f"the path has more than {limit} segments"
@@ -188,7 +188,7 @@ class CoveringVector:
 
     @classmethod
     def everywhere(cls, problem: ContactProblem) -> "CoveringVector":
-        """Return pressure and friction at all nodes: with enough of it every node touches and sticks."""
+        """Return pressure and friction at all nodes, which close every node and make it stick."""
         stress = float(np.abs(problem.sticking_state.traction).max()) or 1.0
         extras, none = stress * _uneven(2 * problem.n_contact), np.zeros(problem.n_contact)
         return cls(extras[::2], extras[1::2], none, none)
@@ -201,9 +201,9 @@ class CoveringVector:
 
     @classmethod
     def of_violations(cls, segment: "_Segment", bound: AffineBound, direction: IntArray) -> "CoveringVector":
-        """Return the additions that make all inequalities of a segment hold and do not change its response.
+        """Return additions with which all inequalities of a segment hold and its response does not change.
 
-        Needs a segment in which no slipping node is under tension: extra pressure there would change the friction.
+        No slipping node may be under tension, because additional pressure would change its friction.
         """
         missing = np.where(segment.is_kept, np.maximum(-segment.slack, 0.0), 0.0)
         missing *= _uneven(missing.size).reshape(missing.shape)
@@ -214,7 +214,7 @@ class CoveringVector:
 
 
 def _uneven(count: int) -> FloatArray:
-    """Return numbers from 1 to 3/2, all different, so that nodes of symmetric problems do not change at once."""
+    """Return different numbers from 1 to 3/2, so that nodes of symmetric problems change one after the other."""
     return 1.0 + 0.5 * spread_fractions(count)
 
 
@@ -227,26 +227,26 @@ class _Path:
         self.cover = cover
 
     def is_free(self, is_closed: BoolArray) -> BoolArray:
-        """Return (n_contact,) bool: nodes that nothing resists along the tangent, for any artificial variable."""
+        """Return a mask (n_contact,) of frictionless nodes, for any artificial variable."""
         has_bound = (self.bound.intercept != 0.0) | (is_closed & (self.bound.slope != 0.0))
         return np.asarray(~has_bound & (self.cover.friction == 0.0))
 
     def slip(self, segment: _Segment, artificial: float) -> FloatArray:
-        """Return the slip (n_contact,) at a value of the artificial variable [m]."""
+        """Return the slip (n_contact,) [m] at a value of the artificial variable."""
         u_t = segment.origin.u_t + artificial * segment.rate.u_t
         return np.asarray(u_t - self.problem.slip_origin - artificial * self.cover.slip)
 
     def segment(self, is_closed: BoolArray, direction: IntArray) -> _Segment:
-        """Respond to fixed statuses, for an artificial variable of zero and of one."""
+        """Return the responses to fixed statuses for the artificial variables zero and one."""
         problem, bound = self.problem, self.bound
         is_free = self.is_free(is_closed)
         slips = (direction != 0) | is_free
-        sticks = ~slips & ~problem.body.tangent_follows  # others follow, with no inequality of their own
-        held = stick(problem.gap, problem.slip_origin)
+        sticks = ~slips & ~problem.body.tangent_follows  # tangents that follow have no inequality
+        sticking = stick(problem.gap, problem.slip_origin)
         sliding = slip(problem.gap, direction.astype(float), bound.slope, bound.intercept)
-        conditions = of_statuses(is_closed, slips, held, sliding)
+        conditions = of_statuses(is_closed, slips, sticking, sliding)
 
-        # The body carries contact traction plus extra pressure; the conditions are on contact tractions only.
+        # the body carries contact tractions and additional pressure; conditions are on contact tractions only
         cover = self.cover
         extra_value = conditions.on_traction[:, :, 0] * cover.pressure[:, None]
         extra_value[:, 1] -= direction * cover.friction
@@ -258,7 +258,7 @@ class _Path:
         traction_rate[:, 0] -= cover.pressure
         rate = ContactState(shifted.displacement - origin.displacement, traction_rate)
 
-        # The slacks of all five inequalities, and their rates; `is_kept` says which of them hold where.
+        # slacks of all five inequalities and their rates; `is_kept` marks those that apply
         origin_slip = origin.u_t - problem.slip_origin
         limit = bound.slope * origin.sigma_n + bound.intercept
         limit_rate = bound.slope * rate.sigma_n + cover.friction
@@ -282,7 +282,7 @@ def _first_artificial(segment: _Segment) -> float:
 
 
 def _leaving(segment: _Segment, artificial: float, sign: float) -> tuple[float, _Inequality, int]:
-    """Return by how much the artificial variable changes on the segment, and the inequality and node that end it."""
+    """Return the change of the artificial variable on the segment, and the inequality and node that end it."""
     rate = sign * segment.slack_rate
     ends = segment.is_kept & (rate < 0.0)
     ratio = np.full(rate.shape, np.inf)
@@ -295,7 +295,7 @@ def _leaving(segment: _Segment, artificial: float, sign: float) -> tuple[float, 
 def _pivoted(
     is_closed: BoolArray, direction: IntArray, leaving: _Inequality, node: int
 ) -> tuple[BoolArray, IntArray, tuple[_Inequality, int]]:
-    """Return the statuses after a pivot, and the inequality that enters in place of the one that leaves."""
+    """Return the statuses after a pivot, and the inequality that enters."""
     is_closed, direction = is_closed.copy(), direction.copy()
     if leaving in (_Inequality.PRESSURE, _Inequality.CLEARANCE):
         is_closed[node] = not is_closed[node]

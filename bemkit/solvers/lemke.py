@@ -1,7 +1,7 @@
 """Lemke's algorithm on the linear complementarity problem of Coulomb friction: an independent check of the solvers.
 
-It shares no equation with them: no projections, no rho, no active sets, no Newton matrix. It pivots in a tableau made
-of the compliance of the body, and is meant for small problems.
+It uses no projections, rho, active sets or Newton matrix. It pivots in a tableau of the compliance of the body and is
+intended for small problems.
 """
 
 from dataclasses import dataclass, replace
@@ -16,11 +16,11 @@ from bemkit.solvers.base import Iterate, Status, check_max_steps
 from bemkit.solvers.newton import spring_stiffness
 
 _RELATIVE_STIFFNESS = 1e-2
-"""Stiffness of the springs on free rigid motions, relative to that of the other solvers. With weaker springs a body
-slides far in few steps; the result loses as many digits as they are weaker."""
+"""Stiffness of springs on free rigid motions, relative to that of the other solvers. Weaker springs let a body slide
+far in few steps, but cost digits."""
 
 _ROUND_OFF = 1e-11
-"""Tableau entries smaller than this, relative to the largest of their column, are round-off of eliminations."""
+"""Largest tableau entry, relative to the largest of its column, that is round-off of eliminations."""
 
 
 @dataclass(frozen=True)
@@ -30,21 +30,21 @@ class LemkePivoting:
     Parameters
     ----------
     max_steps : int
-        Steps allowed. One suffices for a held body; a body with free rigid motions takes a few.
+        Largest number of steps. A held body takes one step, a body with free rigid motions a few.
 
     Notes
     -----
-    With pressing force p, friction forces against backward and forward slip b, f and the size of the slip l, all not
-    negative, the problem reads (Stewart and Trinkle)
+    The unknowns are the pressing force p, the friction forces b and f against backward and forward slip, and the
+    magnitude of slip l, all non-negative. The problem is (Stewart and Trinkle)
 
         0 <= g - u_n          complementary to p,
         0 <= l + slip         complementary to b,
         0 <= l - slip         complementary to f,
         0 <= c + s p - b - f  complementary to l,
 
-    where ``u = compliance (load + F)`` and the nodal forces are ``F = (-p, b - f)``. The matrix is copositive for
-    every friction coefficient, so Lemke's algorithm ends with a solution if the body is held. Laws must be affine in
-    the pressure.
+    where ``u = compliance (load + F)`` with the nodal forces ``F = (-p, b - f)``. The matrix is copositive for every
+    friction coefficient, so Lemke's algorithm finds a solution if the body is held. Laws must be affine in the
+    pressure.
 
     References
     ----------
@@ -57,7 +57,7 @@ class LemkePivoting:
         check_max_steps(self.max_steps)
 
     def init(self, problem: ContactProblem, start: ContactState) -> Iterate:
-        """Keep the start, which matters for free rigid motions only.
+        """Store the start, which matters only for free rigid motions.
 
         Raises
         ------
@@ -68,7 +68,7 @@ class LemkePivoting:
         return Iterate(state=start)
 
     def step(self, problem: ContactProblem, iterate: Iterate) -> Iterate:
-        """Pivot from the origin to a solution; the body is asked for two responses for each contact node."""
+        """Pivot from the origin to a solution; it takes two responses for each contact node."""
         if problem.body.responses_are_expensive:
             return replace(iterate, ended=Status.TOO_COSTLY)
         stiffness, load, linear_solves = _probed(problem)
@@ -90,7 +90,7 @@ class LemkePivoting:
         pressed, backward, forward, _ = unit_force * unknowns.reshape(4, -1)
         force = np.stack([-pressed, backward - forward], axis=1)
         displacement = free + compliance @ force.ravel()
-        # one step of iterative refinement: the inverse loses as many digits as the springs are weak
+        # one step of iterative refinement, because weak springs cost digits of the inverse
         residual = load + spring_load + force.ravel() - (stiffness + springs) @ displacement
         displacement = (displacement + compliance @ residual).reshape(-1, 2)
         displacement = problem.respond(stick(*displacement.T)).displacement  # with the tangents that follow
@@ -118,7 +118,7 @@ def lemke(matrix: FloatArray, vector: FloatArray, max_pivots: int | None = None)
     limit = 50 * n if max_pivots is None else max_pivots
     if vector.min() >= 0.0:
         return np.zeros(n), 0
-    # Columns: w (n), z (n), covering variable, right-hand side. The cover is uneven, against ties.
+    # columns: w (n), z (n), artificial variable, right-hand side; the covering vector is uneven to avoid ties
     cover = 1.0 + 0.5 * spread_fractions(n)
     tableau = np.hstack([np.eye(n), -matrix, -cover[:, None], vector[:, None]])
     basis = np.arange(n)
@@ -186,9 +186,9 @@ def _affine_bound(problem: ContactProblem) -> tuple[FloatArray, FloatArray]:
 
 
 def _probed(problem: ContactProblem) -> tuple[FloatArray, FloatArray, int]:
-    """Return stiffness and load of any body, from its responses to unit displacements, and the solves spent.
+    """Return stiffness and load of a body from its responses to unit displacements, and the linear solves.
 
-    Free tangents, which no force ever moves here, become springs of their own.
+    Tangents that follow, on which no force acts, get separate springs.
     """
     body, n_contact = problem.body, problem.n_contact
     weights = np.repeat(body.weights, 2)
@@ -197,17 +197,17 @@ def _probed(problem: ContactProblem) -> tuple[FloatArray, FloatArray, int]:
     at_rest = problem.respond(stick(none, none)).traction.ravel()
     stiffness = np.empty((2 * n_contact, 2 * n_contact))
     for column, unit in enumerate(amount * np.eye(2 * n_contact)):
-        moved = problem.respond(stick(unit[0::2], unit[1::2])).traction.ravel()
-        stiffness[:, column] = weights * (moved - at_rest) / amount
+        response = problem.respond(stick(unit[0::2], unit[1::2])).traction.ravel()
+        stiffness[:, column] = weights * (response - at_rest) / amount
     idle = 2 * np.flatnonzero(body.tangent_follows) + 1
     stiffness[idle, idle] = weights[idle] * body.stiffness_scale
     return stiffness, -weights * at_rest, 2 * n_contact + 1
 
 
 def _springs(problem: ContactProblem, state: ContactState) -> tuple[FloatArray, FloatArray]:
-    """Return stiffness and load of springs on the free rigid motions, without force at the given state.
+    """Return stiffness and load of springs on the free rigid motions, with zero force at the given state.
 
-    They are carried along from step to step and vanish from the solution.
+    The springs move with the body from step to step, and their forces vanish in the solution.
     """
     n_unknowns = 2 * problem.n_contact
     motions = as_dense(problem.body.rigid_motions(), problem.n_contact)
@@ -226,8 +226,8 @@ def _complementarity(
 ) -> tuple[FloatArray, FloatArray, float]:
     """Return matrix and vector for nodal forces in units of the returned force.
 
-    The slips come in the unit of length which that force causes; so the off-diagonal blocks cancel in the quadratic
-    form, and the matrix is copositive.
+    The unit of slip is the displacement by that force. So the off-diagonal blocks cancel in the quadratic form, and the
+    matrix is copositive.
     """
     cohesion, coefficient = _affine_bound(problem)
     normal, tangential = slice(0, None, 2), slice(1, None, 2)

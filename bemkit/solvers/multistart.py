@@ -1,4 +1,4 @@
-"""Look for several solutions of one problem."""
+"""Search for several solutions of one problem."""
 
 from collections.abc import Sequence
 
@@ -20,22 +20,22 @@ def probe(
 ) -> tuple[ContactSolution, ...]:
     """Solve from several starts and return the distinct certified solutions.
 
-    With Coulomb friction a problem may have several solutions; the start chooses among them.
+    With Coulomb friction a problem may have several solutions; the start selects one of them.
 
     Parameters
     ----------
     problem : ContactProblem
     solver : ContactSolver
     n_starts : int
-        Number of starts that are made: all nodes sticking, open, slipping forward, slipping backward, then random
-        choices with a fixed seed.
+        Number of generated starts: all nodes sticking, open, slipping forward, slipping backward, then random statuses
+        with a fixed seed.
     starts : sequence of ContactState
-        Further starts, tried first.
+        Further starts, used first.
 
     Returns
     -------
     tuple of ContactSolution
-        In the order found; empty if no start leads to a solution. One entry does not prove uniqueness.
+        Empty if no start leads to a solution. A single solution is no proof of uniqueness.
 
     Raises
     ------
@@ -57,7 +57,7 @@ def probe(
 
 
 def start_with(problem: ContactProblem, node_status: Sequence[int] | IntArray) -> ContactState:
-    """Return a guess whose nodes have the given statuses, to start a solve on a chosen branch.
+    """Return an initial guess with given node statuses, to select a branch of solutions.
 
     Parameters
     ----------
@@ -67,7 +67,7 @@ def start_with(problem: ContactProblem, node_status: Sequence[int] | IntArray) -
     Returns
     -------
     ContactState
-        Not in equilibrium; `solve` takes its statuses only.
+        Not in equilibrium; `solve` uses its statuses only.
     """
     status = np.asarray(node_status)
     scales = Scales.of(problem, problem.sticking_state)

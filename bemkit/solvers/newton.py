@@ -1,7 +1,7 @@
-"""Newton steps on the projection equations, shared by all solvers; and how to respond where they leave the body free.
+"""Newton steps on the projection equations, and responses of bodies that the active sets do not hold.
 
-Active sets on the way to a solution may leave rigid motions of a body free. If the forces on it balance, it stays where
-it is along them (`floating_response`); otherwise weak springs hold it during the step (`respond`).
+Intermediate active sets may not hold rigid motions of a body. If its forces are in equilibrium, it keeps its position
+(`floating_response`); otherwise weak springs hold it in that step (`respond`).
 """
 
 from dataclasses import dataclass
@@ -33,21 +33,21 @@ WEAKEST_AFTER = 8
 small force then soon carries the body to where other sets hold it."""
 
 _BEYOND = 1.01
-"""Factor of the way of a body to where the next node closes. A little beyond it the node counts as closed although
-springs pull it back, and no other node does."""
+"""Step of a body relative to the step at which the next node closes. Slightly beyond it this node counts as closed,
+although springs pull it back, and no other node does."""
 
 _NEGLIGIBLE = 100.0
-"""Residuals and imbalances below this many times the accuracy of a body are round-off: 1e-12 for a direct solver, since
-a load of 1e-10 may still carry a body to an obstacle, although a certificate asks for 1e-9."""
+"""Largest residual or imbalance, relative to the accuracy of a body, that is round-off: 1e-12 for a direct solver. A
+load of 1e-10 may still move a body to an obstacle, although certificates require 1e-9."""
 
 _NO_SLIP = 1e-12
-"""Squared size of slips, relative to the largest, below which a rigid motion makes no slip."""
+"""Squared slip, relative to the largest one, below which a rigid motion causes no slip."""
 
 _INFEASIBLE = 1e-12
-"""Residual of a least-squares problem below which no motion takes all nodes out of the obstacle."""
+"""Residual of a least-squares problem below which no motion moves all nodes out of the obstacle."""
 
 _MOST_PINNED = 60
-"""Largest number of free motions for which reactions are computed; of more motions springs hold the body."""
+"""Largest number of free motions for which reactions are computed; with more motions springs hold the body."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,9 +58,9 @@ class Response:
     ----------
     state : ContactState
     linear_solves : int
-        Linear systems solved for it.
+        Number of linear systems solved.
     is_regularised : bool
-        Whether the conditions left the body free to move, so that springs had to hold it in this step.
+        Whether springs held the body in this step.
     """
 
     state: ContactState
@@ -71,22 +71,22 @@ class Response:
 def respond(equations: ProjectionEquations, residual: Residual, sets: ActiveSets, n_regularised: int = 0) -> Response:
     """Solve the equations linearised at a residual, for the given sets.
 
-    If the sets do not hold the body, it stays as near to its present displacements as they allow: without springs if
-    the forces on it balance, otherwise held by weak springs during this step.
+    A body that the sets do not hold moves to the nearest admissible position if its forces are in equilibrium;
+    otherwise weak springs hold it in this step.
 
     Parameters
     ----------
     equations : ProjectionEquations
     residual : Residual
-        Where the equations are linearised.
+        Residual at which the equations are linearised.
     sets : ActiveSets
     n_regularised : int
-        Steps with springs and with these same sets before this one; the springs are weaker for each.
+        Number of previous steps with springs and equal sets; each makes the springs weaker.
 
     Raises
     ------
     SingularResponse
-        If even springs at all free nodes do not hold the body.
+        If springs at all free nodes do not hold the body.
     """
     body = equations.problem.body
     linear = equations.linearised(residual, sets)
@@ -103,7 +103,7 @@ def respond(equations: ProjectionEquations, residual: Residual, sets: ActiveSets
 
 
 def spring_stiffness(problem: ContactProblem, state: ContactState) -> float:
-    """Return the stiffness of springs [Pa/m] so weak that the body reaches a far obstacle in about one step."""
+    """Return a spring stiffness [Pa/m] with which the body reaches a far obstacle in about one step."""
     stress = Scales.of(problem, state).stress
     nearest = float(np.min(problem.gap - state.u_n))
     stiffness = problem.body.stiffness_scale
@@ -113,21 +113,21 @@ def spring_stiffness(problem: ContactProblem, state: ContactState) -> float:
 
 
 def carried_on(problem: ContactProblem, before: ContactState, after: ContactState) -> ContactState:
-    """Return a state in which springs hold a body, moved on in the direction of the step until the next node closes.
+    """Move a state that springs hold further in the direction of the step until the next node closes.
 
-    A force so small that it hardly moves the body against the springs, such as that on a disc that rests on a single
-    node a little out of balance, would need ever weaker springs, until these no longer hold the body.
+    A small force, such as that on a disc on a single node slightly out of equilibrium, hardly moves the body against
+    the springs; weaker and weaker springs would finally not hold it.
 
     Parameters
     ----------
     problem : ContactProblem
     before, after : ContactState
-        At the beginning and at the end of the step.
+        States at the beginning and the end of the step.
 
     Returns
     -------
     ContactState
-        `after` itself if no node closes.
+        `after` if no node closes.
     """
     step, clearance = after.displacement - before.displacement, problem.gap - after.u_n
     closes = (clearance > 0.0) & (step[:, 0] > 0.0)
@@ -146,17 +146,17 @@ def merit(problem: ContactProblem, residual: Residual) -> float:
 
 
 def consistent_state(problem: ContactProblem, guess: ContactState) -> tuple[ContactState, int]:
-    """Return the response of the body to the sets of a guessed state, and the linear solves spent.
+    """Return the response of the body to the sets of a guessed state, and the linear solves.
 
-    Solvers start from states in equilibrium; a guess need not be one. Where a problem has several solutions the guess
-    chooses among them.
+    Solvers start from states in equilibrium; a guess need not be in equilibrium. If a problem has several solutions,
+    the guess selects one of them.
 
     Raises
     ------
     ValueError
-        If the guess has another number of nodes or entries that are not finite.
+        If the guess has another number of nodes, or entries that are not finite.
     SingularResponse
-        If the sets do not hold the body in any way.
+        If the body has no response even with springs.
     """
     if len(guess.displacement) != problem.n_contact:
         raise InputError(f"start has {len(guess.displacement)} nodes; the problem has {problem.n_contact}")
@@ -170,20 +170,20 @@ def consistent_state(problem: ContactProblem, guess: ContactState) -> tuple[Cont
 
 
 def negligible(body: LinearBody) -> float:
-    """Return the relative size below which a residual is due to the inaccuracy of the body's responses."""
+    """Return the relative residual that the accuracy of the responses permits."""
     return _NEGLIGIBLE * body.accuracy
 
 
 @dataclass(frozen=True, eq=False)
 class FloatingResponse:
-    """Responses of a body whose forces balance and whose position along its free motions is arbitrary.
+    """Responses of a body in equilibrium whose position along its free motions is arbitrary.
 
     Parameters
     ----------
     state : ContactState
         One of the responses; the others differ by free motions.
     free_motions : (n_free, n_contact, 2) array
-        Rigid motions that change no condition.
+        Rigid motions that no condition holds.
     """
 
     state: ContactState
@@ -197,7 +197,7 @@ class FloatingResponse:
         return ContactState(self.state.displacement + shift.reshape(-1, 2), self.state.traction)
 
     def nearest_clear(self, displacement: FloatArray, gap: FloatArray) -> ContactState:
-        """Return the nearest response, moved by the smallest free motion that takes all nodes out of the obstacle.
+        """Return the nearest response, moved by the smallest free motion that moves all nodes out of the obstacle.
 
         Parameters
         ----------
@@ -207,13 +207,13 @@ class FloatingResponse:
         Returns
         -------
         ContactState
-            Not moved if no free motion clears the obstacle, or if nodes lie deeper than 1e-3 of the displacement.
+            Not moved if no free motion clears the obstacle, or if the depth of a node exceeds 1e-3 of the displacement.
 
         Notes
         -----
-        The smallest c with ``M_n c >= u_n - gap``, M_n the normal components of orthonormal free motions, follows from
-        the residual of a non-negative least-squares problem [LawsonHanson1974], chapter 23. Nodes become constraints
-        one by one: each time the deepest.
+        Let M_n be the normal components of orthonormal free motions. The smallest c with ``M_n c >= u_n - gap`` follows
+        from the residual of a non-negative least-squares problem [LawsonHanson1974], chapter 23. Nodes are added as
+        constraints one by one, the deepest node first.
         """
         from scipy.optimize import nnls
 
@@ -233,20 +233,20 @@ class FloatingResponse:
 
 
 def contact_free_response(body: LinearBody) -> FloatingResponse | None:
-    """Return the response without any contact, if rigid motions of the body are free and the load does no work on them.
+    """Return the response without contact, if the body has free rigid motions and the load does no work on them.
 
-    The work that round-off of supports leaves does not count.
+    Work by round-off of supports does not count.
     """
     return floating_response(body, separated(body.n_contact))
 
 
 def floating_response(body: LinearBody, conditions: LinearConditions) -> FloatingResponse | None:
-    """Return the response under conditions that leave rigid motions free; None if none is, or forces do not balance.
+    """Return the response under conditions that do not hold all rigid motions.
 
-    As many displacements are pinned as there are motions, at conditions that prescribe tractions. The reactions of the
-    pins are then what is missing to the balance of forces. If they are round-off, the prescribed tractions replace
-    them, so that these are exact. Weak springs would leave a small traction at every node, and a condition such as
-    "friction only where something presses" would take it for contact.
+    None if all are held, or if the forces are not in equilibrium. At conditions on tractions, as many displacements are
+    pinned as there are free motions. The reactions of the pins are the residual of equilibrium; if they are round-off,
+    the prescribed tractions replace them and are exact. Weak springs instead would cause a small traction at every
+    node, which would count as contact.
     """
     free = _few(conditions.free_motions(body.rigid_motions()), body.n_contact)
     gives_traction = ~np.any(conditions.on_displacement != 0.0, axis=2)
@@ -260,7 +260,7 @@ def floating_response(body: LinearBody, conditions: LinearConditions) -> Floatin
     except SingularResponse:
         return None
     traction = response.traction.copy()
-    for row in (0, 1):  # the normal traction first: the friction of a slipping node follows from it
+    for row in (0, 1):  # first the normal traction, from which the friction of a slipping node follows
         nodes = np.flatnonzero(pins[:, row])
         factor, other_factor = conditions.on_traction[nodes, row, row], conditions.on_traction[nodes, row, 1 - row]
         traction[nodes, row] = (conditions.value[nodes, row] - other_factor * traction[nodes, 1 - row]) / factor
@@ -269,10 +269,10 @@ def floating_response(body: LinearBody, conditions: LinearConditions) -> Floatin
 
 
 def with_least_slip(problem: ContactProblem, state: ContactState, sets: ActiveSets) -> ContactState:
-    """Return a state moved along the rigid motions that its sets leave free, so that contact nodes slip least.
+    """Move a state along the rigid motions that its sets do not hold, to minimise the slip of contact nodes.
 
-    Contact does not determine, for instance, how far a disc turns in a hole without friction: responses leave it
-    wherever round-off has put it. The slip is least in the weighted mean square.
+    For instance, contact does not determine the rotation of a disc in a frictionless hole, and round-off would
+    determine it. The weighted mean square of the slip is minimised.
 
     Parameters
     ----------
@@ -280,7 +280,7 @@ def with_least_slip(problem: ContactProblem, state: ContactState, sets: ActiveSe
     state : ContactState
         A solution of the problem.
     sets : ActiveSets
-        Those of the state; see `contact_sets`.
+        Sets of the state; see `contact_sets`.
     """
     motions = problem.body.rigid_motions()
     if not motions.shape[0]:
@@ -290,7 +290,7 @@ def with_least_slip(problem: ContactProblem, state: ContactState, sets: ActiveSe
     free = as_rows(conditions.free_motions(motions))
     if not free.shape[0]:
         return state
-    # least squares by normal equations, which of many bodies are small: one unknown for each free motion
+    # least squares by normal equations, which have one unknown for each free motion
     tangential, weights = free[:, 1::2], problem.body.weights
     right_side = tangential @ (weights * (state.u_t - problem.slip_origin))
     weighted = tangential * weights if isinstance(tangential, np.ndarray) else tangential.multiply(weights).tocsr()
@@ -301,14 +301,14 @@ def with_least_slip(problem: ContactProblem, state: ContactState, sets: ActiveSe
 
 
 def _few(motions: RigidMotions, n_contact: int) -> FloatArray:
-    """Return motions as a dense array (n, n_contact, 2), none if there are too many to be pinned one by one."""
+    """Return motions as a dense array (n, n_contact, 2); none if there are too many to pin them."""
     return as_dense(
         motions if motions.shape[0] <= _MOST_PINNED or isinstance(motions, np.ndarray) else motions[:0], n_contact
     )
 
 
 def _choose_pins(free: FloatArray, allowed: BoolArray) -> BoolArray:
-    """Return (n_contact, 2) bool: as many of the allowed displacements as free motions, which determine the motions."""
+    """Return a mask (n_contact, 2) of allowed displacements that determine the free motions, one for each motion."""
     from scipy.linalg import qr
 
     candidates = np.flatnonzero(allowed)

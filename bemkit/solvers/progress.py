@@ -18,18 +18,18 @@ _PATIENCE = 60
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class OuterIterate(Iterate):
-    """Iterate of a solver whose steps depend only on the state, and each take several linear solves.
+    """Iterate of a solver whose steps depend only on the state and take several linear solves.
 
-    It ends with CYCLING if a state comes back, with STALLED if nothing improves.
+    It ends with CYCLING if a state recurs, and with STALLED without improvement.
 
     Parameters
     ----------
     earlier : tuple of ContactState
-        The states before this one, newest last.
+        Previous states, newest last.
     best : float
-        Smallest residual of (15), (16) so far, relative.
+        Smallest relative residual of (15), (16) so far.
     steps_since_best : int
-        Steps since that improved by a tenth.
+        Steps since the last improvement by a tenth.
     """
 
     earlier: tuple[ContactState, ...] = ()
@@ -42,7 +42,7 @@ class OuterIterate(Iterate):
         return cls(state=start, best=_residual(problem, start))
 
     def followed_by(self, problem: ContactProblem, state: ContactState, linear_solves: int) -> "OuterIterate":
-        """Return the iterate after one more outer step that has taken the given linear solves."""
+        """Return the iterate after another outer step with the given number of linear solves."""
         residual, accuracy = _residual(problem, state), problem.body.accuracy
         improved = residual < 0.9 * self.best
         since = 0 if improved else self.steps_since_best + 1
@@ -62,7 +62,7 @@ class OuterIterate(Iterate):
         )
 
     def failed_at(self, state: ContactState, linear_solves: int, message: str) -> "OuterIterate":
-        """Return the last iterate, after an inner solve that failed for the reason given in the message."""
+        """Return the last iterate after a failed inner solve; the message gives the reason."""
         total = self.linear_solves + linear_solves
         return replace(self, state=state, linear_solves=total, ended=Status.INNER_FAILED, message=message)
 
@@ -73,7 +73,7 @@ def _residual(problem: ContactProblem, state: ContactState) -> float:
 
 
 def _is_same(state: ContactState, other: ContactState, accuracy: float) -> bool:
-    """Whether two states agree to ten times the accuracy of their body."""
+    """Whether two states agree to ten times the accuracy of the body."""
     return all(
         float(np.abs(a - b).max()) <= 10.0 * accuracy * float(np.abs(a).max())
         for a, b in ((state.displacement, other.displacement), (state.traction, other.traction))

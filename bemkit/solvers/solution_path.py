@@ -20,7 +20,7 @@ _SHORT_AND_COSTLY = 80
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class PathIterate(Iterate):
-    """Iterate of `SolutionPath`; `n_paths` counts the paths followed so far."""
+    """Iterate of `SolutionPath`; `n_paths` is the number of paths followed so far."""
 
     n_paths: int = 0
 
@@ -32,16 +32,16 @@ class SolutionPath:
     Parameters
     ----------
     from_start : bool
-        Begin with all nodes closed and sticking, from where the whole path leads to a solution of a body that is held,
-        by a few linear solves for each node. Otherwise begin with the statuses of the state at which the solver before
-        has stopped, most of which are right: one node changes at a time, by two linear solves for each that is wrong.
+        Whether to begin with all nodes closed and sticking. That path leads to a solution of a held body by a few
+        linear solves for each node. Otherwise the path begins with the present statuses, most of which are correct, and
+        takes two linear solves for each change of a node.
     max_steps : int
-        Paths followed, each under the tangent of the law at the end of the last. One is enough for bounds that are
-        affine in the pressure.
+        Largest number of paths, each with the tangent of the law at the end of the last path. One is sufficient for
+        bounds that are affine in the pressure.
 
     Notes
     -----
-    See `bemkit.solvers.homotopy`. Bodies whose responses are costly follow no whole path.
+    See `bemkit.solvers.homotopy`. Bodies with expensive responses do not follow the whole path.
 
     References
     ----------
@@ -55,14 +55,14 @@ class SolutionPath:
         check_max_steps(self.max_steps)
 
     def init(self, problem: ContactProblem, start: ContactState) -> PathIterate:
-        """Begin at a response; end at once where there is no path to follow."""
+        """Begin at a response; end if there is no path to follow."""
         from bemkit.solvers.homotopy import why_no_path
 
         hindrance = why_no_path(problem, is_short=not self.from_start)
         return PathIterate(state=start, ended=Status.STALLED if hindrance else None, message=hindrance)
 
     def step(self, problem: ContactProblem, iterate: Iterate) -> PathIterate:
-        """Follow one path to its end; the whole path only in the first step."""
+        """Follow one path to its end; only the first step may follow the whole path."""
         from bemkit.solvers.homotopy import AffineBound, follow_path
 
         if not isinstance(iterate, PathIterate):
@@ -74,7 +74,7 @@ class SolutionPath:
             most = _SHORT + problem.n_contact // 8
             most = min(most, _SHORT_AND_COSTLY) if problem.body.responses_are_expensive else most
             sets = contact_sets(problem, iterate.state)
-            # a node whose friction drives its slip is on its way through stick to slip in the other direction
+            # a node whose friction acts along its slip is changing its slip direction through stick
             direction = np.where(sets.direction * iterate.state.sigma_t > 0.0, 0, sets.direction)
             end = follow_path(problem, bound, ActiveSets(sets.is_closed, direction), max_segments=most)
         spent = iterate.linear_solves + end.linear_solves

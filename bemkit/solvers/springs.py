@@ -1,4 +1,4 @@
-"""A solver for many loose bodies: springs on all of them that become weaker (the proximal point method)."""
+"""A solver for many loose bodies: springs on all bodies that become weaker (the proximal point method)."""
 
 from dataclasses import dataclass, field, replace
 
@@ -27,12 +27,12 @@ class SpringIterate(Iterate):
     spring : float
         Stiffness of the springs of the next step in units of the stiffness scale [-].
     anchor : ContactState
-        Where they are without force.
+        State with zero spring forces.
     residual : Residual
     sets : ActiveSets
         Projections at the state, and sets of the next step.
     released : Iterate or None
-        The iterate of the solver that goes on once the springs have gone.
+        Iterate of the solver that continues without springs.
     """
 
     spring: float
@@ -51,16 +51,17 @@ class Springs:
     first, last : float
         The first and the weakest spring in units of the stiffness scale of the body [-].
     then : ContactSolver
-        Goes on without springs from where the weakest one has led.
+        Solver that continues without springs after the weakest ones.
     least_motions : int
-        Ends at once where contact holds fewer rigid motions than these; four are those of two loose bodies or more.
+        Smallest number of rigid motions that only contact holds; with fewer the solver does not apply. Four are those
+        of at least two loose bodies.
     max_steps : int
-        Steps allowed, those of `then` included; packings of 200 discs take 50 to 70.
+        Largest number of steps, including those of `then`; packings of 200 discs take 50 to 70.
 
     Notes
     -----
-    For many loose bodies, which only contact holds. It begins with all nodes sticking: where Newton's method has
-    stopped, loose bodies may have moved far away.
+    The solver is for many loose bodies, which only contact holds. It begins with all nodes sticking, because Newton's
+    method may have moved loose bodies far away.
 
     References
     ----------
@@ -79,7 +80,7 @@ class Springs:
             raise InputError(f"springs from {self.first} to {self.last}; give positive numbers, the last not larger")
 
     def init(self, problem: ContactProblem, start: ContactState) -> SpringIterate:
-        """Keep the start, and hold all nodes for the first step; end at once where few motions are free."""
+        """Begin with all nodes held; end if few motions are free."""
         anchor, n_motions = problem.sticking_state, problem.body.rigid_motions().shape[0]
         residual = self._equations(problem).evaluate(anchor)
         begun = SpringIterate(state=start, spring=self.first, anchor=anchor, residual=residual, sets=residual.sets)
@@ -89,7 +90,7 @@ class Springs:
         return replace(begun, ended=Status.STALLED, message=reason)
 
     def step(self, problem: ContactProblem, iterate: Iterate) -> SpringIterate:
-        """Take a step with springs, or, when they have become weak enough, one without."""
+        """Take a step with springs, or without if they have become weak enough."""
         if not isinstance(iterate, SpringIterate):
             raise TypeError(f"iterate is a {type(iterate).__name__}; give a result of init or step of this solver")
         if iterate.released is not None:

@@ -1,4 +1,4 @@
-"""Semismooth Newton on contact and friction together: Algorithm 2 of the paper, the friction bound differentiated."""
+"""Semismooth Newton method for contact and friction: Algorithm 2 of the paper with differentiated friction bound."""
 
 from dataclasses import dataclass, replace
 
@@ -23,7 +23,7 @@ class NewtonIterate(Iterate):
     is_regularised : bool
         Whether springs had to hold the body in this step; see `bemkit.solvers.newton.respond`.
     n_regularised : int
-        Steps in a row, up to this one, that needed springs and kept the sets.
+        Number of consecutive steps with springs and equal sets.
     """
 
     residual: Residual
@@ -41,17 +41,16 @@ class SemismoothNewton:
     ----------
     rho : float, optional
         Ratio of traction to displacement in the projections [Pa/m], rho_1 = rho_2 of the paper. By default the
-        stiffness scale of the body. It matters only at nodes that change from slip to slip, or from open to closed.
+        stiffness scale of the body. It only affects nodes that reverse their slip, or that open or close.
     max_steps : int
-        Steps allowed; `Fallbacks` then hands on to the next solver.
+        Largest number of steps; `Fallbacks` then begins the next solver.
 
     Notes
     -----
     For Coulomb's law the equations are piecewise linear, so a step that reproduces its active sets has found an exact
-    solution: 5 to 10 steps for any friction. Where sets come back instead, other solvers follow in `Fallbacks`.
-    Deviations from the print: the friction bound is differentiated, too, instead of taken from the last step; the
-    multiplier is the traction itself; a node reverses its slip only by way of stick; and where the sets do not hold the
-    body, weak springs do during that step.
+    solution, in 5 to 10 steps for any friction. If sets recur instead, `Fallbacks` begins another solver. Deviations
+    from the print: the friction bound is differentiated instead of lagged; the multiplier is the traction; a node
+    reverses its slip only through stick; and weak springs hold a body that the sets do not hold.
 
     References
     ----------
@@ -67,11 +66,11 @@ class SemismoothNewton:
         check_max_steps(self.max_steps)
 
     def init(self, problem: ContactProblem, start: ContactState) -> NewtonIterate:
-        """Do Step 0: begin at a response of the body."""
+        """Perform step 0: begin at a response of the body."""
         return newton_start(self._equations(problem), start)
 
     def step(self, problem: ContactProblem, iterate: Iterate) -> NewtonIterate:
-        """Do Steps 1 to 3 once."""
+        """Perform steps 1 to 3."""
         if not isinstance(iterate, NewtonIterate):
             raise TypeError(f"iterate is a {type(iterate).__name__}; give a result of init or step of this solver")
         following = newton_step(self._equations(problem), iterate)

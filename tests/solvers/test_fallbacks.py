@@ -48,7 +48,7 @@ def test_a_limit_on_steps_hands_on_from_where_the_driver_has_stopped():
     problem = block_problem(Coulomb(0.5))
     newton = solve(problem, SemismoothNewton())
     hasty = solve(problem, Fallbacks((SemismoothNewton(max_steps=2), SemismoothNewton())))
-    assert messages(hasty)[2] == "2 steps have not led to a solution; SemismoothNewton is next"
+    assert messages(hasty)[2] == "no solution after 2 steps; SemismoothNewton is next"
     assert hasty.steps == newton.steps  # no step is lost
     np.testing.assert_array_equal(hasty.state.traction, newton.state.traction)
     assert hasty.linear_solves == newton.linear_solves
@@ -80,7 +80,7 @@ def test_fallbacks_name_all_reasons_when_the_last_driver_has_ended():
     found = solve(problem, drivers, throw=False)
     assert found.status is Status.STALLED
     assert "FixedPoint: " in found.message
-    assert "Fallbacks: Idle: 1 steps have not led to a solution; Idle: 2 steps" in found.message
+    assert "Fallbacks: Idle: no solution after 1 steps; Idle: no solution after 2 steps" in found.message
 
 
 def test_the_path_begins_at_the_sets_reached_and_the_whole_path_anew():

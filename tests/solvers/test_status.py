@@ -158,7 +158,7 @@ def test_every_status_has_a_case():
 @pytest.mark.parametrize(
     ("case", "words"),
     [
-        ("stalled, few steps", "SemismoothNewton: 2 steps have not led to a solution"),
+        ("stalled, few steps", "SemismoothNewton: no solution after 2 steps"),
         ("cycling, newton", "the active sets come back"),
         ("stalled, nothing left to do", "the rest of the certificate is beyond this driver"),
         ("singular later", "the sockets are empty"),
@@ -222,7 +222,7 @@ def test_errors_inside_a_law_surface_with_its_name(driver):
     ("make", "complaint"),
     [
         (lambda: SemismoothNewton(rho=0.0), "rho = 0.0; give a positive number"),
-        (lambda: SemismoothNewton(max_steps=0), "max_steps = 0; allow at least one step"),
+        (lambda: SemismoothNewton(max_steps=0), "max_steps = 0; give at least 1"),
         (lambda: Fallbacks(()), r"drivers is empty; give at least one solver, such as SemismoothNewton\(\)"),
         (lambda: SolutionPath(max_steps=0), "max_steps = 0"),
         (lambda: Springs(max_steps=0), "max_steps = 0"),
