@@ -18,7 +18,7 @@ from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.reflection import antisymmetric_dofs
 from bemkit.geometry.spaces import BoundarySpace
 from bemkit.geometry.symmetry import Symmetry
-from bemkit.model.contacts import ContactRows, check_overlap
+from bemkit.model.contacts import ContactInterface, check_overlap
 from bemkit.model.placed import PlacedBody
 from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions
 from bemkit.scene.contacts import ContactPair
@@ -70,8 +70,8 @@ def body_rows(
     scene: Scene,
     bodies: Sequence[PlacedBody],
     conditions: Sequence[NodalConditions],
-    with_obstacles: Sequence[ContactRows],
-) -> Iterator[ContactRows]:
+    with_obstacles: Sequence[ContactInterface],
+) -> Iterator[ContactInterface]:
     """Yield the contacts between elastic bodies; those with obstacles and rigid bodies are known.
 
     Notes
@@ -89,7 +89,7 @@ def body_rows(
     taken: list[dict[int, str]] = [{} for _ in bodies]  # node -> the part that has its multiplier
     for rows in with_obstacles:
         taken[rows.body].update(dict.fromkeys(rows.nodes.tolist(), rows.part))
-    found: dict[int, ContactRows] = {}
+    found: dict[int, ContactInterface] = {}
     couplings = CongruentCouplings()
     for k in np.argsort(-np.round(np.array(lengths) / max(lengths, default=1.0), _DIGITS), kind="stable").tolist():
         (first, part, side), (second, _, other_side) = ordered[k]
@@ -117,7 +117,7 @@ def body_rows(
                 taken[number].setdefault(node, name)
         on_line = nodes_on_lines(side.space)[coupling.nodes]
         is_held = np.asarray(conditions[first].is_fixed[coupling.nodes].any(axis=1)) & ~on_line
-        found[k] = ContactRows(
+        found[k] = ContactInterface(
             name=pairs[k].name,
             law=laws[k],
             part=part,

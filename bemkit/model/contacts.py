@@ -35,7 +35,7 @@ class OverlapError(InputError):
 
 
 @dataclass(frozen=True, eq=False)
-class ContactRows:
+class ContactInterface:
     """The nodes of one contact: where relative displacements and tractions are unknown.
 
     Parameters
@@ -131,7 +131,7 @@ class ContactRows:
         of_bodies[self.body][:] += on_body.T @ forces
         of_bodies[self.other][:] -= on_other.T @ forces
 
-    def is_coupled_like(self, other: ContactRows) -> bool:
+    def is_coupled_like(self, other: ContactInterface) -> bool:
         """Whether its nodes take part in both sides as they do in another step of the same load history."""
         if self.couplings is not None:
             return self.couplings is other.couplings
@@ -171,7 +171,7 @@ def obstacle_rows(
     bodies: Sequence[PlacedBody],
     candidates: Sequence[ContactData],
     conditions: Sequence[NodalConditions],
-) -> Iterator[ContactRows]:
+) -> Iterator[ContactInterface]:
     """Yield the contacts with fixed obstacles and with rigid bodies.
 
     Notes
@@ -201,7 +201,7 @@ def obstacle_rows(
                 gap, motions = gap + pair.gap_at(points), scene.rigid[k].motions_at(touched)
             is_held = np.asarray(fixed[nodes.nodes].any(axis=1))
             moves = motions is not None and bool(scene.rigid[other - len(bodies)].is_load_controlled.any())
-            yield ContactRows(
+            yield ContactInterface(
                 name=title,
                 law=law,
                 part=part,
@@ -224,7 +224,7 @@ def obstacle_rows(
 
 
 def retained_for(
-    bodies: Sequence[PlacedBody], conditions: Sequence[NodalConditions], rows: Sequence[ContactRows]
+    bodies: Sequence[PlacedBody], conditions: Sequence[NodalConditions], rows: Sequence[ContactInterface]
 ) -> tuple[NodalConditions, ...]:
     """Retain all nodes that a contact row involves, alike in all bodies that share a mesh."""
     touched = [np.zeros(body.space.n_dofs // 2, bool) for body in bodies]
@@ -239,7 +239,7 @@ def retained_for(
     return tuple(replace(of_body, is_retained=nodes[:, None] & ~of_body.is_fixed) for of_body, nodes in pairs)
 
 
-def law_of_rows(contacts: Sequence[ContactRows]) -> FrictionLaw:
+def law_of_rows(contacts: Sequence[ContactInterface]) -> FrictionLaw:
     """Return the friction law of the nodes of all contacts, in physical units.
 
     Raises

@@ -73,7 +73,7 @@ def _rigid_coupling(prepared: Prepared) -> sparse.csr_array:
     return sparse.csr_array(_frames(prepared) @ sparse.csr_array(by_motions.reshape(2 * begin, 3 * n_rigid)))
 
 
-def relative(prepared: Prepared) -> sparse.csr_array:
+def gap_operator(prepared: Prepared) -> sparse.csr_array:
     """Return how the retained displacements of all bodies move the contact nodes, (2 n_contact, n_retained)."""
     nodal = [_nodal(body) for body in prepared.bodies]
     result = sparse.csr_array(coupling(prepared) @ diagonal_blocks(nodal))
@@ -85,7 +85,7 @@ def relative(prepared: Prepared) -> sparse.csr_array:
     return result
 
 
-def offset(prepared: Prepared) -> FloatArray:
+def prescribed(prepared: Prepared) -> FloatArray:
     """Return the relative displacements (2 n_contact,) that supports and motions of rigid bodies prescribe."""
     result = np.zeros(2 * prepared.n_contact)
     prescribed = [_prescribed(body) for body in prepared.bodies]

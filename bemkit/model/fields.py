@@ -12,7 +12,7 @@ from bemkit.geometry.local_values import from_own_nodes, projector
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.quadrature import gauss_legendre
 from bemkit.geometry.spaces import BoundarySpace, dof_points
-from bemkit.model.contacts import ContactRows
+from bemkit.model.contacts import ContactInterface
 from bemkit.model.placed import PlacedBody
 from bemkit.operators.rigid_modes import without_motion
 from bemkit.operators.steklov_poincare import SteklovPoincare
@@ -85,7 +85,7 @@ class TractionRecovery:
     sides: tuple[RecoveredSide, ...]
 
     @classmethod
-    def of(cls, bodies: Sequence[PlacedBody], contacts: Sequence[ContactRows]) -> TractionRecovery:
+    def of(cls, bodies: Sequence[PlacedBody], contacts: Sequence[ContactInterface]) -> TractionRecovery:
         """Compute the recovery from the couplings of contacts."""
         sides: dict[tuple[int, bytes], _Side] = {}
         first = 0
@@ -153,7 +153,9 @@ class _Side:
         self.position[nodes] = np.arange(nodes.size)
         self.entries: list[_Entries] = []
 
-    def add(self, rows: ContactRows, first: int, shares: FloatArray, contact_nodes: IntArray, nodes: IntArray) -> None:
+    def add(
+        self, rows: ContactInterface, first: int, shares: FloatArray, contact_nodes: IntArray, nodes: IntArray
+    ) -> None:
         """Take a contact whose nodes count on from the given one."""
         nodes = self.position[nodes]
         self.entries.append((shares, contact_nodes, nodes))
@@ -183,7 +185,7 @@ class _Side:
         return RecoveredSide(self.body, self.elements, shares, contact_nodes, nodes, values, self.local)
 
 
-def _sides(rows: ContactRows, first: int) -> list[tuple[int, IntArray, _Entries]]:
+def _sides(rows: ContactInterface, first: int) -> list[tuple[int, IntArray, _Entries]]:
     """Return body, elements, and signed shares, contact nodes and nodes of each side that a contact has."""
     numbers = first + np.arange(rows.n_contact)
     if rows.couplings is None:

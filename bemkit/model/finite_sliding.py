@@ -15,7 +15,7 @@ from bemkit.arrays import BoolArray, FloatArray
 from bemkit.contact.obstacle import SIMPLE_OBSTACLES, Obstacle, measure_contact
 from bemkit.geometry.spaces import element_nodes
 from bemkit.geometry.vectors import norms
-from bemkit.model.contacts import ContactRows
+from bemkit.model.contacts import ContactInterface
 from bemkit.model.model import Model
 from bemkit.model.placed import PlacedBody
 from bemkit.model.prepared import Prepared
@@ -60,14 +60,14 @@ def with_sliding_checked(model: Model, result: ContactSolution) -> ContactSoluti
 
 
 def _moved(
-    prepared: Prepared, rows: ContactRows, displacement: FloatArray, is_pressed: BoolArray, deformation: float
+    prepared: Prepared, rows: ContactInterface, displacement: FloatArray, is_pressed: BoolArray, deformation: float
 ) -> str:
     """Describe how far the pressed nodes of a contact move along it; empty if gaps and directions still hold.
 
     Parameters
     ----------
     prepared : Prepared
-    rows : ContactRows
+    rows : ContactInterface
     displacement : (n, 2) array [m]
         Relative, normal and tangential.
     is_pressed : (n,) bool array
@@ -94,7 +94,7 @@ def _moved(
     )
 
 
-def _is_off_side(rows: ContactRows, slide: FloatArray, is_pressed: BoolArray, deformation: float) -> bool:
+def _is_off_side(rows: ContactInterface, slide: FloatArray, is_pressed: BoolArray, deformation: float) -> bool:
     """Whether another elastic body has moved (n,) [m] by more than its elements, or to a place with another gap."""
     longest = np.abs(slide[is_pressed]).max()
     zone = rows.weights[is_pressed]
@@ -108,7 +108,7 @@ def _is_off_side(rows: ContactRows, slide: FloatArray, is_pressed: BoolArray, de
 
 
 def _is_off_obstacle(
-    rows: ContactRows, obstacle: Obstacle, displacement: FloatArray, is_pressed: BoolArray, deformation: float
+    rows: ContactInterface, obstacle: Obstacle, displacement: FloatArray, is_pressed: BoolArray, deformation: float
 ) -> bool:
     """Whether pressed nodes have moved to places where the obstacle has another distance or direction."""
     if not is_in_the_plane(obstacle):
@@ -121,7 +121,7 @@ def _is_off_obstacle(
     return bool((off > _OFF * deformation).any() or (turned < _LEAST_COSINE).any())
 
 
-def _is_oblique(body: PlacedBody, rows: ContactRows, is_pressed: BoolArray) -> bool:
+def _is_oblique(body: PlacedBody, rows: ContactInterface, is_pressed: BoolArray) -> bool:
     """Whether a pressed node touches at a large angle to the sides of the body that meet there."""
     elements, space = rows.elements, body.space
     normals = body.mesh.normals_at(elements, element_nodes(space)[elements])
@@ -132,7 +132,7 @@ def _is_oblique(body: PlacedBody, rows: ContactRows, is_pressed: BoolArray) -> b
     return bool((facing[rows.nodes[is_pressed]] < _LEAST_FACING).any())
 
 
-def _fixed_obstacle(prepared: Prepared, rows: ContactRows) -> Obstacle:
+def _fixed_obstacle(prepared: Prepared, rows: ContactInterface) -> Obstacle:
     """Return the fixed obstacle of a contact."""
     parts = prepared.bodies[rows.body].scene.parts
     stated = {part.name: part.condition for part in parts if isinstance(part.condition, Contact)}

@@ -10,7 +10,7 @@ import numpy as np
 from bemkit.arrays import FloatArray
 from bemkit.contact.joined.joined_bodies import JoinedBodies
 from bemkit.contact.joined.member import Member
-from bemkit.model.coupling import offset, relative
+from bemkit.model.coupling import gap_operator, prescribed
 from bemkit.model.placed import groups, shape_numbers
 from bemkit.model.prepared import Prepared, PreparedBody
 from bemkit.model.rigid import rigid_members
@@ -35,8 +35,8 @@ def joined_bodies(prepared: Prepared, condensed: Sequence[CondensedMap]) -> Join
     )
     return JoinedBodies(
         members=(*members, *rigid_members(prepared)),
-        relative=relative(prepared),
-        offset=offset(prepared),
+        gap_operator=gap_operator(prepared),
+        prescribed=prescribed(prepared),
         weights=prepared.column("weights") / prepared.units.length,
         tangent_follows=prepared.tangent_follows,
     )
@@ -49,7 +49,7 @@ def joined_under(
     if not (before.has_same_unknowns(prepared) and before.is_coupled_like(prepared)):
         return joined_bodies(prepared, condensed)
     loads = [*(map_.load for map_ in condensed), *(member.load for member in rigid_members(prepared))]
-    return joined.under(loads, offset(prepared))
+    return joined.under(loads, prescribed(prepared))
 
 
 def condensed_under_step(

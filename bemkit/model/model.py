@@ -131,7 +131,7 @@ class Model:
         one, two = before._joined_bodies, self._joined_bodies
         members = zip(one.members, two.members, strict=True)
         loads = [blended(former.load, latter.load, share) for former, latter in members]
-        return two.under(loads, blended(one.offset, two.offset, share))
+        return two.under(loads, blended(one.prescribed, two.prescribed, share))
 
     def _single_between(self, before: Model, share: float) -> SingleBody:
         one, two = before.prepared.only, self.prepared.only

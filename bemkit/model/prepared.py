@@ -18,7 +18,7 @@ from bemkit.contact.condensation.nodes import ContactNodes
 from bemkit.contact.laws import FrictionLaw
 from bemkit.geometry.spaces import dof_points
 from bemkit.model.contact_data import ContactData
-from bemkit.model.contacts import ContactRows, candidates_of, law_of_rows, obstacle_rows, retained_for
+from bemkit.model.contacts import ContactInterface, candidates_of, law_of_rows, obstacle_rows, retained_for
 from bemkit.model.fields import TractionRecovery
 from bemkit.model.given import (
     far_motion_of,
@@ -98,13 +98,13 @@ class Prepared:
     bodies : tuple of PreparedBody
     units : Units
         Common to all bodies: the largest body's length, the modulus of the most compliant contact, the largest load.
-    rows : tuple of ContactRows
+    rows : tuple of ContactInterface
     """
 
     scene: Scene
     bodies: tuple[PreparedBody, ...]
     units: Units
-    rows: tuple[ContactRows, ...]
+    rows: tuple[ContactInterface, ...]
 
     @property
     def only(self) -> PreparedBody:
@@ -186,7 +186,7 @@ class Prepared:
         return min(LARGEST_BLOCK, body.space.n_dofs) if is_compressed else body.space.n_dofs
 
     def column(self, name: str) -> FloatArray:
-        """Return a column of `ContactRows` for all contact nodes."""
+        """Return a column of `ContactInterface` for all contact nodes."""
         shape = (0, 2) if name == "points" else (0,)
         return np.concatenate([np.zeros(shape), *(getattr(rows, name) for rows in self.rows)])
 
@@ -281,7 +281,7 @@ class Prepared:
         pairs = zip(self.rows, other.rows, strict=False)
         return len(self.rows) == len(other.rows) and all(one.is_coupled_like(two) for one, two in pairs)
 
-    def rows_under(self, scene: Scene) -> tuple[ContactRows, ...] | None:
+    def rows_under(self, scene: Scene) -> tuple[ContactInterface, ...] | None:
         """Return the contacts of elastic bodies with the gaps and laws of another scene, None if they are others."""
         before, after = self.scene.elastic_contacts, scene.elastic_contacts
         if len(before) != len(after) or any(

@@ -16,7 +16,7 @@ import numpy as np
 from bemkit.arrays import FloatArray, IntArray
 from bemkit.contact.equilibrium import NOISE_FACTOR, round_off_of
 from bemkit.geometry.spaces import BoundarySpace, dof_points
-from bemkit.model.contacts import ContactRows
+from bemkit.model.contacts import ContactInterface
 from bemkit.model.model import Model
 from bemkit.model.prepared import PreparedBody
 from bemkit.operators.pair_form import Tag
@@ -74,7 +74,7 @@ def contact_warnings(
     return tuple(found)
 
 
-def _oblique(body: PreparedBody, rows: ContactRows, node_status: IntArray) -> list[ResultWarning]:
+def _oblique(body: PreparedBody, rows: ContactInterface, node_status: IntArray) -> list[ResultWarning]:
     candidates = body.candidates
     is_of_part = np.equal(candidates.parts, rows.part) & np.isin(candidates.nodes.nodes, rows.nodes)
     angle = np.degrees(np.arccos(np.clip(candidates.facing[is_of_part], -1.0, 1.0)))

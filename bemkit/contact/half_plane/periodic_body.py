@@ -101,7 +101,7 @@ class _System:
         """Return the left-hand sides of the equations."""
         body, reduced = self.body, self.reduced
         traction = reduced.changes(x[: reduced.n_unknowns])
-        displacement = body.caused(traction) + (x[reduced.n_unknowns :] / self._sizes) @ self.motions
+        displacement = body.displacement_by(traction) + (x[reduced.n_unknowns :] / self._sizes) @ self.motions
         return np.concatenate([reduced.rows(displacement, traction), self._resultants(traction)])
 
     def _tractions_of(self, right: FloatArray) -> FloatArray:

@@ -108,7 +108,7 @@ class SurfaceBody(LinearBody):
         """Return a field on all elements at the acting ones, in their frames."""
         return np.asarray(field[self.acting] * self.turn.conj())
 
-    def caused(self, traction: ComplexArray) -> ComplexArray:
+    def displacement_by(self, traction: ComplexArray) -> ComplexArray:
         """Return the displacements (n_acting,) that tractions (n_acting,) cause."""
         return self.at_acting(self.elastic.displaced(self.on_surface(traction)))
 
@@ -183,7 +183,7 @@ class SurfaceBody(LinearBody):
         if len(conditions.free_motions(self.rigid_motions())):
             raise SingularResponse("the contact conditions leave a rigid motion free")
         traction, motion = self._solved(ReducedConditions.of(_joined(conditions, self._supports)))
-        displacement, n = self.rest + self.caused(traction) + motion @ self.motions, self.n_contact
+        displacement, n = self.rest + self.displacement_by(traction) + motion @ self.motions, self.n_contact
         return ContactState(
             conditions.with_given_displacements(as_pairs(displacement[:n])),
             conditions.with_given_tractions(as_pairs(traction[:n])),
@@ -197,7 +197,7 @@ class SurfaceBody(LinearBody):
         known = reduced.given
         if reduced.n_unknowns == 0:
             return known, np.zeros(len(self.motions))
-        right = reduced.value - reduced.rows(self.rest + self.caused(known), known)
+        right = reduced.value - reduced.rows(self.rest + self.displacement_by(known), known)
         columns = [reduced.rows(motion, np.zeros_like(known)) for motion in self.motions]
         travel, right = _fitted(columns, right)
         unknowns, motion = self.solve(reduced, right, self.motions, -self.load - (self.works @ known).real)
@@ -304,10 +304,10 @@ class SurfaceBody(LinearBody):
         if self._held.size:
             supports = replace(self._supports, value=value)
             reduced = ReducedConditions.of(_joined(separated(self.n_contact), supports))
-            right = reduced.value - reduced.rows(displacement + self.caused(traction), traction)
+            right = reduced.value - reduced.rows(displacement + self.displacement_by(traction), traction)
             unknowns, _ = self.solve(reduced, right, self.motions[:0], np.zeros(0))
             traction = traction + reduced.changes(unknowns)
-        return traction, displacement + self.caused(traction)
+        return traction, displacement + self.displacement_by(traction)
 
 
 def _joined(one: LinearConditions, two: LinearConditions) -> LinearConditions:

@@ -28,36 +28,40 @@ class CoupledMembers:
 
     Parameters
     ----------
-    members, relative, offset, weights, tangent_follows
+    members, gap_operator, prescribed, weights, tangent_follows
         See `bemkit.contact.joined.joined_bodies.JoinedBodies`.
     """
 
     members: tuple[Member, ...]
-    relative: sparse.csr_array
-    offset: FloatArray
+    gap_operator: sparse.csr_array
+    prescribed: FloatArray
     weights: FloatArray
     tangent_follows: BoolArray = None  # type: ignore[assignment]  # a value, to hide the property of the protocol
 
     def __post_init__(self) -> None:
         n_contact, n = len(self.weights), sum(member.n_components for member in self.members)
-        relative = sparse.csr_array(self.relative)
+        gap_operator = sparse.csr_array(self.gap_operator)
         if self.tangent_follows is None:
             object.__setattr__(self, "tangent_follows", np.zeros(n_contact, bool))
         for name, array, shape in (
-            ("relative", relative, (2 * n_contact, n)),
-            ("offset", self.offset, (2 * n_contact,)),
+            ("gap_operator", gap_operator, (2 * n_contact, n)),
+            ("prescribed", self.prescribed, (2 * n_contact,)),
             ("tangent_follows", self.tangent_follows, (n_contact,)),
         ):
             if array.shape != shape:
                 raise InputError(f"{name} has the shape {array.shape}; {n_contact} contact nodes need {shape}")
-        for name, values in (("relative", relative.data), ("offset", self.offset), ("weights", self.weights)):
+        for name, values in (
+            ("gap_operator", gap_operator.data),
+            ("prescribed", self.prescribed),
+            ("weights", self.weights),
+        ):
             if not np.isfinite(values).all():
                 raise InputError(f"{name} contains {values[~np.isfinite(values)][0]}; give finite numbers")
         if n_contact == 0 or not self.members:
             raise InputError(f"{len(self.members)} members with {n_contact} contact nodes; give at least one of each")
         if self.weights.min() <= 0.0:
             raise InputError(f"weights has the entry {self.weights.min():g}; the length of a node is positive")
-        object.__setattr__(self, "relative", relative)
+        object.__setattr__(self, "gap_operator", gap_operator)
         self._check_held()
         object.__setattr__(self, "tangent_follows", self.tangent_follows | ~np.isnan(self.tangents[0]))
 
@@ -83,15 +87,15 @@ class CoupledMembers:
             Relative displacements of the state less those of the members.
         """
         displacement = self.deformation(self.load + self.contact_forces(state))
-        missed = state.displacement.ravel() - self.offset - self.relative @ displacement
+        missed = state.displacement.ravel() - self.prescribed - self.gap_operator @ displacement
         for _ in range(_ROUNDS):
             displacement = displacement + self.motions @ self._motion_fit(missed)
-            missed = state.displacement.ravel() - self.offset - self.relative @ displacement
+            missed = state.displacement.ravel() - self.prescribed - self.gap_operator @ displacement
         return displacement, missed
 
     def contact_forces(self, state: ContactState) -> FloatArray:
         """Return the forces (n,) [N/m] of contact on all members."""
-        return np.asarray(self.relative.T @ (self.weights[:, None] * state.traction).ravel())
+        return np.asarray(self.gap_operator.T @ (self.weights[:, None] * state.traction).ravel())
 
     def deformation(self, forces: FloatArray) -> FloatArray:
         """Return the displacements of all members under forces (n, ...) in equilibrium, but for rigid motions."""
@@ -120,7 +124,7 @@ class CoupledMembers:
     @cached_property
     def relative_motions(self) -> sparse.csr_array:
         """(n_motions, 2 n_contact) sparse array: relative displacements of the rigid motions."""
-        return sparse.csr_array((self.relative @ self.motions).T)
+        return sparse.csr_array((self.gap_operator @ self.motions).T)
 
     @cached_property
     def motion_owner(self) -> IntArray:
@@ -133,7 +137,7 @@ class CoupledMembers:
         of_component = np.repeat(np.arange(len(self.members)), [member.n_components for member in self.members])
         where = (np.arange(of_component.size), of_component)
         sums = sparse.csr_array((np.ones(of_component.size), where), (of_component.size, len(self.members)))
-        return sparse.csr_array(abs(self.relative) @ sums)
+        return sparse.csr_array(abs(self.gap_operator) @ sums)
 
     def least_of_partners(self, values: FloatArray) -> FloatArray:
         """Return (2 n_contact,) the smallest of the values (n_members,) of the members that meet in each component."""
@@ -207,13 +211,13 @@ class CoupledMembers:
     @cached_property
     def tangents(self) -> tuple[FloatArray, FloatArray]:
         """(n_contact,) arrays: slope and constant of ``w_t = slope w_n + constant``, NaN where both are independent."""
-        normal, tangential = self.relative[0::2], self.relative[1::2]
+        normal, tangential = self.gap_operator[0::2], self.gap_operator[1::2]
         squares, product, other = (
             np.asarray(array.sum(axis=1)) for array in (normal * normal, normal * tangential, tangential * tangential)
         )
         is_dependent = squares * other - product**2 <= _DEPENDENT * squares * np.maximum(other, squares)
         slope = np.where(is_dependent, product, np.nan) / np.where(squares > 0.0, squares, 1.0)
-        return slope, self.offset[1::2] - slope * self.offset[0::2]
+        return slope, self.prescribed[1::2] - slope * self.prescribed[0::2]
 
     @cached_property
     def held_friction(self) -> HeldFriction:

@@ -37,8 +37,8 @@ class RelativeStiffness:
         is_kept = np.ones((joined.n_contact, 2), bool)
         is_kept[joined.tangent_follows, 1] = False
         self._is_kept = is_kept.ravel()
-        self._coupling = joined.relative[self._is_kept]
-        self._followers = joined.relative[~self._is_kept]
+        self._coupling = joined.gap_operator[self._is_kept]
+        self._followers = joined.gap_operator[~self._is_kept]
         self._follows, self._slope = joined.tangent_follows, joined.tangents[0][joined.tangent_follows]
         self._unit_deformation = joined.deformation(self._coupling.T.toarray())
         n_kept, motions = self._coupling.shape[0], (self._coupling @ joined.motions).toarray()
@@ -60,14 +60,14 @@ class RelativeStiffness:
         n_kept, load = self._coupling.shape[0], joined.load
         loaded = joined.deformation(load)
         right_side = np.append(
-            -(joined.offset[self._is_kept] + self._coupling @ loaded), -(joined.motions.T @ load) / joined.modulus
+            -(joined.prescribed[self._is_kept] + self._coupling @ loaded), -(joined.motions.T @ load) / joined.modulus
         )
         at_rest = self._inverse @ right_side  # p and a where no relative displacement is allowed
         return DenseBody(
             stiffness=self._stiffness,
             load=-at_rest[:n_kept],
             weights=joined.weights,
-            motions=(joined.relative @ joined.motions).T.toarray().reshape(-1, joined.n_contact, 2),
+            motions=(joined.gap_operator @ joined.motions).T.toarray().reshape(-1, joined.n_contact, 2),
             following_tangents=self._followed(joined, loaded, at_rest),
             modulus=joined.stiffness_scale * float(np.median(joined.weights)),
         )
@@ -76,7 +76,7 @@ class RelativeStiffness:
         if not self._follows.any():
             return None
         n_kept = self._coupling.shape[0]
-        displacement = joined.offset[~self._is_kept] + self._followers @ loaded
+        displacement = joined.prescribed[~self._is_kept] + self._followers @ loaded
         displacement = displacement + self._by_force @ at_rest[:n_kept] + self._following_motions @ at_rest[n_kept:]
         slope, constant = (array[self._follows] for array in joined.tangents)
         return FollowingTangents(

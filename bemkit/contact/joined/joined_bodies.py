@@ -53,15 +53,15 @@ class JoinedBodies(CoupledMembers, LinearBody):
     Parameters
     ----------
     members : tuple of Member
-    relative : (2 n_contact, n) sparse array [-]
-        Relative displacements are ``w = relative @ u + offset``, with index ``2 node + component`` (n, t), of the
-        displacements u of all members, one after the other; ``relative.T`` takes nodal forces to the members.
-    offset : (2 n_contact,) array [m]
+    gap_operator : (2 n_contact, n) sparse array [-]
+        The operator B of the relative displacements ``w = B u + prescribed`` with index ``2 node + component`` (n, t);
+        u are the displacements of all members, one after the other. B.T takes nodal forces to the members.
+    prescribed : (2 n_contact,) array [m]
         Relative displacements that supports prescribe.
     weights : (n_contact,) array [m]
     tangent_follows : (n_contact,) bool array, optional
         Nodes between two obstacles, whose tangential displacements follow from both normal ones. Those where one
-        displacement gives both components, because supports hold the others, are found from `relative`.
+        displacement gives both components, because supports hold the others, are found from `gap_operator`.
     is_dense : bool, optional
         Whether to form the dense stiffness of relative displacements; by default if there are few.
 
@@ -73,22 +73,22 @@ class JoinedBodies(CoupledMembers, LinearBody):
 
     Notes
     -----
-    ``K u - f = relative.T @ (weights t)`` with the stiffness K and load f of all members.
+    ``K u - f = gap_operator.T @ (weights t)`` with the stiffness K and load f of all members.
     """
 
     is_dense: bool | None = None
 
-    def under(self, loads: Sequence[FloatArray], offset: FloatArray) -> JoinedBodies:
+    def under(self, loads: Sequence[FloatArray], prescribed: FloatArray) -> JoinedBodies:
         """Return the same bodies under other loads, without another factorisation.
 
         Parameters
         ----------
         loads : sequence of (n,) arrays [N/m]
             One for each member.
-        offset : (2 n_contact,) array [m]
+        prescribed : (2 n_contact,) array [m]
         """
         members = tuple(replace(member, load=load) for member, load in zip(self.members, loads, strict=True))
-        other = replace(self, members=members, offset=offset)
+        other = replace(self, members=members, prescribed=prescribed)
         other.__dict__.update({name: self.__dict__[name] for name in _WITHOUT_LOAD if name in self.__dict__})
         return other
 
@@ -188,8 +188,10 @@ class JoinedBodies(CoupledMembers, LinearBody):
 
     def _displacement_round_off(self, state: ContactState, displacement: FloatArray) -> FloatArray:
         """Return the round-off (2 n_contact,) [m] of relative displacements: half an eps for each rounding of a row."""
-        sizes = abs(self.relative) @ np.abs(displacement) + np.abs(self.offset) + np.abs(state.displacement.ravel())
-        n_roundings = 3 + np.diff(self.relative.indptr)  # products and sums of a row, and the comparison
+        sizes = (
+            abs(self.gap_operator) @ np.abs(displacement) + np.abs(self.prescribed) + np.abs(state.displacement.ravel())
+        )
+        n_roundings = 3 + np.diff(self.gap_operator.indptr)  # products and sums of a row, and the comparison
         return np.asarray(0.5 * float(np.finfo(float).eps) * n_roundings * sizes)
 
     def _over_members(self, operation: np.ufunc, values: FloatArray) -> FloatArray:
@@ -213,7 +215,7 @@ class JoinedBodies(CoupledMembers, LinearBody):
         nothing is loaded and all forces are round-off, so that members have only moved, the terms take their place.
         """
         nodal = np.abs(self.weights[:, None] * state.traction).ravel()
-        sizes = abs(self.relative).T @ nodal + np.abs(self.load)
+        sizes = abs(self.gap_operator).T @ nodal + np.abs(self.load)
         noise = NOISE_FACTOR * float(np.finfo(float).eps) * terms.sum()
         if not np.abs(self.load).sum() > 0.0 and sizes.sum() <= noise:
             sizes = terms

@@ -149,7 +149,7 @@ class Compliance:
         of_members = blocks_of_members(joined.shapes, lambda shape: shape.flexibility)
         moduli = np.array([member.modulus for member in joined.members])
         return cls(
-            sparse.csr_array(joined.relative @ of_members @ joined.relative.T),
+            sparse.csr_array(joined.gap_operator @ of_members @ joined.gap_operator.T),
             sparse.csr_array(joined.relative_motions.T),
             joined.moduli,
             1.0 / moduli[joined.motion_owner],
@@ -187,7 +187,9 @@ def sparse_response(joined: CoupledMembers, compliance: Compliance, conditions: 
         _blocks(array)[kept]
         for array in (conditions.on_displacement, conditions.on_traction / joined.weights[:, None, None])
     )
-    at_rest = joined.offset + joined.relative @ joined.deformation(joined.load) + compliance.by_force @ given.at_rest
+    at_rest = (
+        joined.prescribed + joined.gap_operator @ joined.deformation(joined.load) + compliance.by_force @ given.at_rest
+    )
     # forces by the square root of the modulus on both sides, motions by its inverse: entries of size one
     row, motion = np.sqrt(compliance.force_unit[kept]), np.sqrt(compliance.motion_unit)
     scaled = sparse.diags_array(row)

@@ -29,7 +29,7 @@ FORMS = pytest.mark.parametrize("is_dense", [True, False])
 def test_floating_blocks_keep_the_promises_of_a_body(is_dense):
     body = row_of_blocks((1.0, 3.0, 0.5), is_dense=is_dense)
     assert body.responses_are_expensive is not is_dense
-    reloaded = body.under([1.3 * member.load for member in body.members], body.offset + 0.1)
+    reloaded = body.under([1.3 * member.load for member in body.members], body.prescribed + 0.1)
     check_body(body, is_symmetric=True, reloaded=reloaded)
 
 
@@ -72,10 +72,10 @@ def test_displacements_of_the_members_go_with_the_state(is_dense):
     body = body.under([member.load for member in body.members], np.linspace(-0.1, 0.1, 2 * body.n_contact))
     state = body.respond(mixed_conditions(body))
     u = body.member_displacements(state)
-    relative = body.relative @ np.concatenate(u) + body.offset
+    relative = body.gap_operator @ np.concatenate(u) + body.prescribed
     assert relative == pytest.approx(state.displacement.ravel(), abs=1e-12)  # displacements of 0.1
     forces = [member.stiffness @ moved - member.load for member, moved in zip(body.members, u, strict=True)]
-    contact = body.relative.T @ (body.weights[:, None] * state.traction).ravel()
+    contact = body.gap_operator.T @ (body.weights[:, None] * state.traction).ravel()
     assert np.concatenate(forces) == pytest.approx(contact, abs=1e-12)
 
 
@@ -119,7 +119,7 @@ def test_each_member_is_judged_by_its_own_forces(is_dense):
     """A block that carries a hundredth of the others, and forces on it that are off by a hundredth of those."""
     body = row_of_blocks((1.0, 1.0, 1.0), press=0.0, is_dense=is_dense)
     loads = [share * member.load for share, member in zip((1.0, 0.01, 1.0), body.members, strict=True)]
-    body = body.under(loads, body.offset)
+    body = body.under(loads, body.prescribed)
     state = body.respond(stick(np.zeros(body.n_contact), np.zeros(body.n_contact)))
     assert body.imbalance(state).is_below(1e-12)
     light = np.flatnonzero(body.owners[0::2].toarray()[:, 1] > 0.0)
@@ -204,10 +204,10 @@ def test_wrong_input_is_named():
             JoinedBodies((member,), coupling, np.zeros(2), np.ones(1)).respond(stick(np.zeros(1), np.zeros(1)))
     held = Member(np.eye(2), np.zeros(2), np.zeros((0, 2)), 1.0)
     for change, words in (
-        ({"offset": np.zeros(3)}, "offset has the shape"),
+        ({"prescribed": np.zeros(3)}, "prescribed has the shape"),
         ({"weights": np.zeros(1)}, "weights has the entry 0"),
-        ({"offset": np.full(2, np.inf)}, "offset contains inf"),
-        ({"members": ()}, "relative has the shape"),
+        ({"prescribed": np.full(2, np.inf)}, "prescribed contains inf"),
+        ({"members": ()}, "gap_operator has the shape"),
     ):
         with pytest.raises(InputError, match=words):
             replace(JoinedBodies((held,), sparse.csr_array(np.eye(2)), np.zeros(2), np.ones(1)), **change)

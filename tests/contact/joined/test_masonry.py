@@ -92,7 +92,7 @@ def test_the_one_block_that_slips_out_is_named():
     last = body.members[-1]
     upwards = last.motions[1] / len(loads[-1]) * 2
     loads[-1] = loads[-1] + 3.0 * upwards  # three times the weight of a half block
-    lifted = find_unsolvable_load(on_foundation(body.under(loads, body.offset), 0.0))
+    lifted = find_unsolvable_load(on_foundation(body.under(loads, body.prescribed), 0.0))
     assert lifted is not None
     assert "'block 4'" in lifted.description
 
@@ -103,7 +103,7 @@ def test_a_leaning_wall_stands_in_steps_up_to_its_limit():
 
     def leaning(share):
         pairs = zip(upright.members, sideways.members, strict=True)
-        return on_foundation(upright.under([a.load + 0.6 * share * b.load for a, b in pairs], upright.offset))
+        return on_foundation(upright.under([a.load + 0.6 * share * b.load for a, b in pairs], upright.prescribed))
 
     falls = solve(leaning(1.02), Fallbacks(), throw=False)
     assert falls.status is Status.UNSOLVABLE_LOAD
