@@ -99,8 +99,8 @@ def check_step(first: Scene, other: Scene) -> None:
     for body, changed in zip_longest(first.rigid, other.rigid):
         if body is None or changed is None or _layout(body) != _layout(changed):
             raise InputError(
-                f"rigid body {(body or changed).name!r} changes its shape, its place or what is given of it: change "
-                "numbers only, or run the scene on its own"
+                f"rigid body {(body or changed).name!r} changes its shape, its position or its given motions and "
+                "loads: change numbers only, or run the scene on its own"
             )
 
 

@@ -1,1 +1,1 @@
-"""Half-planes as contact sees them: strips of their surface, and periodic surfaces."""
+"""Half-planes as bodies of the contact problem: strips of their surface, and periodic surfaces."""

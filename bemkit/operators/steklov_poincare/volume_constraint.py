@@ -64,7 +64,7 @@ class VolumeConstraint:
             raise SingularMatrixError(
                 "the incompressible body (poisson_ratio 0.5) has no free boundary, because supports and contact take "
                 "all of it: leave a part free, end the contact part by `where` before the boundary that never "
-                "touches, or give a poisson_ratio of 0.4999"
+                "touches, or give a poisson_ratio of 0.499999"
             )
         return displacement, total_compliance
 

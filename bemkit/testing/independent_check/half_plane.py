@@ -80,7 +80,7 @@ class Surface:
 
     @property
     def is_periodic(self) -> bool:
-        """Whether it repeats."""
+        """Whether the surface is periodic."""
         surface = self.fields.solution.mesh.surface
         return surface is not None and surface.is_periodic
 

@@ -39,7 +39,7 @@ class Nodes:
     distance : (n_contact,) array [m]
         To the obstacle; infinite where the body faces away from it.
     is_grazing : (n_contact,) bool array
-        Nodes of which round-off decides whether they face away.
+        Nodes for which round-off decides whether they face the obstacle.
     is_supported : (n_contact,) bool array
         Nodes that belong to a support as well: part of their force is a reaction, which no friction law governs.
     displacement, traction : (n_contact, 2) arrays [m], [Pa]
