@@ -41,7 +41,7 @@ def sliding_response(body: LinearBody, is_closed: BoolArray, slides: BoolArray) 
     rows = np.flatnonzero(slides)
     smooth = of_statuses(is_closed, np.ones(n_contact, bool), stick(zero, zero), separated(n_contact))
     if smooth.free_motions(body.rigid_motions()).shape[0]:
-        raise SingularResponse("only friction keeps the body from sliding: add a support")
+        raise SingularResponse("only friction keeps the body from sliding")
 
     def response(moved: FloatArray) -> FloatArray:
         held: LinearConditions = of_statuses(is_closed, ~slides, stick(zero, moved), separated(n_contact))

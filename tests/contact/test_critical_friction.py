@@ -78,5 +78,5 @@ def test_open_nodes_give_way() -> None:
 def test_a_body_that_is_free_to_slide_has_none() -> None:
     stiffness = np.diag([1.0, 0.0])
     body = DenseBody(stiffness, np.zeros(2), np.ones(1), np.array([[[0.0, 1.0]]]), modulus=1.0)
-    with pytest.raises(SingularResponse, match="only friction keeps the body from sliding: add a support"):
+    with pytest.raises(SingularResponse, match="only friction keeps the body from sliding"):
         sliding_response(body, CLOSED, CLOSED)

@@ -162,7 +162,7 @@ def test_coulomb_factors_without_bound_and_what_is_refused() -> None:
     rising = (bk.Gravity(1.0, (0.0, 1.0), is_constant=True), bk.Gravity(1.0, (1.0, 0.0)))
     with pytest.raises(bk.InputError, match="no contact tractions can balance the constant load"):
         bk.coulomb_load_factor(replace(block, bodies=(replace(block.bodies[0], body_forces=rising),)))
-    with pytest.raises(bk.InputError, match="no state of collapse was found: compare largest_load_factor"):
+    with pytest.raises(bk.InputError, match="no state of collapse was found: use largest_load_factor"):
         bk.coulomb_load_factor(block, most_programmes=0)
 
 
