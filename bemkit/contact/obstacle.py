@@ -112,7 +112,7 @@ def _measured(
 
 @dataclass(frozen=True)
 class RigidHalfPlane:
-    """The obstacle fills the half-plane behind a straight line, where the body may not enter.
+    """The obstacle fills the half-plane behind a straight line: ``(x - point) @ normal <= 0``.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Curves: what a side of a body, or a curved element, follows."""
+"""Curves of the sides of a body and of curved elements."""
 
 from __future__ import annotations
 
@@ -290,7 +290,7 @@ class TransformedCurve:
 
     @property
     def magnitude(self) -> float:
-        """Largest length that its evaluation meets [m]: it keeps the round-off of where the original lies."""
+        """Largest length in its evaluation [m]: it includes the round-off at the position of the original."""
         factor = float(np.hypot(*self.matrix[0]))
         before = self.curve.magnitude + float(np.abs(self.origin).max())
         return factor * before + float(np.abs(self.shift).max())
@@ -333,7 +333,7 @@ def reverse_curve(curve: Curve) -> Curve:
 
 
 def as_point(value: tuple[float, float], name: str) -> tuple[float, float]:
-    """Return two finite floats, or say what `name` should have been."""
+    """Return two finite floats; the error explains the form of `name`."""
     try:
         array = np.asarray(value, dtype=float)
     except (TypeError, ValueError):

@@ -1,4 +1,4 @@
-"""Do closed loops of pieces, or arrays of nodes and elements, bound a body on their left."""
+"""Checks that closed loops of pieces, or arrays of nodes and elements, bound a body on their left."""
 
 from collections.abc import Callable, Mapping
 
@@ -173,7 +173,7 @@ def _check_holes_apart(holes: list[int], members: list[Pieces], describe_loop: C
 
 
 def as_index(values: npt.ArrayLike, name: str) -> IntArray:
-    """Return a new integer array, or say that `name` is none."""
+    """Return a new integer array; the error names `name`."""
     array = np.array(values)
     if array.size and array.dtype.kind not in "iu":
         raise GeometryError(f"BoundaryMesh: {name} is an array of {array.dtype}: give an array of integers")

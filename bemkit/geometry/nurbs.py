@@ -17,7 +17,8 @@ if TYPE_CHECKING:
     from scipy.interpolate import BSpline
 
 _END = 1e-7
-"""How close to an end where the curve has no speed, its control points being one, its tangent is taken."""
+"""Distance from an end with coincident control points, where the curve has no speed, at which the tangent is
+evaluated."""
 
 
 @dataclass(frozen=True, eq=False)

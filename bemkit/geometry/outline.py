@@ -1,4 +1,4 @@
-"""Outlines: named sides joined to closed loops around a body, and which pieces of them a boundary part covers."""
+"""Outlines: named sides joined to closed loops around a body, and the pieces of them in a boundary part."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -18,7 +18,8 @@ _JOINT_TOLERANCE = 64 * RESOLUTION  # times the coordinates: trigonometry and sp
 _N_SEEN = 4  # points of a side that define its size, also of a closed one
 _LEAST_SPLITS = 4  # 16 pieces, 9 tangents each: a side with fewer than about 30 waves is seen as it is
 N_SAMPLES = 257
-"""Points at which a predicate is looked at along a side; 2**k + 1, so that halves and quarters are among them."""
+"""Number of points at which a predicate is sampled along a side; 2**k + 1, so that halves and quarters are among
+them."""
 _N_FINER, _N_PASSES = 4097, 5  # 1 / (256 * 4096**4) is less than the spacing of numbers near 1
 _END_TOLERANCE = 1e-12  # a part does not begin this close to the end of its side: that is round-off of the predicate
 
@@ -61,7 +62,7 @@ class Drawing:
     Parameters
     ----------
     notes : tuple of str
-        What the reader of a file had to do or to assume to make it of the file.
+        Notes and assumptions of the reader of the file.
     unit : str
         Unit of length that the file states; empty if it states none.
     """

@@ -15,13 +15,13 @@ from bemkit.geometry.pieces import overlapping_boxes
 from bemkit.geometry.vectors import norms
 
 ROUND_OFF = 1e-6
-"""Depth, relative to the size of the smaller body, up to which it may be round-off of curves."""
+"""Depth that may be round-off of curves, relative to the size of the smaller body."""
 _PIECES = 8
 """Straight pieces of the polyline along an element."""
 _SHIFT = np.array([3.7e-9, 7.3e-9])
-"""Shift of points, relative to the size of a body, before rays are followed from them."""
+"""Shift of points before rays are followed from them, relative to the size of a body."""
 _MOST_POINTS = 4000
-"""Points of a boundary that are compared with an outline; of longer boundaries some are skipped."""
+"""Largest number of points of a boundary that are compared with an outline; others are skipped."""
 _ENTRIES = 1_000_000
 """Pairs of points and pieces that are compared at once."""
 

@@ -28,7 +28,7 @@ _MOST_SPLITS = 24  # the tip of a thin ellipse turns on as little of its length 
 RESOLUTION = 8 * float(np.finfo(float).eps)
 """Points closer than this times the size of their coordinates are the same point: they differ by round-off only."""
 _FEW_BOXES = 64
-"""So many boxes are compared each with each."""
+"""Number of boxes that are compared each with each."""
 _MOST_HALVED = 1_000_000  # more pairs than this mean two curves that all but coincide
 
 
@@ -120,7 +120,7 @@ def split_until_flat(pieces: Pieces, describe: Callable[[int], str], least_split
     describe : callable
         Number of an owner -> how a message calls it.
     least_splits : int
-        Split this often in any case, so that the sampled tangents see what a long side does.
+        Least number of splits, so that the sampled tangents resolve a long side.
 
     Raises
     ------

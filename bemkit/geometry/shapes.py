@@ -314,8 +314,8 @@ class PeriodicHalfPlane(CheckedShape):
 
     Notes
     -----
-    A resultant force displaces the surface without limit relative to points far below. Displacements are such that a
-    mean traction T moves the surface by ``period T / (pi E')`` in the mean, as a wave as long as the period would.
+    A resultant force displaces the surface without limit relative to points far below. By definition a mean traction T
+    displaces the surface by ``period T / (pi E')`` in the mean, like a wave of the length of the period.
     """
 
     period: float

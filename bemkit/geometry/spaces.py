@@ -1,4 +1,4 @@
-"""Boundary element spaces: what a displacement or traction looks like on each element."""
+"""Boundary element spaces: the functions of displacements and tractions on each element."""
 
 from __future__ import annotations
 

@@ -9,17 +9,17 @@ from bemkit.geometry.errors import GeometryError, format_point
 from bemkit.geometry.vectors import norms
 
 _STRAIGHT = 1e-9
-"""Distance of a node from the line between the ends of the strip, relative to its length, that round-off explains."""
+"""Distance of a node from the line between the ends of the strip that is round-off, relative to its length."""
 
 
 @dataclass(frozen=True)
 class Surface:
-    """Says of an outline or a mesh that it is a strip of the surface of a half-plane, free of traction elsewhere.
+    """Marks an outline or a mesh as a strip of the surface of a half-plane, free of traction elsewhere.
 
     Parameters
     ----------
     is_periodic : bool
-        Whether the strip is one period of a surface that goes on like it on both sides.
+        Whether the strip is one period of a periodic surface.
     """
 
     is_periodic: bool = False

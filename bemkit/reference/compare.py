@@ -1,6 +1,6 @@
 """Reference data: fields at points of the contact boundary, resultants, and transition points.
 
-References are exact, come from elsewhere, or are fine solutions.
+References are exact, from other programs, or fine solutions.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ MEASURES: Mapping[str, str] = MappingProxyType(
 )
 """The relative errors that `errors_of` measures, by name, with words for tables and figures."""
 FINEST = 1e-9
-"""The accuracy asked for; far below it round-off would decide the status of nodes beside a place of change."""
+"""Accuracy of fine solutions; far below it round-off would decide the status of nodes beside a transition."""
 COLUMNS = ("u_n", "u_t", "sigma_n", "sigma_t")
 
 
@@ -113,16 +113,16 @@ class SampledFields:
 
 @dataclass(frozen=True, eq=False)
 class Reference:
-    """The answer that others are measured against.
+    """A reference solution for errors.
 
     Parameters
     ----------
     source : str
-        Where it comes from, in a few words.
+        Its source, in a few words.
     places : tuple of SamplePoints
     answer : SampledFields
     own_errors : mapping of str to float
-        How far it may itself be wrong, by the names of `MEASURES`; by default round-off.
+        Its own errors, by the names of `MEASURES`; by default round-off.
     """
 
     source: str

@@ -1,4 +1,4 @@
-"""Slip, energy that cycles of load lose, and limits of friction, in closed form."""
+"""Slip, energy lost in load cycles, and limits of friction, in closed form."""
 
 from __future__ import annotations
 

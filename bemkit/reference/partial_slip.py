@@ -1,4 +1,4 @@
-"""Press, then shear by less than the friction can hold: Cattaneo and Mindlin, and Ciavarella and Jaeger for any zone.
+"""Pressed and then sheared contacts in partial slip: Cattaneo and Mindlin, and Ciavarella and Jaeger for any zone.
 
 Valid where normal and tangential contact do not influence each other: two bodies alike in elasticity, or an
 incompressible one on a rigid one. The load is applied in two steps, under the incremental law: pressed first, then

@@ -1,7 +1,7 @@
 """Frictionless contact along one smooth zone, symmetric about its middle, to round-off.
 
 The pressure is sqrt(1 - (x/a)^2) times a sum of even Chebyshev polynomials, and the contact condition is an integral
-equation for their coefficients. Nothing of this shares code with the boundary elements that it is the measure of.
+equation for their coefficients. It shares no code with the boundary elements that it verifies.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ N_TERMS = 24
 """Coefficients. On a straight boundary a dozen leave round-off; a curved one makes the pressure less smooth, and the
 error then falls like the fourth power of their number."""
 _N_PANELS = 36
-"""Panels on either side of a point, each half as long as the one before it towards the point."""
+"""Number of intervals on either side of a point, each half as long as the one before it towards the point."""
 _N_POINTS = 10
 
 
@@ -85,7 +85,7 @@ def solve_pressure(
 
 
 def half_width_for(load: float, load_of: Callable[[float], float], near: float) -> float:
-    """Find the half-width [m] at which a load is carried, which grows with it, from a first guess."""
+    """Find the half-width [m] of contact under a load, which grows with it, from a first guess."""
     from scipy.optimize import brentq
 
     low = high = near
@@ -109,7 +109,7 @@ def places_along(length: float, ends: tuple[float, ...]) -> tuple[FloatArray, Fl
 
 
 def _graded_rule(n_panels: int, n_points: int) -> tuple[FloatArray, FloatArray]:
-    """Gauss points and weights on (0, 1), on panels each half as long as the next one towards zero."""
+    """Gauss points and weights on (0, 1), on intervals each half as long as the next one towards zero."""
     xi, weights = gauss_legendre(n_points)
     edges: FloatArray = np.concatenate([[0.0], 0.5 ** np.arange(n_panels - 1, -1, -1)])
     half: FloatArray = 0.5 * np.diff(edges)[:, None]
@@ -119,7 +119,8 @@ def _graded_rule(n_panels: int, n_points: int) -> tuple[FloatArray, FloatArray]:
 def _rule(kernel: Kernel, half_width: float, x: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return places y / a and weights (n_points, n_places) that integrate kernel(x - y) sqrt(1 - (y/a)^2) over a zone.
 
-    With y = a sin(phi) the integrand is smooth but for the kernel at the point itself, towards which panels are graded.
+    With y = a sin(phi) the integrand is smooth except for the kernel at the point itself, towards which intervals are
+    graded.
     """
     fraction, weight = _graded_rule(_N_PANELS, _N_POINTS)
     angles = np.arcsin(np.clip(x / half_width, -1.0, 1.0))[:, None]

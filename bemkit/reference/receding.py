@@ -1,7 +1,7 @@
 """A layer that a strip of pressure presses onto an elastic half-plane or a rigid base: receding contact.
 
-Frictionless and weightless. Where contact ends depends neither on the load nor on Poisson's ratios, and is found from
-the equation of equal deflections in Fourier space by Chebyshev polynomials.
+Without friction and weight. The end of contact depends neither on the load nor on Poisson's ratios. It follows from
+equal deflections in Fourier space, solved by Chebyshev polynomials.
 """
 
 from __future__ import annotations
@@ -133,7 +133,7 @@ def _transform(spectrum: FloatArray, x: FloatArray) -> FloatArray:
 
 
 def _frequencies() -> tuple[FloatArray, FloatArray]:
-    """Gauss points and weights on panels of length one."""
+    """Gauss points and weights on intervals of length one."""
     xi, weights = gauss_legendre(12)
     starts = np.arange(_LARGEST_FREQUENCY)[:, None]
     return (starts + 0.5 * (1.0 + xi)).ravel(), np.tile(0.5 * weights, starts.size)

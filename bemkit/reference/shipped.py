@@ -1,4 +1,4 @@
-"""Which reference belongs to a scene; the paper's examples by elements of rising degree (`docs/make_references.py`).
+"""The references of shipped scenes; the paper's examples by elements of rising degree (`docs/make_references.py`).
 
 Plane strain, one static step, friction coefficients 0.5 and 0.1. Finite elements that share nothing with bemkit agree
 to the 1e-7 that they can claim (`tests/reference/test_paper.py`).
@@ -48,7 +48,7 @@ def find_reference(scene: Scene) -> Reference | None:
 
 
 def _problem(scene: Scene) -> Scene:
-    """Leave only what determines the exact solution."""
+    """Return a scene reduced to the data that determine the exact solution."""
     return replace(
         scene,
         title="problem",

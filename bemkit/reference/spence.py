@@ -1,4 +1,4 @@
-"""How much of the contact of a rigid indenter with a half-plane sticks under Coulomb friction: Spence's problem.
+"""The stick zone below a rigid indenter on a half-plane with Coulomb friction: Spence's problem.
 
 The zone -a < x < a sticks within -c < x < c and slips outside of it. Under a load that only grows, slip counted from
 increment to increment, c / a is the same for flat, parabolic and all indenters of a power of x ([Spence1975]): after
@@ -22,7 +22,7 @@ from bemkit.reference.hertz import check_positive
 from bemkit.reference.punches import coupling
 
 _N_LEVELS, _N_POINTS = 26, 7
-"""Panels, each half as long as the one before, towards the ends of zones, and Gauss points on each."""
+"""Number of intervals, each half as long as the one before, towards the ends of zones, and Gauss points on each."""
 
 
 def spence_stick_ratio(friction: float, material: Material) -> float:
@@ -144,12 +144,12 @@ class _Zones:
 
 
 def _graded(n_levels: int) -> FloatArray:
-    """Return the ends of panels on (0, 1) that are each half as long as the next one."""
+    """Return the ends of intervals on (0, 1) that are each half as long as the next one."""
     return np.concatenate([[0.0], 0.5 ** np.arange(n_levels - 1, -1, -1.0)])
 
 
 def _running_integrals(half_lengths: FloatArray) -> FloatArray:
-    """Return what takes values at Gauss points to integrals from the start to each of these points."""
+    """Return the matrix from values at Gauss points to integrals from the start to each of these points."""
     xi, weights = gauss_legendre(_N_POINTS)
     n_panels = half_lengths.size
     powers = np.vander(xi, increasing=True)
@@ -161,11 +161,11 @@ def _running_integrals(half_lengths: FloatArray) -> FloatArray:
 
 
 def _log_integrals(cuts: FloatArray, places: FloatArray) -> FloatArray:
-    """Return what takes values at the Gauss points of panels to the integrals of log|place - t| times them.
+    """Return the matrix from values at Gauss points of intervals to their integrals with log|place - t|.
 
     Notes
     -----
-    int log|z - t| P_k(t) dt = 2 (Q_(k+1)(z) - Q_(k-1)(z)) / (2 k + 1) beside a panel, Gauss points away from it.
+    int log|z - t| P_k(t) dt = 2 (Q_(k+1)(z) - Q_(k-1)(z)) / (2 k + 1) beside an interval, Gauss points away from it.
     """
     legendre = np.polynomial.legendre
     xi, weights = gauss_legendre(_N_POINTS)

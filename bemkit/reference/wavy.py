@@ -1,4 +1,4 @@
-"""A block between rollers on a wavy obstacle: Westergaard's pressure, and the answer of a block of finite height."""
+"""A block between rollers on a wavy obstacle: Westergaard's pressure, and the solution for a block of finite height."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from bemkit.reference.compare import Reference, SampledFields, SamplePoints, Zon
 from bemkit.reference.pressure import N_TERMS, EvenPressure, half_width_for, places_along, solve_pressure
 
 _N_MODES = 4
-"""Modes whose compliance the far side changes; the fifth is changed by less than 1e-30."""
+"""Number of modes whose compliance the far side changes; for the fifth the change is less than 1e-30."""
 
 
 def westergaard_half_width(mean_pressure: float, amplitude: float, wavelength: float, plane_modulus: float) -> float:
-    """Return where contact ends on a wave of the height amplitude (1 - cos(2 pi x / wavelength)).
+    """Return the half-width of contact on a wave of the height amplitude (1 - cos(2 pi x / wavelength)).
 
     Parameters
     ----------

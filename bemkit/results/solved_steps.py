@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from bemkit.notebook import ShownInNotebooks
-from bemkit.result_warning import without_duplicates
+from bemkit.result_warning import ResultWarning, without_duplicates
 from bemkit.results.solution import Solution
 from bemkit.solvers.base import StepRecord
 
@@ -73,16 +73,18 @@ def following(so_far: Solution | None, solution: Solution, stated: Scene, number
     name = f"load step {number} of {n_steps}"
     before = () if so_far is None else (so_far,)
     total = with_totals(solution, [*before, solution], [*("" for _ in before), name])
-    earlier = [
-        each
-        if each.step is not None
-        else replace(each, step=number - 1, text=f"Load step {number - 1} of {n_steps}: {each.text}")
-        for each in (() if so_far is None else so_far.warnings)
-    ]
-    warnings = without_duplicates((*solution.warnings, *earlier))
     loading = None if solution.loading is None else replace(solution.loading, asked=stated)
-    message = f"{name}: {solution.message}"
-    return replace(total, message=message, loading=loading).with_warnings(warnings)
+    result = replace(total, message=f"{name}: {solution.message}", loading=loading)
+    # the warnings of this step first: of equal ones the first is kept
+    earlier = (_of_step(warning, number - 1, n_steps) for one in before for warning in one.warnings)
+    return result.with_warnings(without_duplicates((*solution.warnings, *earlier)))
+
+
+def _of_step(warning: ResultWarning, number: int, n_steps: int) -> ResultWarning:
+    """Return a warning that names its step; a warning from a step before does already."""
+    if warning.step is not None:
+        return warning
+    return replace(warning, step=number, text=f"Load step {number} of {n_steps}: {warning.text}")
 
 
 def continued(records: Sequence[StepRecord], further: Iterable[StepRecord], words: str = "") -> tuple[StepRecord, ...]:

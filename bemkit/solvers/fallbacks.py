@@ -96,7 +96,11 @@ class Fallbacks:
         driver, n_steps = self.drivers[iterate.index], iterate.n_steps + 1
         inner = driver.step(problem, iterate.inner)
         if inner.ended is None and n_steps >= driver.max_steps:
-            inner = replace(inner, ended=Status.STALLED, message=f"no solution after {n_steps} steps")
+            inner = replace(
+                inner,
+                ended=Status.STALLED,
+                message=f"no solution after {n_steps} {'step' if n_steps == 1 else 'steps'}",
+            )
         following = replace(
             iterate,
             state=inner.state,

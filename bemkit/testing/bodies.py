@@ -15,7 +15,7 @@ from bemkit.errors import InputError
 from bemkit.testing.failure import demand
 
 _MARGIN = 1e3
-"""Errors allowed, in units of the accuracy that a body states: the condition of a response may magnify its errors."""
+"""Allowed errors, in units of the stated accuracy of a body: the condition of a response may magnify its errors."""
 
 
 def check_body(

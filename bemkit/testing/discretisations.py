@@ -73,7 +73,7 @@ def _check_spaces(discretisation: Discretisation, name: str, mesh: BoundaryMesh)
 
 
 def _check_map(discretisation: Discretisation, name: str) -> None:
-    """Check the matrix of the map: rigid motions cost no forces, and it has what its tags promise."""
+    """Check the matrix of the map: rigid motions cause no forces, and its tags are true."""
     mesh = _tension(discretisation).build_mesh()
     elastic = discretisation.elastic_map(mesh, _MATERIAL, DenseCholesky())
     n_nodes = elastic.displacement_space.n_dofs // 2

@@ -10,7 +10,7 @@ from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.testing.failure import demand, evaluated
 
 _STEP = 1e-5
-"""Length of steps, by the size of the boundary: the curvature of a surface changes gaps by their squares."""
+"""Length of steps, relative to the size of the boundary: the curvature of a surface changes gaps by their squares."""
 _SLOPE = 1e-3
 """Error of slopes from differences of gaps: curvature radii down to a hundredth of the size of the boundary."""
 

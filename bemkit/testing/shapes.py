@@ -13,7 +13,7 @@ from bemkit.testing.spaces import check_curve
 
 _SEEN = np.linspace(0.0, 1.0, 9)
 _ELEMENTS = 16
-"""Elements on each side of the mesh by which the sense of the boundary is checked."""
+"""Number of elements on each side in the check of the sense of the boundary."""
 
 
 def check_shape(shape: Shape) -> None:

@@ -80,7 +80,7 @@ def test_fallbacks_name_all_reasons_when_the_last_driver_has_ended():
     found = solve(problem, drivers, throw=False)
     assert found.status is Status.STALLED
     assert "FixedPoint: " in found.message
-    assert "Fallbacks: Idle: no solution after 1 steps; Idle: no solution after 2 steps" in found.message
+    assert "Fallbacks: Idle: no solution after 1 step; Idle: no solution after 2 steps" in found.message
 
 
 def test_the_path_begins_at_the_sets_reached_and_the_whole_path_anew():

@@ -1,1 +1,1 @@
-"""The elastic body seen by contact: all unknowns but those of the contact nodes are eliminated."""
+"""The elastic body of the contact problem: all unknowns but those of the contact nodes are eliminated."""

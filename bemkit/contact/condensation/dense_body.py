@@ -14,11 +14,11 @@ from bemkit.contact.equilibrium import Imbalance, Unbalanced
 from bemkit.errors import InputError
 
 _SMALLEST_RCOND = 1e-13
-"""Below this reciprocal condition number of a row-scaled system its matrix counts as singular. A condensed stiffness
-of a floating body leaves 1e-15 of its free motions; solvers that are refused without need only take a detour."""
+"""Below this reciprocal condition number of a row-scaled system its matrix counts as singular. The condensed stiffness
+of a floating body leaves 1e-15 of its free motions; solvers that are refused without need only take other steps."""
 
 _LEFT_OVER = 1e-9
-"""Stiffnesses below this share of the largest may be what round-off leaves of none."""
+"""Stiffness that may be round-off of zero, relative to the largest."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -129,7 +129,7 @@ class WholeBody:
         Parameters
         ----------
         of_contact : Unbalanced
-            What the contact nodes leave of their balance.
+            Imbalance of the contact nodes.
         retained : (n_retained,) array [m]
         column_sums : (n,) array [Pa]
             Sums of the sizes of the columns of the stiffness at the contact nodes.

@@ -18,7 +18,7 @@ from bemkit.contact.conditions import LinearConditions
 from bemkit.errors import InputError
 
 _JAMS = 1e-9
-"""Effective pressure by normal traction, relative to its two terms, below which friction cancels the pressure."""
+"""Effective pressure by normal traction that friction cancels, relative to its two terms."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,4 +1,4 @@
-"""A body with compressed boundary equations as the contact solvers see it."""
+"""A body with compressed boundary equations for the contact solvers."""
 
 from __future__ import annotations
 
@@ -364,7 +364,7 @@ def hierarchical_body(
     force: FloatArray,
     inside: ForcesInside | None = None,
 ) -> HierarchicalBody:
-    """Return a body with compressed equations as contact solvers see it.
+    """Return a body with compressed equations for the contact solvers.
 
     Parameters
     ----------

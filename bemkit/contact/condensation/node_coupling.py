@@ -17,7 +17,7 @@ from bemkit.contact.condensation.nodes import ContactNodes
 from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions
 
 _ROUND_OFF = 1e-6
-"""A larger share is not round-off: it stays, and the certificate measures it."""
+"""Largest share that is round-off and removed; the certificate measures a larger one."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,9 +149,9 @@ def resisting_none(stiffness: FloatArray, motions: FloatArray) -> FloatArray:
     Notes
     -----
     A body that supports leave free to move resists no rigid motion, and its load does on it the work of all given
-    forces (`with_work`). Elimination keeps that to the round-off of the forces on the whole body. A contact much
-    smaller than the body, such as a pin in a plate, has short lever arms: there the same round-off would be forces that
-    turn the body, by far.
+    forces (`with_work`). Elimination fulfils both only to the round-off of the forces on the whole body. A contact much
+    smaller than the body, such as a pin in a plate, has short lever arms, so that the same round-off would be a large
+    force that turns the body.
     """
     if not len(motions):
         return stiffness

@@ -1,4 +1,4 @@
-"""The displacement nodes on a contact boundary, and what supports and obstacles give at each of them."""
+"""The displacement nodes on a contact boundary, with the conditions of supports and obstacles at each."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from bemkit.geometry.vectors import turned_left
 from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions, free_modes
 
 APPROACH_TOLERANCE = 1e-3
-"""Cosine of the angle between the one direction in which a supported node can move and the direction of contact below
-which contact there is left to the support: it would have to slide a thousand times as far as it closes the gap."""
+"""Least cosine of the angle between the direction in which a supported node can move and the direction of contact.
+Below it the node would slide a thousand times as far as it closes the gap, and takes no part in contact."""
 
 
 class NoContactNodesError(InputError):

@@ -13,7 +13,7 @@ from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions
 def surface_body(
     elastic: SurfaceElasticity, conditions: NodalConditions, nodes: ContactNodes, force: FloatArray
 ) -> SurfaceBody:
-    """Return a half-plane as contact sees it; the parameters are those of `SurfaceBody`."""
+    """Return the body of a half-plane for the contact problem; the parameters are those of `SurfaceBody`."""
     if isinstance(elastic, HalfPlaneElasticity):
         from bemkit.contact.half_plane.large_strip_body import LargeStripBody
         from bemkit.operators.half_plane.large import LargeHalfPlane

@@ -16,7 +16,7 @@ from bemkit.operators.hierarchy.system import LocalConditions, NodeConditions
 from bemkit.operators.linear.dense import SingularMatrixError
 
 _SAMPLED = 24
-"""Elements in contact whose equations are evaluated without compression for the certificate."""
+"""Number of elements in contact whose equations the certificate evaluates without compression."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -21,7 +21,7 @@ class StripBody(SurfaceBody):
     Parameters
     ----------
     kept : list
-        What was factored last, and the factor: conditions that differ only in values take it again.
+        The last factored conditions, and the factor: conditions that differ only in values use it again.
 
     Notes
     -----

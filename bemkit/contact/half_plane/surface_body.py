@@ -192,7 +192,7 @@ class SurfaceBody(LinearBody):
     def _solved(self, reduced: ReducedConditions) -> tuple[ComplexArray, FloatArray]:
         """Return tractions (n_acting,) and driven motions (n_driven,).
 
-        Long travel is subtracted first: beside it the deformation would have few digits.
+        A long rigid motion is subtracted first, since the deformation would lose digits beside it.
         """
         known = reduced.given
         if reduced.n_unknowns == 0:

@@ -1,1 +1,1 @@
-"""Several elastic bodies in mutual contact, as one body that contact solvers see."""
+"""Several elastic bodies in mutual contact, as one body for the contact solvers."""

@@ -17,7 +17,7 @@ from bemkit.errors import InputError
 from bemkit.operators.linear.null_space import null_space
 
 _ROUNDS = 2
-"""Times that rigid motions are fitted: normal equations hold half of the digits, which is too few for stiff bodies."""
+"""Number of fits of rigid motions: normal equations hold half of the digits, too few for stiff bodies."""
 _DEPENDENT = 1e-12
 """Squared sine of the angle between the two rows of a node below which one displacement gives both components."""
 
@@ -148,7 +148,7 @@ class CoupledMembers:
 
     @cached_property
     def moduli(self) -> FloatArray:
-        """(2 n_contact,) array: the E' of the partner that yields more, in each component of contact [Pa]."""
+        """(2 n_contact,) array: the E' of the more compliant partner, in each component of contact [Pa]."""
         return self.least_of_partners(np.array([member.modulus for member in self.members]))
 
     @cached_property
@@ -173,7 +173,7 @@ class CoupledMembers:
         return self._named(self._is_moved(coefficients))
 
     def partners_of(self, coefficients: FloatArray) -> str:
-        """Name the members at rest that these touch; if there are none, the obstacle or each other."""
+        """Name the members at rest in contact with these; if there are none, the obstacle or each other."""
         is_moved = self._is_moved(coefficients)
         has_moved_owner = self.owners @ is_moved.astype(float) > 0.0
         is_partner = (np.asarray(self.owners.T @ has_moved_owner.astype(float)) > 0.0) & ~is_moved

@@ -24,7 +24,7 @@ class RelativeStiffness:
     Raises
     ------
     SingularMatrixError
-        If a tie repeats what others say.
+        If a tie is redundant.
 
     Notes
     -----

@@ -18,15 +18,15 @@ from bemkit.contact.joined.dense_form import RelativeStiffness
 from bemkit.contact.joined.sparse_form import Compliance, sparse_response
 
 LIGHTEST = 1e-3
-"""Forces on a member are measured by at least this share of the largest forces on any: one linear system solves for all
-of them, and its round-off is everywhere."""
+"""Least scale of the forces on a member, relative to the largest forces on any member: all belong to one linear system,
+whose round-off affects each."""
 MOST_DENSE = 2500
 """Largest number of contact components and rigid motions for which a dense stiffness is formed."""
 MOST_CONTRAST = 1e6
 """Largest ratio of moduli for which it is formed: of stiffer bodies the sparse form keeps strain and motion apart."""
 
 _ROUND_OFF = 1e-12
-"""Forces of missed relative displacements, relative to all forces, from which on a response is refined."""
+"""Forces of missed relative displacements at which a response is refined, relative to all forces."""
 
 _WITHOUT_LOAD = (
     *(
@@ -156,7 +156,7 @@ class JoinedBodies(CoupledMembers, LinearBody):
         -------
         Imbalance
             `force` is the largest relative displacement that no deformation and no motion of the members explains, as
-            the force it would take (E' of the partner that yields more); `moment` the work of load and contact forces
+            the force it would take (E' of the more compliant partner); `moment` the work of load and contact forces
             on a rigid motion of a member, of largest entry one. The first is relative to the largest force on the
             lightest loaded member there, the second to the sum of all forces on the member. Members that carry nothing
             are measured by a thousandth of the largest forces on any.

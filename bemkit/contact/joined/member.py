@@ -14,10 +14,10 @@ from bemkit.arrays import FloatArray, IntArray, read_only
 from bemkit.errors import InputError
 
 _MOTIONS_ARE_FREE = 1e-6
-"""Forces of rigid motions, relative to the largest entry of the stiffness, up to which these are free: errors of
-quadrature are smaller, forces of supports larger."""
+"""Largest forces of free rigid motions, relative to the largest entry of the stiffness: errors of quadrature are
+smaller, forces of supports larger."""
 _LARGEST_CONDITION = 1e13
-"""Condition number of a held stiffness from which on it counts as singular."""
+"""Condition number of a held stiffness that counts as singular."""
 
 
 @dataclass(frozen=True, eq=False)

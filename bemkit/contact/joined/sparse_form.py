@@ -29,9 +29,9 @@ rows are scaled before. The caller refines the solution, because it knows the ma
 
 Solve = Callable[[FloatArray], FloatArray]
 _SMALLEST_RCOND = 1e-15
-"""Reciprocal condition number from which on the system counts as singular; free motions are found before."""
+"""Reciprocal condition number of a singular system; free motions are found before."""
 _LARGEST_RESIDUAL = 1e-13
-"""Residual, relative to its terms, from which on a factorisation counts as failed."""
+"""Residual of a failed factorisation, relative to its terms."""
 _POOR_RCOND = 1e-9
 """Reciprocal condition number below which residuals are computed with more digits: bodies that are 1e7 times stiffer
 than their neighbours move by that much more than they deform."""
@@ -133,7 +133,7 @@ class Compliance:
     by_force : (2 n_contact, 2 n_contact) sparse array [1/Pa]
     by_motion : (2 n_contact, n_motions) sparse array [-]
     force_unit : (2 n_contact,) array [Pa]
-        E' of the partner that yields more; ``by_force`` times this is of size one.
+        E' of the more compliant partner; ``by_force`` times this is of size one.
     motion_unit : (n_motions,) array [1/Pa]
         1 / E' of the member that moves.
     """

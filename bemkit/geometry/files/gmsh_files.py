@@ -20,7 +20,8 @@ from bemkit.geometry.files.plane_mesh import CellBlock, PlaneMesh, in_plane
 from bemkit.geometry.files.strokes import Stroke
 
 _N_SAMPLES = 129
-"""Points of a curve of a geometry, ends included: a cubic spline through them is as good as round-off of most files."""
+"""Number of points of a curve of a geometry, with its ends: a cubic spline through them is as accurate as most
+files."""
 _CORNERS = {"Line": 2, "Triangle": 3, "Quadrilateral": 4}
 _CALLS = re.compile(
     rb"\b(System|SystemCall|NonBlockingSystemCall|OnelabRun|OnelabRunClient|UnlinkFile|DeleteFile|RenameFile|CreateDir|"

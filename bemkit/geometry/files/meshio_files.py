@@ -71,7 +71,7 @@ def require_meshio() -> None:
 
 
 def _read_quietly(path: Path) -> Any:
-    """Read a file; meshio prints what it dislikes, and may leave the interpreter."""
+    """Read a file without the printed warnings of meshio, which may also exit the interpreter."""
     import meshio
 
     said = io.StringIO()

@@ -15,7 +15,7 @@ from bemkit.geometry.files.strokes import closed_chains
 from bemkit.geometry.vectors import cross
 
 _PLANE = 1e-9
-"""Deviation from a plane, relative to the size, that round-off explains."""
+"""Deviation from a plane that is round-off, relative to the size."""
 
 
 @dataclass(frozen=True)

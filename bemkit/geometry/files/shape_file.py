@@ -34,7 +34,7 @@ class Drawn:
     strokes : list of Stroke
         In any order and sense.
     notes : list of str
-        What was done to read it.
+        Notes on how it was read.
     unit : str
         Unit of length that the file states; empty if none.
     tolerance : float

@@ -22,9 +22,9 @@ StrokeSide: TypeAlias = LineTo | ArcTo | SplineTo | NurbsTo
 
 _SEEN = np.linspace(0.0, 1.0, 17)
 _ROUND_OFF = 1e-12
-"""Gaps, relative to the coordinates, that are not worth a word."""
+"""Gaps that are closed without a note, relative to the coordinates."""
 _STRAIGHT = 1e-9
-"""Distance of control points from the chord of what is a line, relative to the chord."""
+"""Largest distance of the control points of a line from its chord, relative to the chord."""
 
 
 @dataclass(frozen=True)

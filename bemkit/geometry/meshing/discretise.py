@@ -22,11 +22,11 @@ from bemkit.geometry.outline import Outline, Selection
 from bemkit.geometry.symmetry import Symmetry
 
 ALIKE = 1.2
-"""Ratio of two neighbouring element lengths up to which nothing is done."""
+"""Largest ratio of two neighbouring element lengths without a gradual transition."""
 GROWTH = 0.3
 """Growth of the element length per length of boundary, unless there are too few elements for so little."""
 TIE = 1e-6
-"""A neighbour has shorter elements if they are shorter by more than this share: lengths hold few digits far away."""
+"""Least relative difference of the lengths of shorter elements: lengths have few digits far from the origin."""
 LARGEST_STRETCH = 2.0
 """No element is longer than this many times the mean of its piece."""
 

@@ -17,7 +17,7 @@ from bemkit.geometry.vectors import norms
 
 _INNER = np.array([0.25, 0.5, 0.75])
 _N_PANELS, _N_POINTS = 64, 6
-"""Panels and points of integrals: twelve digits for arcs, and for splines, which have a bounded third derivative."""
+"""Intervals and points of integrals: twelve digits for arcs, and for splines, which have a bounded third derivative."""
 
 
 @dataclass(frozen=True)
@@ -77,7 +77,7 @@ class Division:
         return replace(self, pieces=tuple(pieces))
 
     def half(self, symmetry: Symmetry) -> "Division":
-        """Return what lies on the side x <= a, y <= b of symmetry lines.
+        """Return the pieces on the side x <= a, y <= b of symmetry lines.
 
         Raises
         ------
@@ -119,19 +119,23 @@ class Division:
             Elements run along each loop in order, node i starts element i; the nodes that start none come last.
         """
         outline = self.outline
+        # the node at the start of each element, piece by piece, and the side and part of the element
         along = list(zip(self.pieces, parameters, strict=True))
         nodes = [outline.sides[piece.side].curve.point(s[:-1]) for piece, s in along]
         counts = [len(points) for points in nodes]
         side = np.repeat([piece.side for piece in self.pieces], counts)
         part = np.repeat([piece.part or "" for piece in self.pieces], counts)
-        is_curved = np.array([not side.curve.is_straight for side in outline.sides])
+        # an element ends at the next node, the last one of a piece at the first node of the following piece
         after = np.cumsum(counts)
         ends = np.arange(1, after[-1] + 1)
         following = self.following
         ends[after - 1] = (after - counts)[following]
-        loose = np.flatnonzero(following < 0)  # on a symmetry line, or at the end of a half-plane
+        # pieces without a following one, on a symmetry line or at the end of a half-plane, end at nodes of their own
+        loose = np.flatnonzero(following < 0)
         ends[after[loose] - 1] = after[-1] + np.arange(len(loose))
         nodes += [outline.sides[self.pieces[k].side].curve.point(parameters[k][-1:]) for k in loose.tolist()]
+        # curves are numbered without the straight sides
+        is_curved = np.array([not side.curve.is_straight for side in outline.sides])
         return BoundaryMesh(
             np.concatenate(nodes),
             np.column_stack([np.arange(after[-1]), ends]),

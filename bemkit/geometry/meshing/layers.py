@@ -24,30 +24,31 @@ FACTOR = 0.2
 FIRST_LAYERS = (1, 2)
 """Layers to begin with: at corners and ends of parts, and where the contact status changes."""
 MOST_LAYERS = 3
-"""Layers that an end gains at once: the estimate behind them is one of the mesh before."""
+"""Largest number of layers that an end gains at once, since their number follows from an estimate on the mesh
+before."""
 SHORTEST = 1e3 * float(np.finfo(float).eps)
-"""Least length of an element relative to the largest coordinate: shorter ones would not be held to three digits."""
+"""Least length of an element, relative to the largest coordinate: shorter ones would have less than three digits."""
 STEEPEST = 7.0
 """Largest ratio of the lengths of two elements that meet at an end of their pieces. The error of a long one would fall
 on a short one as a peak of its traction."""
 NEXT_MOTION = 0.1
-"""How far places where the contact status changes move from one mesh to the next, relative to the mesh before."""
+"""Motion of the transitions from one mesh to the next, relative to the motion before."""
 LARGEST_TURN = np.pi / 4.0
 """Angle by which a curve may turn on one element."""
 
 
 def probing_partition(base: Division, even: Collection[str], n_elements: int) -> Partition:
-    """Divide an outline of whose solution nothing is known, to find where the contact status changes.
+    """Divide an outline without a known solution, to locate the transitions.
 
     Parameters
     ----------
     base : Division
         The outline cut at corners and ends of parts.
     even : collection of str
-        Parts with elements of equal length besides a layer at their ends: on a contact boundary anything may happen
-        anywhere. Other pieces take two elements and a layer at their ends.
+        Parts with elements of equal length besides a layer at their ends: transitions may lie anywhere on a contact
+        boundary. Other pieces take two elements and a layer at their ends.
     n_elements : int
-        Shared among all pieces like the square roots of their lengths: what an even piece gets of them.
+        Total that all pieces share in proportion to the square roots of their lengths.
     """
     shares = np.sqrt(base.piece_lengths)
     counts = share_elements(max(n_elements, LEAST * shares.size), shares)
@@ -75,7 +76,7 @@ def layered_partition(base: Division, cuts: Mapping[int, Sequence[float]], *, n_
 
 
 def refined_partition(old: Partition, excess: FloatArray, fresh: Partition, resolution: float) -> Partition:
-    """Divide elements whose errors are too large, and move the pieces to where the contact status now changes.
+    """Divide elements with too large errors, and move the ends of pieces to the new transitions.
 
     Parameters
     ----------

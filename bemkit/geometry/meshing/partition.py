@@ -1,4 +1,4 @@
-"""Partitions of an outline into elements, and the better ones that a solution suggests."""
+"""Partitions of an outline into elements, and their refinement from a solution."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ EXPONENT = 2.5
 """Elements at the distance d from an end of a piece have lengths like d**(1 - 1/2.5) unless more is known. That suits
 the logarithms at load jumps and the square roots at ends of contact zones."""
 SPREAD = 0.5
-"""Part of all elements that is spread over the contact boundary for any error estimate."""
+"""Share of the elements that is spread over the contact boundary for any error estimate."""
 IDLE = 0.2
-"""Part of what other pieces get of these that is enough for those on which nothing happens."""
+"""Share of idle pieces in these, relative to other pieces."""
 STEEPEST = 4.0
 """Largest ratio of the lengths of two neighbours."""
 LEAST = 4
@@ -73,7 +73,7 @@ def first_partition(
     even: Collection[str] = (),
     symmetry: Symmetry | None = None,
 ) -> Partition:
-    """Divide an outline of whose solution nothing is known.
+    """Divide an outline without a known solution.
 
     Parameters
     ----------
@@ -83,7 +83,7 @@ def first_partition(
     n_elements : int
         About so many elements, more where `LEAST` or `STEEPEST` ask for them.
     even : collection of str
-        Parts with elements of equal length: on a contact boundary anything may happen anywhere.
+        Parts with elements of equal length: transitions may lie anywhere on a contact boundary.
     symmetry : Symmetry, optional
         Lines of which only one side is divided.
 
@@ -131,7 +131,7 @@ def better_partition(
     spread : float
         Which part of all elements that is.
     idle : (n_elements_old,) bool array, optional
-        Old elements on which nothing happens: pieces of such share in the spread by `IDLE` only.
+        Old elements without errors: their pieces take part in the spread by `IDLE` only.
     """
     division = old.base.cut(cuts)
     shares = np.sqrt(division.piece_lengths) * [piece.part in spread_over for piece in division.pieces]

@@ -3,7 +3,7 @@
 Only the physical fields of a `Solution`, the points of its mesh and the statement of its scene are read. Normals are
 differentiated from the points, obstacles measured anew, and elasticity is tested with Kelvin's solution as printed in
 textbooks. Resultants of forces inside are integrated anew; only for Betti's theorem the particular solution of body
-forces is taken off as the solver knows it. Independent of the solvers, these numbers say whether the fields obey
+forces is that of the solver. Independent of the solvers, these numbers say whether the fields obey
 supports, contact and friction, whether forces and energy balance, and whether tractions and displacements belong to one
 elastic body.
 """

@@ -124,7 +124,7 @@ def _free_motions(solution: BodyView, boundary: Boundary) -> FloatArray:
 def negative_energy(fields: Fields) -> float:
     """Return by how much the elastic energy is negative, over the work of the sizes of tractions and strains.
 
-    To these belong the tractions of which nothing but round-off is known, on the displacement of the whole body.
+    They include tractions that may be round-off, on the displacement of the whole body.
     """
     solution, scales = fields.solution, fields.scales
     size = _work_of_sizes(fields, strained_displacement(solution)) + trusted_work(fields)
@@ -162,7 +162,7 @@ def strained_displacement(solution: BodyView, displacement: FloatArray | None = 
 
 
 def trusted_work(fields: Fields) -> float:
-    """Return the work [J/m] of tractions of which nothing but round-off is known, on the motion of the whole body."""
+    """Return the work [J/m] of tractions that may be round-off, on the motion of the whole body."""
     motion = float(np.abs(fields.solution.boundary.displacement).max())
     return trusted_stress(fields.solution) * motion * float(fields.boundary.lengths.sum())
 

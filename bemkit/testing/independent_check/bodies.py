@@ -1,4 +1,4 @@
-"""The bodies of a solution, each measured by itself: boundary, loads, reactions, scales, balances."""
+"""The bodies of a solution, each checked separately: boundary, loads, reactions, scales, balances."""
 
 from __future__ import annotations
 
@@ -27,13 +27,13 @@ from bemkit.testing.independent_check.views import BodyView, freed, obstacles_of
 
 @dataclass(frozen=True, eq=False)
 class BodyMeasurements:
-    """A body and what is measured again of it.
+    """A body with the quantities that are measured again.
 
     Parameters
     ----------
     result : SolvedBody
     fields : Fields
-        Tractions are given loads, and what elements say of contacts and reactions.
+        Tractions are given loads, and those of the elements for contacts and reactions.
     is_touched : (n_elements,) bool array
         Elements that belong to contacts, be they with bodies or with rigid obstacles.
     """
@@ -61,7 +61,7 @@ class BodyMeasurements:
 
     @property
     def largest_stress(self) -> float:
-        """The larger of its unit and of what its strains are worth [Pa]: heat strains a free body without tractions."""
+        """The larger of its unit and the stress of its strains [Pa]: heat strains a free body without tractions."""
         view = self.fields.solution
         strain = float(np.abs(strained_displacement(view)).max()) / self.result.mesh.diameter
         return max(self.scales.stress, strain * view.scene.material.plane_modulus)
@@ -89,7 +89,7 @@ class BodyMeasurements:
         return float(self.boundary.lengths.max()) / self.result.mesh.diameter
 
     def supports(self) -> float:
-        """Return the larger of what supports and what loads are violated by [-]."""
+        """Return the larger violation of supports and loads [-]."""
         return max(support_mismatch(self.fields), load_mismatch(self.fields))
 
     def negative_energy(self) -> float:

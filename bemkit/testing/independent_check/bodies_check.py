@@ -1,4 +1,4 @@
-"""The independent check of a scene: each body by itself, each contact from both its sides, all forces together."""
+"""The independent check of a scene: each body separately, each contact from both its sides, all forces together."""
 
 from __future__ import annotations
 
@@ -30,11 +30,11 @@ class BodiesCheck(Violations):
     means : float
         Mean relative displacements of flat sides against those of the table; its clearances against gaps.
     reactions : float
-        Forces that the elements of a side feel, against what the table says, with the other sign on the partner's.
+        Forces on the elements of a side against those of the table, with the opposite sign on the partner.
     rigid : float
         Motions and loads of rigid bodies against what is given, and the balance of each.
     between_nodes : float
-        How much deeper points of one side are in the other one than the solution says of them.
+        Excess of the overlap of both sides over that of the solution.
     """
 
     gaps: float
@@ -84,7 +84,7 @@ def violations_of_bodies(solution: Solution, before: Solution | None = None) -> 
 def violations_of(step: Solution, before: Solution | None) -> Violations:
     """Check a solution of one body or of several, of a load history with the step before it.
 
-    Slip counts from the last increment, which is not there to be seen if the step was gone in several.
+    Slip counts from the last increment, which is unknown if the step was divided into several.
     """
     if step.loading is not None and step.loading.steps[-1].n_increments > 1:
         before = None
@@ -114,9 +114,9 @@ def _nodal(joints: Interfaces) -> FloatArray:
 
 
 def rigid_mismatch(joints: Interfaces) -> float:
-    """Return how far rigid bodies are from moving, and being loaded, as prescribed [-].
+    """Return the largest difference [-] of the motions and loads of rigid bodies from the prescribed ones.
 
-    What acts on each besides its contacts balances these, at the points that the nodes may touch.
+    The load on each balances its contacts, at the points that the nodes may touch.
     """
     solution, table, worst = joints.solution, joints.solution.contact, [0.0]
     points, acting = np.column_stack([table.x, table.y]), _nodal(joints)
@@ -144,14 +144,14 @@ def rigid_mismatch(joints: Interfaces) -> float:
 
 
 def reaction_mismatch(joints: Interfaces) -> float:
-    """Return the largest difference [-] of what the elements of a side feel from what its contacts transmit."""
+    """Return the largest difference [-] of the forces on the elements of a side from those of its contacts."""
     worst = [0.0]
     for name, (force, size) in forces(joints).items():
         side = joints.side(name)
-        felt, felt_size = side.body.force_on(side.elements)
-        unit = size + felt_size + side.body.scales.stress * float(side.body.boundary.lengths.min())
+        force_on_elements, size_on_elements = side.body.force_on(side.elements)
+        unit = size + size_on_elements + side.body.scales.stress * float(side.body.boundary.lengths.min())
         if not np.isin(side.body.boundary.nodes[side.elements], side.body.supported_nodes()).any():
-            worst.append(float(np.abs(felt - force).max()) / unit)
+            worst.append(float(np.abs(force_on_elements - force).max()) / unit)
     return float(np.max(worst))
 
 

@@ -42,7 +42,7 @@ class Support(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Boundary:
-    """Places on each element, what the scene gives there, and how nodal values are interpolated.
+    """Points on each element, the given data there, and the interpolation of nodal values.
 
     Parameters
     ----------
@@ -180,10 +180,11 @@ class Scales(NamedTuple):
     Parameters
     ----------
     stress : float [Pa]
-        Largest traction on the boundary, but no less than its round-off is worth, see `trusted_stress`.
+        Largest traction on the boundary, but no less than `trusted_stress`.
     length : float [m]
-        Displacement that this traction causes across the body, ``stress * diameter / E'``. What is left of rigid
-        motions a million times longer is round-off. If there are no tractions at all, as in a body that has given way
+        Displacement that this traction causes across the body, ``stress * diameter / E'``. Smaller remainders of rigid
+        motions that are a million times longer are
+        round-off. If there are no tractions at all, as in a body that has given way
         to an overlap, its displacement is the only length there is.
     coordinates : float [m]
         Round-off of lengths that are differences of coordinates.
@@ -199,15 +200,17 @@ class Scales(NamedTuple):
 
 
 def scales_of(solution: BodyView, before: BodyView | None = None) -> Scales:
-    """Return the sizes that the violations in a solution are measured by.
+    """Return the scales of the violations in a solution.
 
     What is left of the load step `before` is known no better than its own tractions were.
     """
+    # round-off of coordinates and gaps
     modulus, diameter = solution.scene.material.plane_modulus, solution.mesh.diameter
     displacement = float(np.abs(solution.boundary.displacement).max())
     table = solution.contact
     gaps = np.abs(table.gap[np.isfinite(table.gap)]).max(initial=0.0)
     coordinates = 64.0 * EPSILON * (float(np.abs(solution.mesh.nodes).max()) + float(gaps))
+    # the largest traction, if it is more than round-off, and the displacement that it causes
     fields = (solution.boundary.traction, table.sigma_n, table.sigma_t)
     largest_traction = max(float(np.abs(each).max(initial=0.0)) for each in fields)
     trusted = trusted_stress(solution, before)
@@ -225,14 +228,14 @@ def scales_of(solution: BodyView, before: BodyView | None = None) -> Scales:
 
 
 def trusted_stress(solution: BodyView, before: BodyView | None = None) -> float:
-    """Return the stress [Pa] whose `CONTACT_LIMIT`-th part is the round-off of tractions: the least to measure by.
+    """Return the least scale of stresses [Pa]: its `CONTACT_LIMIT`-th part is the round-off of tractions.
 
     What is left of the load step `before` is known no better than its tractions were.
 
-    Numbers hold a displacement to some eps of its size. Across a node of length h that is the strain ``eps |u| / h``,
-    times E' a stress, which a bulk modulus beyond E' multiplies. A body that only moves, say because an overlap has
-    pushed it aside, has no tractions but these. Tiny elements and nearly incompressible bodies are no excuse for
-    tractions beyond 1e-10 of those by which the displacement would strain the whole body.
+    A displacement has a round-off of some eps of its size: across a node of length h the strain ``eps |u| / h``, times
+    E' a stress, which a bulk modulus beyond E' magnifies. A body in rigid motion, such as one pushed aside by an
+    overlap, has no other tractions. The allowance ends at 1e-10 of the tractions by which the displacement would strain
+    the whole body, also for tiny elements and nearly incompressible bodies.
     """
     material, diameter = solution.scene.material, solution.mesh.diameter
     freedom = 1.0 if material.is_incompressible else min(1.0, 1.0 - 2.0 * material.effective_poisson_ratio)

@@ -1,4 +1,4 @@
-"""The independent check of one solution: the conditions of contact at each node, and all that it must fulfil."""
+"""The independent check of one solution: the conditions of contact at each node, and all other conditions."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ class ContactMeasurements:
 
 
 def measured_contact(fields: Fields) -> ContactMeasurements:
-    """Return the contact quantities that the laws speak of.
+    """Return the contact quantities in the friction laws.
 
     Displacements are those of the boundary field, tractions those of the table. Slip counts from the load step before,
     and from the undeformed body if there is none.
@@ -177,7 +177,7 @@ def slip_opposition(measured: ContactMeasurements) -> float:
 
 
 def status_mismatch(status: IntArray, measured: ContactMeasurements) -> float:
-    """Return the largest violation [-] of what the status of a node claims."""
+    """Return the largest violation [-] of the conditions of the status of a node."""
     direction = np.select([status == NodeStatus.SLIP_FORWARD, status == NodeStatus.SLIP_BACKWARD], [1.0, -1.0])
     slides_freely = measured.bound <= CONTACT_LIMIT
     against = np.where(slides_freely, 0.0, np.minimum(-direction * measured.slip, measured.bound))
@@ -263,7 +263,7 @@ def violations_of_body(solution: Solution, before: Solution | None = None) -> In
 
 
 def _balances(parts: Fields) -> dict[str, float]:
-    """Return what tractions and displacements say of each other."""
+    """Return the balances of work between tractions and displacements."""
     if parts.solution.mesh.surface is None:
         return {
             "equilibrium": imbalance(parts),

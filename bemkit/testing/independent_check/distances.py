@@ -85,14 +85,14 @@ def mean_mismatch(joints: Interfaces) -> float:
 
 
 def hidden_overlaps(joints: Interfaces) -> tuple[float, float]:
-    """Return how deep points of one side are in the other one, over the displacement that strains the bodies.
+    """Return the overlap of both sides, relative to the displacement that strains the bodies.
 
     Returns
     -------
     float
         The deepest of all.
     float
-        How much deeper they are than the solution says of its contact.
+        Their excess over the overlap that the solution reports.
     """
     deepest, unsaid = [0.0], [0.0]
     for pair in joints.pairs.values():

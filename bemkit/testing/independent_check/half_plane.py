@@ -1,4 +1,4 @@
-"""Half-planes: displacements by Flamant's solution from the tractions, and balances with what acts far away.
+"""Half-planes: displacements by Flamant's solution from the tractions, and balances with loads far away.
 
 Tractions (p, q), p into the half-plane and q along s, displace its surface at x along s and inward by
 
@@ -31,11 +31,12 @@ from bemkit.testing.independent_check.boundary import trusted_stress
 from bemkit.testing.independent_check.nodes import Fields
 
 _MOST_PAIRS = 250_000
-"""Pairs of elements that are looked at: of more than 500 elements some displacements are skipped, but no traction."""
+"""Largest number of pairs of elements: of more than 500 elements some displacements are skipped, but no traction."""
 _STEP, _REACH = 0.14, 3.1
 """Step and range of the double exponential rule: 1e-10 of a mean logarithm, for any lengths of the elements."""
 _NEAR, _N_GAUSS = 3.0, 8
-"""Distance, in half the sum of lengths, from which on Gauss points do, and how many: 1e-12 of a mean logarithm."""
+"""Distance, in half the sum of lengths, beyond which Gauss points suffice, and their number: 1e-12 of a mean
+logarithm."""
 _IN_MOTION = 1e-6
 """Share of the motion of the whole body that counts as a displacement by tractions: below that it is round-off."""
 
@@ -64,7 +65,7 @@ class Surface:
 
     @classmethod
     def of(cls, fields: Fields) -> Surface:
-        """Measure the surface that the elements of a solution are."""
+        """Measure the surface of a solution."""
         solution, boundary = fields.solution, fields.boundary
         outward = boundary.normals.mean(axis=(0, 1))
         outward /= np.hypot(*outward)
@@ -75,7 +76,7 @@ class Surface:
 
     @property
     def far(self) -> FarField:
-        """How it moves far away; not at all if the scene says nothing of it."""
+        """Its motion far away; at rest by default."""
         return self.fields.solution.scene.far or FarField()
 
     @property
@@ -139,7 +140,7 @@ class Surface:
     def _logarithms(self, element: int) -> FloatArray:
         """Return the mean logarithms (n_elements,) of |x - s|, x on one element and s on all, images included.
 
-        At rest is what `ElasticHalfPlane` and `PeriodicHalfPlane` say.
+        The points at rest are those of `ElasticHalfPlane` and `PeriodicHalfPlane`.
         """
         if self.is_periodic:  # of equal elements all rows are alike
             return np.roll(self._first_logarithms, element)
@@ -150,6 +151,7 @@ class Surface:
         return self._integrated(0) - 0.5
 
     def _integrated(self, element: int) -> FloatArray:
+        """Return the mean logarithms (n_elements,) of the distances of points of one element from those of all."""
         own = float(self.lengths[element])
         middle, half_sum = np.abs(self._distances(element)), 0.5 * (own + self.lengths)
         half_difference, least = 0.5 * np.abs(own - self.lengths), np.minimum(own, self.lengths)
@@ -159,6 +161,7 @@ class Surface:
         knots = np.maximum(knots, 0.0)  # neighbours, but for round-off
         heights = np.stack([0.0 * least, least, least, 0.0 * least])
         heights[:, element] = [0.0, 2.0 * own, 2.0 * own, 0.0]
+        # near elements by the double exponential rule, which finds the singularity at zero, others by Gauss's
         is_near = middle < _NEAR * half_sum
         total = np.empty_like(least)
         for chosen, rule in ((is_near, _double_exponential()), (~is_near, _gauss())):
@@ -183,7 +186,7 @@ class Surface:
 
     @cached_property
     def motion(self) -> FloatArray:
-        """(3,) array: motion far away: as it is given, and where loads drive it as displacements show it."""
+        """(3,) array: motion far away, given, or fitted to the displacements where loads drive it."""
         return self.far.motion + self._fitted[0]
 
     @cached_property
@@ -206,11 +209,11 @@ class Surface:
 
     @cached_property
     def trusted_force(self) -> float:
-        """Force [N/m] of tractions of which nothing but round-off is known."""
+        """Force [N/m] of tractions that may be round-off."""
         return trusted_stress(self.fields.solution) * self.extent
 
     def elasticity_mismatch(self) -> float:
-        """Return how far displacements are from what tractions and the motion far away make of them [-]."""
+        """Return the difference [-] of displacements from those by tractions and the motion far away."""
         modulus = self.fields.solution.scene.material.plane_modulus
         moved = float(np.abs(self.fields.solution.boundary.displacement).max())
         unit = max(float(np.abs(self.force).sum()) / modulus, _IN_MOTION * moved)

@@ -1,4 +1,4 @@
-"""The contacts of a solution, the bodies that they join, and the units by which both are measured."""
+"""The contacts of a solution, the bodies that they join, and the units of both."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from bemkit.testing.independent_check.check import ContactMeasurements, measure
 from bemkit.testing.independent_check.sides import Side
 
 LIGHTEST = 1e-3
-"""Bodies that carry less than this share of the largest stress of the scene are measured by this share."""
+"""Least unit of stress of a body, relative to the largest stress of the scene."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,7 +83,7 @@ class Interfaces:
         return self.solution.bodies[side.body].scene.laws[side.part]
 
     def units(self) -> tuple[FloatArray, FloatArray]:
-        """Return (n_contact,) lengths [m] and stresses [Pa] by which each row is measured."""
+        """Return the units of each row: (n_contact,) lengths [m] and stresses [Pa]."""
         length, stress = np.ones((2, self.solution.contact.n_contact))
         for name in self.solution.contact.parts:
             sides = self.solution.contact_sides[name]
@@ -97,7 +97,7 @@ class Interfaces:
         return length, stress
 
     def measured(self, before: Solution | None) -> ContactMeasurements:
-        """Return the contact quantities that the laws speak of."""
+        """Return the contact quantities in the friction laws."""
         table, units = self.solution.contact, self.units()
         points = np.column_stack([table.x, table.y])
         slip = table.u_t if before is None else table.u_t - before.contact.u_t

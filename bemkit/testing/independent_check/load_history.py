@@ -10,14 +10,14 @@ from bemkit.operators.pair_form import Tag
 from bemkit.results.solution import Solution
 
 LOST = 1e-6
-"""Share of the work in a load step that iterative linear solvers and far rigid motions may leave unexplained."""
+"""Unexplained work in a load step by iterative linear solvers and long rigid motions, relative to the work."""
 ROUND_OFF = 1e-12
 """Share, on top, of the work by which the displacement would strain a body of its own size: the last digits of sums of
 forces, each of that size, which a body that is carried along has."""
 
 
 def energy_fault(step: Solution) -> str:
-    """Say what is wrong with the work in the last step of a history: friction that gives back, work that is missing."""
+    """Describe a fault of the work in the last step of a history: negative dissipation, or missing work."""
     if step.loading is None:
         return ""
     last = step.loading.steps[-1]

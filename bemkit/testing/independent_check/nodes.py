@@ -17,8 +17,8 @@ from bemkit.testing.independent_check.boundary import Boundary, Scales, boundary
 from bemkit.testing.independent_check.views import BodyView
 
 _GRAZING_COSINE = 2e-3
-"""Cosine between the body's normal and the direction of contact up to which a node may count as facing away: it would
-have to slide five hundred times as far as it approaches, and normals at nodes are means over elements."""
+"""Largest cosine between the body's normal and the direction of contact of a node that may face away: it would slide
+five hundred times as far as it approaches, and normals at nodes are means over elements."""
 _ROUND_OFF = 1e-12
 """Distance from a corner, relative to the coordinates, that may be their round-off."""
 
@@ -91,7 +91,7 @@ def contact_nodes_of(solution: BodyView, boundary: Boundary) -> Nodes:
 
 
 class Fields(NamedTuple):
-    """A solution, the load step before it, and what is measured again of it."""
+    """A solution, the load step before it, and the quantities that are measured again."""
 
     solution: BodyView
     before: BodyView | None
@@ -107,9 +107,9 @@ class Fields(NamedTuple):
 
 
 def hidden_overlap(fields: Fields) -> float:
-    """Return how deep contact parts are in their obstacles at nodes that are not in the table, over the displacement.
+    """Return the overlap with obstacles at nodes that are not in the table, relative to the displacement.
 
-    There supports hold the direction of contact, so that nothing but a warning can be asked for.
+    Supports hold the direction of contact there, so that only a warning can be required.
     """
     solution, boundary, nodes = fields.solution, fields.boundary, fields.nodes
     points, displacement = solution.boundary.points, solution.boundary.displacement
@@ -151,7 +151,7 @@ def supported_nodes(solution: BodyView, boundary: Boundary) -> IntArray:
 def distance_to(obstacle: Obstacle, points: FloatArray, normals: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Measure distances (n,) [m] of points to an obstacle, negative inside it, and unit vectors (n, 2) towards it.
 
-    The vectors point into the obstacle at its nearest point. An obstacle that is not built in is asked itself.
+    The vectors point into the obstacle at its nearest point. An obstacle that is not built in measures itself.
 
     Parameters
     ----------

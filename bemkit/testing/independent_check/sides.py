@@ -18,7 +18,7 @@ from bemkit.testing.independent_check.bodies import BodyMeasurements
 
 _PARALLEL = 1e-9
 _SLIVER = 1e-9
-"""Share of the common length of two sides below which a piece of it is round-off."""
+"""Piece of the common length of two sides that is round-off, relative to it."""
 _STEP = 1e-4
 """Difference of local coordinates by which slopes are taken."""
 _N_SAMPLES = 33
@@ -26,7 +26,7 @@ _N_SAMPLES = 33
 _N_NEAREST = 3
 """Number of nearest points from which the search for the closest point begins."""
 _BESIDE = 1e-6
-"""Share of an element by which that place may lie beside the direction."""
+"""Largest distance of that point from the direction, relative to an element."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,11 +155,12 @@ def sampled_overlap(one: Side, two: Side, pair: ContactPair, reach: float) -> fl
         Points farther apart than this do not face each other.
     """
     mesh, boundary = two.body.result.mesh, one.body.boundary
+    # many samples of the second side, and the quadrature points of the first
     xi = np.linspace(-1.0, 1.0, _N_SAMPLES)
     rows = np.repeat(np.arange(two.elements.size), _N_SAMPLES)
     samples = mesh.points(two.elements, xi).reshape(-1, 2)
     every = boundary.points[one.elements].reshape(-1, 2)
-    # candidates: the nearest samples of each point, several because an end belongs to two elements
+    # start values: the nearest samples of each point, several because an end belongs to two elements
     distance, nearest = (np.ravel(found) for found in cKDTree(samples).query(every, k=_N_NEAREST))
     points = np.repeat(every, _N_NEAREST, axis=0)
     normals = np.repeat(boundary.normals[one.elements].reshape(-1, 2), _N_NEAREST, axis=0)
@@ -188,5 +189,6 @@ def sampled_overlap(one: Side, two: Side, pair: ContactPair, reach: float) -> fl
     # exclude points whose closest point lies beyond the end of the element
     offset = mesh.points(element, place[:, None])[:, 0] - points
     faces &= np.abs(beside(place, direction)) < _BESIDE * np.maximum(mesh.lengths[element], distance)
+    # the relative displacement of both points along the direction, less their distance
     overlap = np.sum((motion - two.displacement(row, place) - offset) * direction, axis=1) - pair.gap_at(points)
     return float(np.max(overlap[faces], initial=0.0))

@@ -16,8 +16,8 @@ COARSE_SHARE = 2.0
 """The same for each unit of `Violations.coarseness`: collocation with 35, 70 and 140 elements on a block between
 two obstacles misses it by 1.5, 1.4 and 1.25 times that, its energy by 34, 15 and 7 %."""
 OVERLAP_LIMIT = 1e-5
-"""Share of the largest displacement by which a support may push a node into an obstacle without a word: ten times what
-the warning takes for round-off."""
+"""Largest overlap that a support may cause at an obstacle without a warning, relative to the largest displacement: ten
+times the round-off of the warning."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -35,7 +35,7 @@ class Violations:
     cone_excess, slip_opposition : float
         Of friction: traction beyond the bound; the smaller of slip and missing opposition.
     status : float
-        What the status of a node claims against its traction, clearance and slip.
+        The status of a node against its traction, clearance and slip.
     equilibrium : float
         Of all forces on a body along motions that no support holds.
     negative_energy, energy : float
@@ -86,7 +86,7 @@ class Violations:
 
     @property
     def faults(self) -> tuple[str, ...]:
-        """Names of the entries that must vanish and do not, the largest first."""
+        """Names of the entries that should vanish and do not, the largest first."""
         wrong = {name: value for name, value in self.exact.items() if not value <= CONTACT_LIMIT}
         return tuple(sorted(wrong, key=lambda name: -np.nan_to_num(wrong[name], nan=np.inf, posinf=np.inf)))
 

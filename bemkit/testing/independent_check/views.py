@@ -1,4 +1,4 @@
-"""One body as the check reads it: its statement, its fields, and the contact nodes on it."""
+"""One body for the check: its scene, its fields, and its contact nodes."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def view_of(solution: Solution) -> BodyView:
 
 
 def freed(body: SolvedBody) -> BodyView:
-    """Return a body with free parts where rigid obstacles touch it: what touches it is a load."""
+    """Return a body with free parts in place of rigid obstacles, whose contact is then a load."""
     obstacles = obstacles_of(body.scene)
     parts = tuple(replace(part, condition=Free()) if part.name in obstacles else part for part in body.scene.parts)
     scene = replace(body.scene, parts=parts, law=Frictionless())
