@@ -144,7 +144,7 @@ class ResultWriter:
             self._growing.close()
 
     def append(self, solution: Solution) -> None:
-        """Append the new steps of the load history of a solution to the file on the disk.
+        """Append the new steps of a load history to the file on the disk, given the solution of the last of them.
 
         Another history than before, on a finer mesh for example, begins the file anew.
 
@@ -155,19 +155,19 @@ class ResultWriter:
         SceneError
             If the scene holds a Python function, which a file cannot hold.
         """
-        self._grown(solution).commit()
+        self._grown(solution, is_one_step=True).commit()
 
     def finish(self, solution: Solution) -> None:
         """Replace the file on the disk by the whole result; errors as for `append`."""
-        growing = self._grown(solution)
+        growing = self._grown(solution, is_one_step=False)
         write_outcome(growing.file, solution)
         write_array(growing.file, "derived", json.dumps(_derived(solution)))
         growing.file["last"] = growing.file[_group(max(len(self._written), 1))]
         annotate(growing.file, solution.units)
         growing.finish()
 
-    def _grown(self, solution: Solution) -> GrowingFile:
-        """Return the open file with all steps of a solution."""
+    def _grown(self, solution: Solution, *, is_one_step: bool) -> GrowingFile:
+        """Return the open file with all steps of a solution: that of the last step, or one with the records of all."""
         steps = () if solution.loading is None else solution.loading.steps
         n_written = len(self._written)
         if self._growing is None or steps[:n_written] != self._written:
@@ -175,7 +175,7 @@ class ResultWriter:
         file = self._growing.file
         for number, step in enumerate(steps[n_written:], start=n_written + 1):
             group = file.create_group(_group(number))
-            write_step(group, cast(Any, step.end), step)
+            write_step(group, solution if is_one_step and number == len(steps) else solution.at_step(number), step)
             if solution.loading is not None and solution.stated.n_steps != solution.loading.n_steps:
                 write_array(group, "scene", scene_to_toml(cast(Any, step.end).stated))
         if not steps:

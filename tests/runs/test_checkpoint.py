@@ -12,8 +12,10 @@ import pytest
 
 import bemkit as bk
 from bemkit.cli.main import main
+from bemkit.result_warning import ResultWarning
 from bemkit.results.export import export_result
 from bemkit.results.load_history import LoadHistory
+from bemkit.results.result_file import ResultWriter
 from bemkit.runs import load_path
 from bemkit.sealed_file import USER_BLOCK
 from bemkit.solvers.base import Status, StepRecord
@@ -201,6 +203,31 @@ def test_files_hold_all_fields_of_all_steps(scene: bk.Scene | bk.Scene, tmp_path
     for number in (0, scene.n_steps + 1):
         with pytest.raises(bk.InputError, match=f"step {number} does not exist: give a number from 1 to"):
             read.at_step(number)
+
+
+def test_the_first_step_without_load_has_the_warnings_in_its_file_that_it_has_in_memory(tmp_path: Path) -> None:
+    """A load history may begin at rest, so neither warns that nothing is loaded."""
+    rest = bk.Step(1.0, {"parts.top.condition.y": 0.0})
+    whole = bk.run(replace(SHORTER, steps=(rest, bk.Step(2.0))), file=tmp_path / "a.h5")
+    assert not whole.at_step(1).contact.u_n.any()
+    for number in (1, 2):
+        assert bk.read_result(tmp_path / "a.h5").at_step(number).warnings == whole.at_step(number).warnings
+
+
+def test_warnings_of_a_step_are_found_once_for_its_file_and_for_the_steps_after_it(tmp_path: Path) -> None:
+    found: list[bk.Solution] = []
+
+    def warnings_of(solution: bk.Solution) -> tuple[ResultWarning, ...]:
+        found.append(solution)
+        return (ResultWarning("kind", "", "Text."),)
+
+    step = replace(bk.run(SHORTER), warnings_of=warnings_of)
+    with ResultWriter(tmp_path / "a.h5") as writer:
+        writer.append(step)
+    assert [str(warning) for warning in step.warnings] == ["Text."]
+    assert found == [step]
+    read = bk.read_result(tmp_path / "a.h5")
+    assert read.at_step(SHORTER.n_steps).warnings == step.warnings
 
 
 def test_another_scene_begins_anew(tmp_path: Path) -> None:
