@@ -100,7 +100,7 @@ SHORTER = replace(LOOP, steps=(LOOP.steps[0], replace(LOOP.steps[1], increments=
 SHORT = replace(LOOP, steps=(LOOP.steps[0], replace(LOOP.steps[1], increments=2)), mesh=bk.MeshOptions(accuracy=0.01))
 CYLINDERS = replace(
     bk.load_scene("two-cylinders"),
-    mesh=bk.MeshOptions(accuracy=0.1),
+    mesh=bk.MeshOptions(accuracy=0.05),
     steps=(bk.Step(1.0, load_factor=0.5), bk.Step(2.0, load_factor=1.0)),
 )
 
