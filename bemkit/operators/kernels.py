@@ -10,7 +10,7 @@ where Q_k is the Legendre function of the second kind [DLMF, 14.12.13]. For rho 
 for k = 0 and 0 otherwise, the integrals of elasticity are
 
     int P_k log|rho| ds        = l (m_k log l + Re (C_{k+1} - C_{k-1}) / (2 k + 1)),   k > 0
-                               = l (m_k log l + log|zeta^2 - 1| + Re C_1),             k = 0
+    int P_0 log|rho| ds        = l (m_0 log l + log|zeta^2 - 1| + Re C_1)
     int P_k rho / conj(rho) ds = l tau^2 (m_k + 2 i eta conj(C_k)),   eta = Im zeta
     int P_k k(x, y) ds         = Im C_k / (2 pi),   k = -(1/2 pi) d log|rho| / dn_y the Laplace double layer
 
@@ -274,6 +274,6 @@ def legendre_weights(n_polynomials: int, n_points: int) -> FloatArray:
 
 
 def legendre_values(highest: int, t: FloatArray | float) -> FloatArray:
-    """Return P_0 ... P_highest at points t of [-1, 1], (highest + 1, *shape of t)."""
+    """Return P_0 ... P_highest at points t of [-1, 1], (highest + 1, ...) with the shape of t behind."""
     values = np.polynomial.legendre.legvander(np.asarray(t, float), highest)
     return np.moveaxis(values, -1, 0).reshape(highest + 1, *np.shape(t))
