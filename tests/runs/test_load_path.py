@@ -188,7 +188,7 @@ def test_what_is_given_is_interpolated_between_two_steps() -> None:
     before = build_model(prepared[0])
     halfway, after = (before.under(each) for each in prepared[1:])
     problem = after.between(before, 0.5)
-    for name in ("load", "offset"):
+    for name in ("load", "prescribed"):
         expected = getattr(halfway.body, name)
         assert np.abs(expected).max() > 0.0
         np.testing.assert_allclose(getattr(problem.body, name), expected, atol=1e-13 * np.abs(expected).max())
