@@ -120,14 +120,14 @@ def plan_steps(steps: Sequence[Prepared], proposal: Symmetry | None = None) -> P
     """
     first = steps[0]
     firsts = [int(group[0]) for group in groups(first.bodies)]
-    needs, drawn = [_needs(steps, number) for number in firsts], [first.bodies[number] for number in firsts]
+    costs, drawn = [_cost_of(steps, number) for number in firsts], [first.bodies[number] for number in firsts]
     sizes = find_sizes(first)
     linear_solver = first.linear_solver(max(first.bodies, key=lambda body: body.space.n_dofs))
-    contact = _ContactSystem.of(first, sizes, is_matrix_free=any(each.is_matrix_free for each in needs))
-    kept = sum(each.kept for each in needs)
-    flops = sum(each.flops for each in needs) + CONTACT_STEPS * len(steps) * contact.flops
+    contact = _ContactSystem.of(first, sizes, is_matrix_free=any(each.is_matrix_free for each in costs))
+    kept = sum(each.kept for each in costs)
+    flops = sum(each.flops for each in costs) + CONTACT_STEPS * len(steps) * contact.flops
     if first.scene.has_obstacles_only:
-        items = items_of_one(first.only.scene, sizes, needs[0].items, len(steps), proposal)
+        items = items_of_one(first.only.scene, sizes, costs[0].items, len(steps), proposal)
     else:
         items = tuple(items_of_several(first, sizes, len(steps), is_dense=contact.is_dense))
     thinness = [warning for body in drawn for warning in first.thinness_warnings(body)]
@@ -135,16 +135,16 @@ def plan_steps(steps: Sequence[Prepared], proposal: Symmetry | None = None) -> P
     return Plan(
         linear_solver=linear_solver.solver,
         sizes=sizes,
-        work=sum((each.work for each in needs), OperationCounts(contact_unknowns=sizes.n_contact_unknowns)),
-        memory=int(kept + max(contact.memory, *(each.memory - each.kept for each in needs))),
-        seconds=LEAST_SECONDS + seconds_of(sum(each.evaluations for each in needs), flops),
+        work=sum((each.work for each in costs), OperationCounts(contact_unknowns=sizes.n_contact_unknowns)),
+        memory=int(kept + max(contact.memory, *(each.memory - each.kept for each in costs))),
+        seconds=LEAST_SECONDS + seconds_of(sum(each.evaluations for each in costs), flops),
         items=items,
         warnings=tuple(dict.fromkeys([*thinness, *of_profiles])),
         is_compressed=linear_solver.hierarchical is not None,
     )
 
 
-def _needs(steps: Sequence[Prepared], number: int) -> BodyCost:
+def _cost_of(steps: Sequence[Prepared], number: int) -> BodyCost:
     first, body = steps[0], steps[0].bodies[number]
     case = BodyCase(
         body.own_space.mesh,

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from bemkit.operators.collocation import compiled
 from bemkit.operators.linear.solvers import MatrixFree
-from bemkit.operators.steklov_poincare.cost import BodyCase, BodyCost, PlanItem
+from bemkit.operators.steklov_poincare.cost import NO_HYPERSINGULAR, BodyCase, BodyCost, PlanItem, slopes_item
 
 _FEWEST_ELEMENTS = 200
 _MOST_LOOPS = 20
@@ -44,11 +44,10 @@ def matrix_free_cost(case: BodyCase, options: MatrixFree, *, takes_slopes: bool)
     memory = int(_BYTES * n + _BYTES_OF_GROUPS)
     is_compiled, _ = compiled.expected(n)
     of_product = n * (_EVALUATIONS_COMPILED if is_compiled else _EVALUATIONS)
-    slopes = "rotations then cause no tractions" if takes_slopes else "the method of the source paper"
     items = (
         PlanItem("boundary equations", True, f"products by the fast multipole method: {case.linear_solver.reason}"),
-        PlanItem("slopes between constant elements", takes_slopes, slopes),
-        PlanItem("hypersingular operator W", False, "collocation takes only the displacement equation"),
+        slopes_item(takes_slopes),
+        NO_HYPERSINGULAR,
         PlanItem(
             "linear solver of the body", True, f"GMRES to {options.tolerance:g}, about {_STEPS:.0f} steps from cold"
         ),

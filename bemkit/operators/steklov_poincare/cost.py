@@ -246,24 +246,32 @@ def _different_loads(case: BodyCase) -> list[GivenData]:
     return different
 
 
+NO_HYPERSINGULAR = PlanItem("hypersingular operator W", False, "collocation takes only the displacement equation")
+"""Item of all collocation maps."""
+
+
+def slopes_item(takes_slopes: bool) -> PlanItem:
+    """Return the item of slopes between constant elements, of all collocation maps."""
+    reason = "rotations then cause no tractions" if takes_slopes else "the method of the source paper"
+    return PlanItem("slopes between constant elements", takes_slopes, reason)
+
+
 def _collocation_items(
     case: BodyCase, order: int, n_loaded: int, n_moved: int, takes_slopes: bool
 ) -> tuple[PlanItem, ...]:
     u, n_single, n_double = case.n_displacements, case.n_fixed + case.n_retained, case.n_free + case.n_retained
     n_given = n_loaded + n_moved
     given = f"{n_given} columns are multiplied by given data at once" if n_given else "all given data are zero"
-    slopes = "rotations then cause no tractions" if takes_slopes else "the method of the source paper"
     volume = "collocation has it among the tractions" if case.material.is_incompressible else "the body is compressible"
-    one_equation = "collocation takes only the displacement equation"
     return (
         PlanItem("single layer V", True, f"unknown tractions: held and retained directions; {u} x {n_single}"),
         _zero_columns("columns of V on the free surface", "the traction is zero there", u - n_single - n_loaded, u),
         PlanItem("double layer K", True, f"unknown displacements: free and retained directions; {u} x {n_double}"),
         _zero_columns("columns of K where supports hold", "the displacement is zero there", u - n_double - n_moved, u),
         PlanItem("storage of columns under given data", False, given),
-        PlanItem("slopes between constant elements", takes_slopes, slopes),
-        PlanItem("adjoint double layer K'", False, one_equation),
-        PlanItem("hypersingular operator W", False, one_equation),
+        slopes_item(takes_slopes),
+        PlanItem("adjoint double layer K'", False, NO_HYPERSINGULAR.reason),
+        NO_HYPERSINGULAR,
         PlanItem(
             "linear solver of the body",
             True,

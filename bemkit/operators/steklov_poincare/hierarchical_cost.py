@@ -22,11 +22,13 @@ from bemkit.operators.linear.solvers import (
 )
 from bemkit.operators.steklov_poincare.cost import (
     CONTACT_STEPS,
+    NO_HYPERSINGULAR,
     BodyCase,
     BodyCost,
     PlanItem,
     collocation_cost,
     seconds_of,
+    slopes_item,
 )
 
 _DIRECT: LinearSolver = DenseCholesky()
@@ -152,12 +154,11 @@ def _gain(
 
 def hierarchical_cost(case: BodyCase, options: Hierarchical, *, takes_slopes: bool) -> BodyCost:
     """Return the costs of the compressed equations; counts depend on ranks and are not predicted."""
-    slopes = "rotations then cause no tractions" if takes_slopes else "the method of the source paper"
     reason = f"compressed over a tree to {options.tolerance:g}: {case.linear_solver.reason}"
     items = (
         PlanItem("boundary equations", True, f"single and double layer, {reason}"),
-        PlanItem("slopes between constant elements", takes_slopes, slopes),
-        PlanItem("hypersingular operator W", False, "collocation takes only the displacement equation"),
+        slopes_item(takes_slopes),
+        NO_HYPERSINGULAR,
         *_tree_items(case, options),
     )
     return replace(_cost(case, options), items=items)
