@@ -22,6 +22,20 @@ _MOST_KEPT = 400
 """Logarithms for each element that are kept; leaves and siblings of one tree take 160."""
 
 
+class KeptArrays(dict[tuple[bytes, bytes], FloatArray]):
+    """Arrays by key, of bounded total size."""
+
+    n_entries = 0
+    """Sum of the sizes of the arrays."""
+
+    def add(self, key: tuple[bytes, bytes], array: FloatArray, most: int) -> None:
+        """Keep an array; drop the oldest ones while all have more than `most` entries together."""
+        while self and self.n_entries + array.size > most:
+            self.n_entries -= self.pop(next(iter(self))).size
+        self[key] = array
+        self.n_entries += array.size
+
+
 @dataclass(frozen=True, eq=False)
 class HalfPlaneEquations:
     """Equations on the surface of a half-plane; fulfils `BoundaryEquations`.
@@ -35,14 +49,14 @@ class HalfPlaneEquations:
     material : Material
     motions : (n_motions, n) array
         Load-controlled motions R.
-    kept : dict
+    kept : KeptArrays
         Cached logarithms of leaves, siblings and sampled nodes.
     """
 
     nodes: FloatArray
     material: Material
     motions: ComplexArray
-    kept: dict[tuple[bytes, bytes], FloatArray] = field(default_factory=dict, repr=False)
+    kept: KeptArrays = field(default_factory=KeptArrays, repr=False)
 
     @cached_property
     def lengths(self) -> FloatArray:
@@ -81,10 +95,7 @@ class HalfPlaneEquations:
         if transposed in self.kept:
             return self.kept[transposed].T
         if key not in self.kept:
-            most = _MOST_KEPT * self.lengths.size
-            while self.kept and sum(block.size for block in self.kept.values()) + targets.size * sources.size > most:
-                del self.kept[next(iter(self.kept))]
-            self.kept[key] = self.logarithms(targets, sources)
+            self.kept.add(key, self.logarithms(targets, sources), _MOST_KEPT * self.lengths.size)
         return self.kept[key]
 
     def block(self, rows: IntArray, columns: IntArray) -> FloatArray:
