@@ -27,7 +27,7 @@ LARGEST_REACH = 0.15
 """Largest length of the elements at a singular point that are excluded as near it, relative to the contact. Longer ones
 have estimates."""
 
-SPREADING = 0.15
+NEIGHBOUR_SHARE = 0.15
 """Share of the error of an excluded element, by its degree, that the tractions of its neighbour have, too."""
 
 
@@ -197,7 +197,7 @@ class ContactPlaces:
         excluded = np.setdiff1d(self._touching(name), counted)
         source = pairs[np.isin(pairs[:, 0], excluded) & np.isin(pairs[:, 1], counted), 0]
         degrees = element_degrees(body.scene.discretisation.displacement_space(body.mesh))[source]
-        return float((SPREADING / degrees) ** 2 @ body.coefficient_errors.traction[source])
+        return float((NEIGHBOUR_SHARE / degrees) ** 2 @ body.coefficient_errors.traction[source])
 
     def squared_energy_error(self) -> float:
         """Return the squared error in the energy norm [J/m] where zones end inside elements of degree 3 and more."""
