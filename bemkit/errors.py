@@ -1,4 +1,4 @@
-"""The base classes of all errors that bemkit raises on purpose, and their messages as text that is fit to print."""
+"""The base classes of errors that bemkit raises on purpose, those of geometry, and messages as text fit to print."""
 
 from __future__ import annotations
 
@@ -6,7 +6,10 @@ import pickle
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from bemkit.arrays import FloatArray
 
 
 class BemkitError(Exception):
@@ -19,6 +22,14 @@ class BemkitError(Exception):
 
 class InputError(BemkitError, ValueError):
     """An invalid value of an argument or a key."""
+
+
+class GeometryError(InputError):
+    """A curve, shape, selection or mesh that cannot be the boundary of a body."""
+
+
+class UnknownPartError(GeometryError):
+    """A boundary part was asked for by a name the mesh does not know."""
 
 
 class NoResultError(BemkitError, RuntimeError):
@@ -49,6 +60,11 @@ def printable(text: str) -> str:
 def shown_path(path: Path) -> str:
     """Return the name of a file for messages."""
     return printable(str(path))[:200]
+
+
+def format_point(point: FloatArray) -> str:
+    """Write a point for a message, with digits enough to find it in a file."""
+    return f"({point[0]:.9g}, {point[1]:.9g})"
 
 
 def called(owner: object, method: str, arguments: tuple[Any, ...], remedy: str) -> Any:

@@ -29,7 +29,8 @@ from bemkit.contact.condensation.dense_body import DenseBody
 from bemkit.contact.problem import ContactProblem
 from bemkit.geometry.quadrature import gauss_legendre
 from bemkit.operators.linear.threads import blas_threads_for
-from bemkit.results.contact_table import ContactTable, find_transitions
+from bemkit.results.contact_table import ContactTable
+from bemkit.results.transitions import find_transitions
 from bemkit.solvers.base import solve
 
 _N_CORES = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

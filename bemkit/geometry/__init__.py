@@ -2,12 +2,12 @@
 
 from typing import TYPE_CHECKING, Any
 
+from bemkit.errors import GeometryError as GeometryError
+from bemkit.errors import UnknownPartError as UnknownPartError
 from bemkit.geometry.curves import Arc as Arc
 from bemkit.geometry.curves import Curve as Curve
 from bemkit.geometry.curves import ParametricCurve as ParametricCurve
 from bemkit.geometry.curves import Segment as Segment
-from bemkit.geometry.errors import GeometryError as GeometryError
-from bemkit.geometry.errors import UnknownPartError as UnknownPartError
 from bemkit.geometry.mesh import BoundaryMesh as BoundaryMesh
 from bemkit.geometry.meshing.discretise import Algebraic as Algebraic
 from bemkit.geometry.meshing.discretise import Geometric as Geometric

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, ClassVar, Protocol
 import numpy as np
 
 from bemkit.arrays import FloatArray
-from bemkit.geometry.errors import GeometryError, format_point
+from bemkit.errors import GeometryError, format_point
 from bemkit.geometry.quadrature import gauss_legendre
 from bemkit.geometry.vectors import norms
 

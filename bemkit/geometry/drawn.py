@@ -11,8 +11,8 @@ from typing import Protocol
 import numpy as np
 
 from bemkit.arrays import FloatArray
+from bemkit.errors import GeometryError, format_point
 from bemkit.geometry.curves import Arc, Curve, ParametricCurve, Segment, as_point, reverse_curve
-from bemkit.geometry.errors import GeometryError, format_point
 from bemkit.geometry.nurbs import Nurbs, clamped_knots
 from bemkit.geometry.outline import Drawing, Outline, Side
 from bemkit.geometry.shapes import CheckedShape

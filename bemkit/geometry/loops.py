@@ -6,8 +6,8 @@ import numpy as np
 import numpy.typing as npt
 
 from bemkit.arrays import BoolArray, FloatArray, IntArray, read_only
+from bemkit.errors import GeometryError, format_point
 from bemkit.geometry.curves import Curve
-from bemkit.geometry.errors import GeometryError, format_point
 from bemkit.geometry.pieces import (
     Pieces,
     concatenate,

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray, IntArray, read_only
+from bemkit.errors import GeometryError, UnknownPartError
 from bemkit.geometry.curves import Curve, as_point, require_positive, scaled_curve
 from bemkit.geometry.elements import Elements, bisected
-from bemkit.geometry.errors import GeometryError, UnknownPartError
 from bemkit.geometry.loops import (
     as_index,
     check_chains,

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bemkit.arrays import FloatArray
+from bemkit.errors import GeometryError
 from bemkit.geometry.curves import ParametricCurve
-from bemkit.geometry.errors import GeometryError
 from bemkit.geometry.vectors import norms
 
 if TYPE_CHECKING:

@@ -7,8 +7,8 @@ from functools import cached_property
 import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray
+from bemkit.errors import GeometryError, format_point
 from bemkit.geometry.curves import CURVE_MEMBERS, Curve
-from bemkit.geometry.errors import GeometryError, format_point
 from bemkit.geometry.loops import check_loops
 from bemkit.geometry.pieces import RESOLUTION, make_pieces, resolution
 from bemkit.geometry.surface import Surface

@@ -16,8 +16,8 @@ from typing import Any
 import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray, IntArray
+from bemkit.errors import GeometryError
 from bemkit.geometry.curves import Curve
-from bemkit.geometry.errors import GeometryError
 from bemkit.geometry.vectors import angles_between, cross, norms
 
 LARGEST_TURNING = np.pi / 4

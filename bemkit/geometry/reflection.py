@@ -14,7 +14,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray, IntArray
-from bemkit.geometry.errors import GeometryError
+from bemkit.errors import GeometryError
 from bemkit.geometry.local_values import element_degrees
 from bemkit.geometry.spaces import BoundarySpace
 from bemkit.geometry.symmetry import is_reversing

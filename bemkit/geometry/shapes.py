@@ -8,8 +8,8 @@ from typing import Protocol
 
 import numpy as np
 
+from bemkit.errors import GeometryError
 from bemkit.geometry.curves import Arc, Segment, as_point, require_positive, reverse_curve
-from bemkit.geometry.errors import GeometryError
 from bemkit.geometry.outline import Outline, Side
 from bemkit.geometry.surface import Surface
 

@@ -10,7 +10,7 @@ from typing import ClassVar, Protocol
 import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray, IntArray, read_only
-from bemkit.geometry.errors import GeometryError
+from bemkit.errors import GeometryError
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.quadrature import gauss_legendre, gauss_lobatto
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bemkit.arrays import FloatArray, IntArray
-from bemkit.geometry.errors import GeometryError, format_point
+from bemkit.errors import GeometryError, format_point
 from bemkit.geometry.vectors import norms
 
 _STRAIGHT = 1e-9

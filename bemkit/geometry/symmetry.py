@@ -12,9 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray, IntArray
+from bemkit.errors import GeometryError
 from bemkit.geometry.curves import Curve, TransformedCurve, scaled_curve
 from bemkit.geometry.elements import Elements
-from bemkit.geometry.errors import GeometryError
 from bemkit.geometry.pieces import RESOLUTION
 
 _ON_LINE = 64 * RESOLUTION

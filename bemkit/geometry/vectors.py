@@ -3,7 +3,7 @@
 import numpy as np
 
 from bemkit.arrays import FloatArray
-from bemkit.geometry.errors import GeometryError
+from bemkit.errors import GeometryError
 
 SMALLEST, LARGEST = 1e-140, 1e140
 """With their squares, and those times a few powers of ten, these lie within the range of numbers, 1e-308 to 1e308."""

@@ -9,8 +9,7 @@ from typing import TypeAlias
 import numpy as np
 
 from bemkit.arrays import IntArray
-from bemkit.errors import InputError
-from bemkit.geometry.errors import GeometryError
+from bemkit.errors import GeometryError, InputError
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.placement import Placement
 from bemkit.geometry.spaces import BoundarySpace

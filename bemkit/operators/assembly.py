@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, TypeAlias
 import numpy as np
 
 from bemkit.arrays import FloatArray, IntArray, consecutive_runs
-from bemkit.geometry.errors import GeometryError
+from bemkit.errors import GeometryError
 from bemkit.geometry.local_values import element_degrees
 from bemkit.geometry.reflection import antisymmetric_dofs
 from bemkit.geometry.series import columns_of, series

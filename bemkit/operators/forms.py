@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bemkit.geometry.errors import GeometryError
+from bemkit.errors import GeometryError
 from bemkit.geometry.reflection import antisymmetric_dofs
 from bemkit.geometry.series import columns_of, series
 from bemkit.geometry.spaces import BoundarySpace

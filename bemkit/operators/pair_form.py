@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from bemkit.arrays import FloatArray
-from bemkit.geometry.errors import GeometryError
+from bemkit.errors import GeometryError
 from bemkit.geometry.spaces import BoundarySpace
 from bemkit.operators.material import Material
 

@@ -75,6 +75,8 @@ def _draw_status(strip: Axes, solution: Result, part: str, abscissa: Abscissa) -
     length = solution.part_length(part)
     transitions = [transition for transition in solution.transitions if transition.part == part]
     first = solution.contact.status_words()[int(np.flatnonzero(chosen)[0])]
+    if transitions and part in solution.contact.circumferences:  # the last zone goes on beyond the seam
+        first = transitions[-1].to_status
     words = [first, *(transition.to_status for transition in transitions)]
     edges = [0.0, *(transition.s for transition in transitions), length]
     named = set()

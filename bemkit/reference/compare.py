@@ -18,8 +18,8 @@ from bemkit.geometry.meshing.discretise import Algebraic
 from bemkit.geometry.neighbours import along_boundary
 from bemkit.geometry.quadrature import gauss_legendre
 from bemkit.geometry.spaces import element_nodes
-from bemkit.results.contact_table import FLICKER
 from bemkit.results.solution import Solution
+from bemkit.results.transitions import FLICKER
 from bemkit.scene.discretisation import Galerkin
 from bemkit.scene.mesh_options import MeshOptions
 from bemkit.scene.scene import Scene

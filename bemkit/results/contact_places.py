@@ -14,7 +14,7 @@ from bemkit.contact.body import SlipHistory
 from bemkit.geometry.local_values import element_degrees
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.vectors import norms
-from bemkit.results.contact_table import resolved_transitions, unresolved_contacts
+from bemkit.results.transitions import resolved_transitions, unresolved_contacts, unrolled
 from bemkit.results.zone_ends import LYING_AT, Side, ZoneEnd
 from bemkit.scene.contacts import name_at_obstacle
 from bemkit.solvers.active_sets import NodeStatus
@@ -140,9 +140,10 @@ class ContactPlaces:
         See `resolved_transitions`, `unresolved_contacts` and `Solution.missed_contacts`.
         """
         solution = self.solution
-        resolved = resolved_transitions(solution.contact, solution.transitions)
+        table, transitions = unrolled(solution.contact, solution.transitions)
+        resolved = resolved_transitions(table, transitions)
         places = [(each.part, (each.x, each.y)) for each in resolved]
-        places += [*unresolved_contacts(solution.contact, resolved), *self.missed().items()]
+        places += [*unresolved_contacts(table, resolved), *self.missed().items()]
         return tuple(side.near(np.array(place)) for name, place in places for side in self.sides(name))
 
     @cached_property
@@ -223,11 +224,12 @@ class ContactPlaces:
         from bemkit.results.error_indicators import transition_error
 
         solution, traction, energy = self.solution, 0.0, 0.0
-        for transition in solution.transitions:
+        table, transitions = unrolled(solution.contact, solution.transitions)
+        for transition in transitions:
             for side in self.sides(transition.part):
                 end = side.near(np.array([transition.x, transition.y]))
                 if end.element in self._counted[side.body]:
-                    squared = transition_error(solution.contact, transition, solution.transitions, end)
+                    squared = transition_error(table, transition, transitions, end)
                     plane_modulus = solution.bodies[side.body].scene.material.plane_modulus
                     traction, energy = traction + squared, energy + 0.5 * squared * end.distance / plane_modulus
         return traction, energy

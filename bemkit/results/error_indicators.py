@@ -23,7 +23,8 @@ from bemkit.geometry.neighbours import break_nodes
 from bemkit.geometry.reflection import reflected_to_whole
 from bemkit.geometry.spaces import BoundarySpace, ConstantSpace, dof_points
 from bemkit.operators.rigid_modes import without_motion
-from bemkit.results.contact_table import ContactTable, Transition
+from bemkit.results.contact_table import ContactTable
+from bemkit.results.transitions import Transition
 from bemkit.results.zone_ends import ZoneEnd
 
 STRAIN_CALIBRATION = (1.0 / 64.0, 1.0 / 128.0)
@@ -165,6 +166,7 @@ def contact_errors(contact: ContactTable, degree: int) -> FloatArray:
         h |d|^2 / 8 for degree 1, / 16 for degree 2; zero at ends of parts.
     """
     errors = np.zeros(contact.n_contact)
+    contact, order = contact.unrolled
     for part in contact.parts:
         rows = np.flatnonzero(contact.rows(part))
         tractions = np.stack([contact.sigma_n[rows], contact.sigma_t[rows]], axis=1)
@@ -172,7 +174,7 @@ def contact_errors(contact: ContactTable, degree: int) -> FloatArray:
         means = 0.5 * (steps[1:] + steps[:-1])
         slopes = np.diff(tractions, axis=0) / np.where(steps > 0.0, steps, np.inf)[:, None]  # 0: between two sides
         bends = np.diff(slopes, axis=0) * means[:, None]
-        errors[rows[1:-1]] = CONTACT_CALIBRATION[degree - 1] * means * np.sum(bends**2, axis=1)
+        errors[order[rows[1:-1]]] = CONTACT_CALIBRATION[degree - 1] * means * np.sum(bends**2, axis=1)
     return errors
 
 

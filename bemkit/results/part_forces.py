@@ -13,7 +13,8 @@ from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.quadrature import gauss_legendre
 from bemkit.geometry.spaces import BoundarySpace, dof_points
 from bemkit.operators.steklov_poincare.nodal_conditions import integrate_traction
-from bemkit.results.contact_table import ContactTable, Transition
+from bemkit.results.contact_table import ContactTable
+from bemkit.results.transitions import Transition, unrolled
 from bemkit.scene.conditions import Load
 from bemkit.solvers.active_sets import NodeStatus
 
@@ -220,13 +221,13 @@ def contact_sizes(
     return {
         "force_normal": -depth * float(table.weight[nodes] @ table.sigma_n[nodes]),
         "force_tangential": depth * float(table.weight[nodes] @ table.sigma_t[nodes]),
-        "contact_length": min(length, _contact_length(table, part, transitions)),
+        "contact_length": min(length, _contact_length(*unrolled(table, transitions), part)),
         "peak_pressure": float(np.max(-table.sigma_n[nodes], initial=0.0)),
         "largest_slip": float(np.abs(table.u_t[closed]).max(initial=0.0)),
     }
 
 
-def _contact_length(table: ContactTable, part: str, transitions: Sequence[Transition]) -> float:
+def _contact_length(table: ContactTable, transitions: Sequence[Transition], part: str) -> float:
     """Return the length of the pieces of a part, between its ends and transitions, whose nodes are closed.
 
     Nodes without a partner end a piece.

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
-from bemkit.results.contact_table import ContactTable, Transition
+from bemkit.results.contact_table import ContactTable
+from bemkit.results.transitions import Transition
 from bemkit.solvers.active_sets import NodeStatus
 
 
@@ -31,16 +33,19 @@ def slip_reversals(contact: ContactTable) -> tuple[SlipReversal, ...]:
     Between opposite directions lies a stick zone, where the tangential traction changes sign; here the mesh does not
     resolve it. For stick zones of several nodes see `resolved_transitions`. Parts without friction are skipped.
     """
-    direction = np.where(contact.status == NodeStatus.SLIP_FORWARD, 1.0, 0.0)
-    direction[contact.status == NodeStatus.SLIP_BACKWARD] = -1.0
-    direction[contact.sigma_t == 0.0] = 0.0
-    sticks, joined = contact.status == NodeStatus.STICK, contact.is_joined
+    table, _ = contact.unrolled
+    direction = np.where(table.status == NodeStatus.SLIP_FORWARD, 1.0, 0.0)
+    direction[table.status == NodeStatus.SLIP_BACKWARD] = -1.0
+    direction[table.sigma_t == 0.0] = 0.0
+    sticks, joined = table.status == NodeStatus.STICK, table.is_joined
     reversals = []
     for n_sticking in (0, 1):
         beyond = n_sticking + 1
         for i in np.flatnonzero(direction[:-beyond] * direction[beyond:] < 0.0).tolist():
             if joined[i : i + beyond].all() and sticks[i + 1 : i + beyond].all():
-                reversals.append(SlipReversal(_where_slip_vanishes(contact, i, i + beyond), n_sticking))
+                place = _where_slip_vanishes(table, i, i + beyond)
+                wrapped = replace(place, s=contact.wrapped(place.part, place.s))
+                reversals.append(SlipReversal(wrapped, n_sticking))
     return tuple(reversals)
 
 

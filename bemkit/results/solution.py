@@ -22,11 +22,11 @@ from bemkit.plan import Plan
 from bemkit.result_warning import ResultWarning
 from bemkit.results.between_nodes import BetweenNodes, missed_contacts, unfound_contacts
 from bemkit.results.contact_table import ContactTable as ContactTable
-from bemkit.results.contact_table import Transition as Transition
 from bemkit.results.contact_table import narrow_contacts
 from bemkit.results.contact_violations import violations_between_nodes
 from bemkit.results.solved_body import BoundaryFields as BoundaryFields
 from bemkit.results.solved_scene import SolvedScene, contact_facts, part_facts
+from bemkit.results.transitions import Transition as Transition
 from bemkit.solvers.base import Status, StepRecord
 
 if TYPE_CHECKING:

@@ -13,9 +13,10 @@ from bemkit.contact.body import SlipHistory
 from bemkit.contact.laws import FrictionLaw
 from bemkit.errors import InputError
 from bemkit.geometry.mesh import BoundaryMesh
-from bemkit.results.contact_table import ContactTable, Transition
+from bemkit.results.contact_table import ContactTable
 from bemkit.results.part_forces import ContactForce, PartForce, RigidResult
 from bemkit.results.solved_body import BoundaryFields, SideName, SolvedBody
+from bemkit.results.transitions import Transition
 from bemkit.scene.contacts import name_at_obstacle
 from bemkit.scene.scene import Scene
 from bemkit.scene.unit_names import UnitNames

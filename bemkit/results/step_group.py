@@ -21,11 +21,12 @@ from bemkit.hdf5 import Reader, write_array, write_table
 from bemkit.operators.counts import OperationCounts
 from bemkit.plan import Plan
 from bemkit.result_warning import ResultWarning
-from bemkit.results.contact_table import ContactTable, Transition
+from bemkit.results.contact_table import ContactTable
 from bemkit.results.load_history import LoadStep, StepWork
 from bemkit.results.part_forces import ContactForce, PartForce, RigidResult
 from bemkit.results.solution import Solution, stated_warnings
 from bemkit.results.solved_body import BoundaryFields, SideName, SolvedBody
+from bemkit.results.transitions import Transition
 from bemkit.scene.scene import Scene
 from bemkit.scene.serialisation import structure
 from bemkit.solvers.base import Status, StepRecord

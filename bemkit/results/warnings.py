@@ -288,6 +288,7 @@ def _narrow_zones(contact: ContactTable, smooth: Collection[str], remedy: str) -
     """
     if not (contact.sigma_n.any() or contact.sigma_t.any()):
         return
+    wrapped, (contact, _) = contact.wrapped, contact.unrolled
     words = np.array(contact.status_words(), dtype=object)
     # friction that acts across a gap sticks or slips without contact
     clearance = np.where(np.isfinite(contact.clearance), contact.clearance, 0.0)
@@ -305,7 +306,8 @@ def _narrow_zones(contact: ContactTable, smooth: Collection[str], remedy: str) -
             narrow = [zone for zone in narrow if not reported[zone].all()]
             if narrow:
                 reported[np.concatenate(narrow)] = True
-                yield _narrow(part, kind, [contact.s[zone] for zone in narrow], remedy)
+                middle = wrapped(part, float(contact.s[narrow[0]].mean()))
+                yield _narrow(part, kind, middle, [zone.size for zone in narrow], remedy)
 
 
 def _hidden_overlaps(
@@ -354,12 +356,11 @@ def _enclosed(contact: ContactTable, chosen: BoolArray) -> BoolArray:
     return is_enclosed
 
 
-def _narrow(part: str, kind: str, zones: Sequence[FloatArray], remedy: str) -> ResultWarning:
-    nodes = "1 node" if zones[0].size == 1 else f"{zones[0].size} nodes"
-    n_more, middle = len(zones) - 1, float(zones[0].mean())
+def _narrow(part: str, kind: str, middle: float, sizes: Sequence[int], remedy: str) -> ResultWarning:
+    nodes, n_more = "1 node" if sizes[0] == 1 else f"{sizes[0]} nodes", len(sizes) - 1
     more = f", and {n_more} more {'zone' if n_more == 1 else 'zones'} like it" if n_more else ""
     text = f"A {kind} zone of part {part!r} at s = {middle:.4g} has only {nodes}{more}: {_there(remedy)}."
-    return ResultWarning(f"narrow {kind} zone", part, text, zones[0].size)
+    return ResultWarning(f"narrow {kind} zone", part, text, sizes[0])
 
 
 def _there(remedy: str) -> str:

@@ -14,8 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray, IntArray
-from bemkit.errors import InputError
-from bemkit.geometry.errors import GeometryError
+from bemkit.errors import GeometryError, InputError
 from bemkit.geometry.local_values import element_degrees
 from bemkit.geometry.meshing.layers import (
     FACTOR,
@@ -28,9 +27,9 @@ from bemkit.geometry.meshing.layers import (
 )
 from bemkit.geometry.meshing.partition import Partition
 from bemkit.results.coefficient_decay import CoefficientErrors
-from bemkit.results.contact_table import FLICKER, resolved_transitions
 from bemkit.results.slip_reversals import slip_reversals
 from bemkit.results.solution import Solution
+from bemkit.results.transitions import FLICKER, resolved_transitions, unrolled
 from bemkit.runs.density import DensityMeshes
 from bemkit.runs.element_degrees import below_layers, few_kinds, sufficient_degrees
 from bemkit.runs.mesh_sequence import Level, Member, zone_cuts
@@ -139,7 +138,7 @@ class LayeredMeshes:
 
     def _finer_look(self, level: Level, members: Sequence[Member], solutions: Sequence[Solution]) -> Level | None:
         """Return denser meshes if zones have single nodes; None if none does, or another look does not help."""
-        table, transitions = solutions[-1].contact, solutions[-1].transitions
+        table, transitions = unrolled(solutions[-1].contact, solutions[-1].transitions)
         n_unresolved = len(transitions) - len(resolved_transitions(table, transitions))
         # both ends of a stick zone of one node between opposite slips are resolved by layers
         is_coarse = n_unresolved > sum(2 * reversal.n_sticking for reversal in slip_reversals(table))

@@ -16,10 +16,11 @@ from bemkit.model.model import Model
 from bemkit.model.solved_contact import contact_warnings
 from bemkit.plan import Plan
 from bemkit.result_warning import ResultWarning
-from bemkit.results.contact_table import ContactTable, bound_at, find_transitions, free_contacts
+from bemkit.results.contact_table import ContactTable, bound_at, free_contacts
 from bemkit.results.part_forces import PartForce, RigidResult, contact_forces, forces_on_parts, nodal_resultant
 from bemkit.results.solution import Solution
 from bemkit.results.solved_body import BoundaryFields, SideName, SolvedBody
+from bemkit.results.transitions import find_transitions
 from bemkit.results.warnings import find_warnings
 from bemkit.scene.unit_names import amount
 from bemkit.solvers.base import ContactSolution, Status

@@ -11,7 +11,7 @@ from typing import Protocol
 import numpy as np
 
 from bemkit.arrays import IntArray
-from bemkit.geometry.errors import GeometryError
+from bemkit.errors import GeometryError
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.neighbours import break_nodes
 from bemkit.geometry.spaces import BoundarySpace, ConstantSpace, LagrangeSpace, check_degree

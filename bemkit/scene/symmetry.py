@@ -15,8 +15,7 @@ import numpy as np
 from bemkit.arrays import FloatArray, IntArray
 from bemkit.contact.laws import FrictionLaw
 from bemkit.contact.obstacle import measure_contact
-from bemkit.errors import InputError
-from bemkit.geometry.errors import GeometryError, format_point
+from bemkit.errors import GeometryError, InputError, format_point
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.meshing.division import divide
 from bemkit.geometry.outline import Selection

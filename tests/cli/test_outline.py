@@ -12,7 +12,7 @@ from click.testing import CliRunner, Result
 
 from bemkit.cli.main import _run_to_end, commands
 from bemkit.cli.options import names_of
-from bemkit.geometry.errors import GeometryError
+from bemkit.errors import GeometryError
 from bemkit.geometry.files.gmsh_files import why_no_gmsh
 from tests.geometry.files.parts import DATA, MESHES, PART_DXF, PART_SVG, dxf, line, needs_ezdxf, why_no
 from tests.slow import slow_except

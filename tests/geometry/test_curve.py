@@ -3,8 +3,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from bemkit.errors import GeometryError
 from bemkit.geometry.curves import Arc, Curve, ParametricCurve, Segment, TransformedCurve, reverse_curve, scaled_curve
-from bemkit.geometry.errors import GeometryError
 from bemkit.testing import check_curve
 
 

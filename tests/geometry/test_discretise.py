@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from bemkit.errors import GeometryError
 from bemkit.geometry.curves import ParametricCurve, Segment
-from bemkit.geometry.errors import GeometryError
 from bemkit.geometry.meshing.discretise import Algebraic, Geometric, discretise, share_elements
 from bemkit.geometry.outline import Outline, Selection, Side
 from bemkit.geometry.shapes import Disk, PlateWithHole, Polygon, Rectangle, Ring

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from bemkit.errors import GeometryError
 from bemkit.geometry.curves import Arc, Curve, reverse_curve
 from bemkit.geometry.drawn import ArcTo, DrawnSide, LineTo, Loop, NurbsTo, OutlineShape, SplineTo
-from bemkit.geometry.errors import GeometryError
 from bemkit.geometry.meshing.discretise import discretise
 from bemkit.geometry.nurbs import Nurbs, clamped_knots, conic_arc
 from bemkit.geometry.outline import Drawing, Selection

@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bemkit.geometry.errors import GeometryError
+from bemkit.errors import GeometryError
 from bemkit.geometry.meshing.discretise import Algebraic, Geometric, Grading, Uniform
 
 gradings = st.one_of(

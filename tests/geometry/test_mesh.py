@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from bemkit.errors import UnknownPartError
 from bemkit.geometry.curves import Arc
-from bemkit.geometry.errors import UnknownPartError
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.meshing.discretise import Geometric, discretise
 from bemkit.geometry.outline import Selection

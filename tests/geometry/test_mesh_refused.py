@@ -3,8 +3,8 @@ import re
 import numpy as np
 import pytest
 
+from bemkit.errors import GeometryError
 from bemkit.geometry.curves import Arc
-from bemkit.geometry.errors import GeometryError
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.meshing.discretise import discretise
 from bemkit.geometry.shapes import Rectangle

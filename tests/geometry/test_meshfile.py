@@ -9,7 +9,7 @@ import meshio
 import numpy as np
 import pytest
 
-from bemkit.geometry.errors import GeometryError
+from bemkit.errors import GeometryError
 from bemkit.geometry.files.meshio_files import plane_mesh_of, read_mesh, write_mesh
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.meshing.discretise import discretise

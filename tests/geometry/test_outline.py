@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
+from bemkit.errors import GeometryError
 from bemkit.geometry.curves import Arc, Curve, ParametricCurve, Segment, reverse_curve, scaled_curve
-from bemkit.geometry.errors import GeometryError
 from bemkit.geometry.meshing.discretise import discretise
 from bemkit.geometry.outline import Outline, Side
 

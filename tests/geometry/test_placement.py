@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bemkit import Disk, InputError, Placement, discretise
-from bemkit.geometry.errors import GeometryError
+from bemkit.errors import GeometryError
 from bemkit.testing import check_curve
 
 ANGLES = st.floats(-720.0, 720.0)

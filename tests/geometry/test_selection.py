@@ -3,8 +3,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from bemkit.errors import GeometryError
 from bemkit.geometry.curves import Arc, Segment
-from bemkit.geometry.errors import GeometryError
 from bemkit.geometry.outline import Selection, breakpoints, merge_breakpoints
 
 BOTTOM = Segment((0.0, 0.0), (1.0, 0.0))

@@ -11,7 +11,7 @@ import pytest
 
 import bemkit as bk
 from bemkit.arrays import ComplexArray, FloatArray
-from bemkit.geometry.errors import GeometryError
+from bemkit.errors import GeometryError
 from bemkit.geometry.neighbours import break_nodes
 from bemkit.geometry.quadrature import gauss_lobatto
 from bemkit.geometry.spaces import LagrangeSpace, dof_points

@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 
 import bemkit as bk
 from bemkit.arrays import FloatArray
+from bemkit.errors import GeometryError
 from bemkit.geometry import BoundaryMesh, Disk, ExteriorOf, ParametricCurve, Polygon, Rectangle, Ring, discretise
-from bemkit.geometry.errors import GeometryError
 from bemkit.geometry.neighbours import corner_nodes
 from bemkit.geometry.outline import Outline, Side
 from bemkit.geometry.spaces import BoundarySpace, ConstantSpace, LinearSpace, QuadraticSpace, dof_points

@@ -10,9 +10,10 @@ import numpy as np
 import pytest
 
 import bemkit as bk
-from bemkit.results.contact_table import ContactTable, find_transitions
+from bemkit.results.contact_table import ContactTable
 from bemkit.results.part_forces import contact_sizes
 from bemkit.results.solution import BoundaryFields, Solution
+from bemkit.results.transitions import find_transitions
 from bemkit.runs.run import run
 from bemkit.scene.toml import load_scene, with_overrides
 from bemkit.solvers.active_sets import NodeStatus

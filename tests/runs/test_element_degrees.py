@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 import bemkit as bk
-from bemkit.errors import InputError
-from bemkit.geometry.errors import GeometryError
+from bemkit.errors import GeometryError, InputError
 from bemkit.geometry.local_values import dof_weights, summed_at_dofs, values_on_elements
 from bemkit.geometry.reflection import antisymmetric_dofs
 from bemkit.geometry.series import series

@@ -12,7 +12,7 @@ import pytest
 
 import bemkit as bk
 from bemkit.contact.body import ContactState
-from bemkit.geometry.errors import GeometryError
+from bemkit.errors import GeometryError
 from bemkit.geometry.vectors import check_magnitude
 from bemkit.model.model import Model
 from bemkit.model.units import OutOfRangeError

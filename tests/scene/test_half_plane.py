@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import bemkit as bk
-from bemkit.geometry.errors import GeometryError
+from bemkit.errors import GeometryError
 from bemkit.geometry.outline import Outline, Side
 from bemkit.geometry.surface import Surface
 from bemkit.runs.steps import run_on_mesh

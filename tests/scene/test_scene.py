@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from bemkit.contact.obstacle import RigidHalfPlane
+from bemkit.errors import GeometryError
 from bemkit.formulas import Expression
-from bemkit.geometry.errors import GeometryError
 from bemkit.geometry.shapes import Polygon, Rectangle
 from bemkit.operators.material import Material
 from bemkit.scene.conditions import Clamped, Contact, Part, PrescribedDisplacement, Pressure, Roller, Traction

@@ -25,7 +25,7 @@ from bemkit.arrays import BoolArray, FloatArray, IntArray
 from bemkit.contact.mortar.projection import mean_directions
 from bemkit.contact.mortar.segments import MortarQuadrature, Segments, common_refinement, quadrature_on
 from bemkit.contact.mortar.sides import ContactSide
-from bemkit.geometry.errors import GeometryError, format_point
+from bemkit.errors import GeometryError, format_point
 from bemkit.geometry.quadrature import gauss_legendre
 from bemkit.geometry.vectors import turned_left
 

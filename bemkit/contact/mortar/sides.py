@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray, IntArray
-from bemkit.geometry.errors import GeometryError
+from bemkit.errors import GeometryError
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.neighbours import along_boundary
 from bemkit.geometry.spaces import BoundarySpace

@@ -13,10 +13,9 @@ from typing import Any
 
 import numpy as np
 
-from bemkit.errors import printable
+from bemkit.errors import GeometryError, printable
 from bemkit.formulas import closest
 from bemkit.geometry.drawn import ArcTo, LineTo, Point
-from bemkit.geometry.errors import GeometryError
 from bemkit.geometry.files.strokes import Stroke, ellipse_strokes, nurbs_strokes
 
 _UNITS: Mapping[int, str] = MappingProxyType({1: "in", 2: "ft", 4: "mm", 5: "cm", 6: "m", 13: "um"})

@@ -13,8 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from bemkit.errors import printable
-from bemkit.geometry.errors import GeometryError
+from bemkit.errors import GeometryError, printable
 from bemkit.geometry.files.chords import ChordLoop, fitted_strokes, strokes_of
 from bemkit.geometry.files.plane_mesh import CellBlock, PlaneMesh, in_plane
 from bemkit.geometry.files.strokes import Stroke

@@ -11,8 +11,7 @@ from typing import Any
 import numpy as np
 
 from bemkit.arrays import FloatArray, IntArray
-from bemkit.errors import printable
-from bemkit.geometry.errors import GeometryError
+from bemkit.errors import GeometryError, printable
 from bemkit.geometry.files.plane_mesh import CellBlock, PlaneMesh, boundary_chains, in_plane
 from bemkit.geometry.loops import following_in_loops
 from bemkit.geometry.mesh import BoundaryMesh

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bemkit.arrays import FloatArray, IntArray
-from bemkit.geometry.errors import GeometryError, format_point
+from bemkit.errors import GeometryError, format_point
 from bemkit.geometry.files.chords import ChordLoop
 from bemkit.geometry.files.strokes import closed_chains
 from bemkit.geometry.vectors import cross

@@ -8,10 +8,9 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from bemkit.errors import shown_path
+from bemkit.errors import GeometryError, shown_path
 from bemkit.geometry.curves import require_positive
 from bemkit.geometry.drawn import OutlineShape
-from bemkit.geometry.errors import GeometryError
 from bemkit.geometry.files.chords import CORNER_ANGLE
 from bemkit.geometry.files.strokes import Stroke, extent, join_strokes, named_loops
 from bemkit.geometry.outline import Outline

@@ -13,8 +13,8 @@ from typing import TypeAlias
 import numpy as np
 
 from bemkit.arrays import FloatArray, IntArray
+from bemkit.errors import GeometryError, format_point
 from bemkit.geometry.drawn import ArcTo, LineTo, Loop, NurbsTo, Point, SplineTo
-from bemkit.geometry.errors import GeometryError, format_point
 from bemkit.geometry.nurbs import conic_arc
 from bemkit.geometry.vectors import cross, enclosed_area, norms
 

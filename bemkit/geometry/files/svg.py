@@ -13,10 +13,9 @@ from xml.etree.ElementTree import Element, ParseError
 
 import numpy as np
 
-from bemkit.errors import printable
+from bemkit.errors import GeometryError, printable
 from bemkit.formulas import closest
 from bemkit.geometry.drawn import ArcTo, LineTo, Point
-from bemkit.geometry.errors import GeometryError
 from bemkit.geometry.files.strokes import Stroke, bezier_stroke, ellipse_strokes
 
 _LENGTH = re.compile(r"\s*([-+.\deE]+?)\s*(mm|cm|in|pt|pc)\s*$")

@@ -15,7 +15,7 @@ from typing import Protocol
 import numpy as np
 
 from bemkit.arrays import FloatArray, IntArray
-from bemkit.geometry.errors import GeometryError
+from bemkit.errors import GeometryError
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.meshing.division import Division, divide
 from bemkit.geometry.outline import Outline, Selection

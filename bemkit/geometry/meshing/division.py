@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bemkit.arrays import FloatArray, IntArray
-from bemkit.geometry.errors import GeometryError, format_point
+from bemkit.errors import GeometryError, format_point
 from bemkit.geometry.loops import following_in_loops
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.outline import N_SAMPLES, Outline, Selection, Side, breakpoints, merge_breakpoints

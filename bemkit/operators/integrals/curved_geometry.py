@@ -23,8 +23,8 @@ from numpy.polynomial import chebyshev
 from numpy.typing import NDArray
 
 from bemkit.arrays import BoolArray, ComplexArray, FloatArray, IntArray
+from bemkit.errors import GeometryError
 from bemkit.geometry.curves import Curve
-from bemkit.geometry.errors import GeometryError
 from bemkit.geometry.mesh import BoundaryMesh
 
 MAX_DEGREE = 20

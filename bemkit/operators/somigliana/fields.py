@@ -20,9 +20,8 @@ from typing import TypeAlias
 import numpy as np
 
 from bemkit.arrays import BoolArray, ComplexArray, FloatArray, IntArray
-from bemkit.errors import InputError
+from bemkit.errors import GeometryError, InputError
 from bemkit.geometry.curves import scaled_curve
-from bemkit.geometry.errors import GeometryError
 from bemkit.geometry.local_values import values_on_elements
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.spaces import BoundarySpace, local_coefficients

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bemkit.arrays import BoolArray, ComplexArray, FloatArray, IntArray
-from bemkit.geometry.errors import GeometryError
+from bemkit.errors import GeometryError
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.pieces import RESOLUTION
 from bemkit.operators.hierarchy.tree import Clusters, ClusterTree, consecutive

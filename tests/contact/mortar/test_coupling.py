@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 from bemkit.arrays import FloatArray
 from bemkit.contact.mortar.coupling import MortarCoupling, NotFacingError, couple
 from bemkit.contact.mortar.sides import ContactSide
+from bemkit.errors import GeometryError
 from bemkit.geometry.curves import Arc, Segment
-from bemkit.geometry.errors import GeometryError
 from bemkit.geometry.local_values import dof_weights
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.spaces import dof_points

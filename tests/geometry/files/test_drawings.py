@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from bemkit.errors import GeometryError
 from bemkit.geometry.drawn import ArcTo, LineTo, NurbsTo, OutlineShape
-from bemkit.geometry.errors import GeometryError
 from bemkit.geometry.files.shape_file import DrawingFile
 from bemkit.geometry.meshing.discretise import discretise
 

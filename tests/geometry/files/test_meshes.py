@@ -13,8 +13,8 @@ import meshio
 import numpy as np
 import pytest
 
+from bemkit.errors import GeometryError
 from bemkit.geometry.drawn import ArcTo, LineTo, SplineTo
-from bemkit.geometry.errors import GeometryError
 from bemkit.geometry.files.gmsh_files import why_no_gmsh
 from bemkit.geometry.files.shape_file import DrawingFile, MeshFile
 from bemkit.geometry.meshing.discretise import discretise

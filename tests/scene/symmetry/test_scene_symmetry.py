@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import bemkit as bk
-from bemkit.geometry.errors import GeometryError
+from bemkit.errors import GeometryError
 from bemkit.geometry.reflection import element_images
 from bemkit.geometry.spaces import LinearSpace
 from bemkit.scene.symmetry import AsymmetricSceneError, find_symmetry

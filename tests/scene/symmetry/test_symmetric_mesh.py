@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import bemkit as bk
-from bemkit.geometry.errors import GeometryError
+from bemkit.errors import GeometryError
 from bemkit.geometry.neighbours import along_boundary, break_nodes, corner_nodes
 from bemkit.geometry.outline import Selection
 from bemkit.geometry.spaces import BoundarySpace, ConstantSpace, LinearSpace, QuadraticSpace
