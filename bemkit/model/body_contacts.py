@@ -31,8 +31,11 @@ _DIGITS = 9
 """Decimals of lengths of contacts relative to the longest: round-off shall not decide which of two is longer."""
 
 
-def touching_pairs(scene: Scene, bodies: Sequence[PlacedBody]) -> tuple[ContactPair, ...]:
-    """Return the contacts of free sides that face each other, besides those that are listed; see `Touching`."""
+def touching_pairs(scene: Scene, bodies: Sequence[PlacedBody]) -> tuple[tuple[ContactPair, bool], ...]:
+    """Return the contacts of free sides that face each other, besides those that are listed; see `Touching`.
+
+    Each comes with whether the meshes resolve it.
+    """
     touching = scene.touching
     if touching is None:
         return ()
@@ -49,8 +52,11 @@ def touching_pairs(scene: Scene, bodies: Sequence[PlacedBody]) -> tuple[ContactP
     known = {frozenset(pair.sides) for pair in scene.contacts}
     law = scene.law_of(touching)
     facing = find_facing(sides, touching.within, owners=owners, has_friction=not law.is_frictionless)
-    found = [ContactPair((names[one], names[two]), multipliers_on=names[one]) for one, two in facing]
-    return tuple(pair for pair in found if frozenset(pair.sides) not in known)
+    found = [
+        (ContactPair((names[pair.non_mortar], names[pair.mortar]), multipliers_on=names[pair.non_mortar]), pair)
+        for pair in facing
+    ]
+    return tuple((pair, sides.is_resolved) for pair, sides in found if frozenset(pair.sides) not in known)
 
 
 def _check_images(sides: Sequence[ContactSide], names: Sequence[str], symmetry: Symmetry, within: float) -> None:

@@ -29,7 +29,7 @@ from bemkit.model.given import (
     with_far_motion,
 )
 from bemkit.model.placed import Meshes, PlacedBody, place
-from bemkit.model.same_bodies import bodies_under, check_step, find_units, listed_contacts, with_found_contacts
+from bemkit.model.same_bodies import bodies_under, check_step, find_units, found_contacts, with_found_contacts
 from bemkit.model.units import Units
 from bemkit.operators.linear.solvers import ChosenLinearSolver, DenseCholesky, LinearSolver
 from bemkit.operators.material import Material
@@ -99,12 +99,15 @@ class Prepared:
     units : Units
         Common to all bodies: the largest body's length, the modulus of the most compliant contact, the largest load.
     rows : tuple of ContactInterface
+    unresolved : tuple of str
+        Contacts between touching bodies that are too short for the mesh, which are skipped.
     """
 
     scene: Scene
     bodies: tuple[PreparedBody, ...]
     units: Units
     rows: tuple[ContactInterface, ...]
+    unresolved: tuple[str, ...] = ()
 
     @property
     def only(self) -> PreparedBody:
@@ -331,11 +334,12 @@ def prepare_steps(scenes: Sequence[Scene], meshes: Meshes = None) -> tuple[Prepa
         If a scene lacks its symmetry, or an expression is not finite somewhere.
     """
     bodies = place(scenes[0], meshes)
-    found = listed_contacts(scenes[0], bodies)
-    steps = [with_found_contacts(step, found) for step in scenes]
+    found = found_contacts(scenes[0], bodies)
+    steps = [with_found_contacts(step, [pair for pair, is_resolved in found if is_resolved]) for step in scenes]
     for step in steps[1:]:
         check_step(steps[0], step)
     first = _prepared(steps[0], bodies, find_units(steps, bodies))
+    first = replace(first, unresolved=tuple(pair.name for pair, is_resolved in found if not is_resolved))
     if len(bodies) > 1 or scenes[0].rigid:
         from bemkit.model.overlaps import check_apart
 

@@ -20,8 +20,8 @@ if TYPE_CHECKING:
     from bemkit.scene.plane_motion import RigidBody
 
 
-def listed_contacts(scene: Scene, bodies: Sequence[PlacedBody]) -> tuple[ContactPair, ...]:
-    """Return the contacts found between touching bodies; none unless the scene asks for them."""
+def found_contacts(scene: Scene, bodies: Sequence[PlacedBody]) -> tuple[tuple[ContactPair, bool], ...]:
+    """Return the contacts found between touching bodies, and whether meshes resolve them; none unless asked for."""
     if scene.touching is None:
         return ()
     from bemkit.model.body_contacts import touching_pairs  # mortars, which single bodies lack

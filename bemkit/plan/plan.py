@@ -26,7 +26,7 @@ from bemkit.operators.steklov_poincare.cost import (
 )
 from bemkit.plan.items import Sizes as Sizes
 from bemkit.plan.items import find_sizes, items_of_one, items_of_several
-from bemkit.result_warning import ResultWarning
+from bemkit.result_warning import ResultWarning, first_of_each_kind
 from bemkit.scene.load_history import load_steps
 from bemkit.scene.profiles import profile_warnings
 from bemkit.scene.scene import Scene
@@ -139,9 +139,17 @@ def plan_steps(steps: Sequence[Prepared], proposal: Symmetry | None = None) -> P
         memory=int(kept + max(contact.memory, *(each.memory - each.kept for each in costs))),
         seconds=LEAST_SECONDS + seconds_of(sum(each.evaluations for each in costs), flops),
         items=items,
-        warnings=tuple(dict.fromkeys([*thinness, *of_profiles])),
+        warnings=first_of_each_kind(dict.fromkeys([*thinness, *of_profiles, *map(_too_short, first.unresolved)])),
         is_compressed=linear_solver.hierarchical is not None,
     )
+
+
+def _too_short(contact: str) -> ResultWarning:
+    text = (
+        f"Contact {contact!r} is shorter than a hundredth of its elements and skipped: use more elements, or move the "
+        "bodies so that these sides share more or nothing."
+    )
+    return ResultWarning("contact too short", contact, text)
 
 
 def _cost_of(steps: Sequence[Prepared], number: int) -> BodyCost:

@@ -1,5 +1,8 @@
+import bemkit as bk
 from bemkit.contact.joined.sparse_form import sparse_solver_name
+from bemkit.model.prepared import prepare
 from bemkit.plan import make_plan
+from bemkit.plan.plan import plan_steps
 from tests.runs.masonry import wall
 
 
@@ -11,3 +14,18 @@ def _contact_line(courses, per_course):
 def test_the_plan_says_how_the_contact_system_is_solved():
     assert "one dense matrix of relative displacements" in _contact_line(2, 3)
     assert f"a sparse system, factored in every step by {sparse_solver_name()}" in _contact_line(10, 10)
+
+
+def test_contacts_that_the_mesh_does_not_resolve_are_skipped_with_a_warning():
+    """The upper block stands on the left one, and on 1e-4 of the right one."""
+    block = bk.Rectangle(1.0, 1.0)
+    places = {"left": (0.0, 0.0), "right": (1.0, 0.0), "upper": (1e-4, 1.0)}
+    steel = bk.Material(1.0, 0.3)
+    bodies = tuple(
+        bk.Body(name=name, shape=block, material=steel, placement=bk.Placement(at)) for name, at in places.items()
+    )
+    scene = bk.Scene(title="Blocks", bodies=bodies, touching=bk.Touching(1e-6), mesh=bk.MeshOptions(elements=16))
+    prepared = prepare(scene)
+    assert [rows.name for rows in prepared.rows] == ["left.right / right.left", "left.top / upper.bottom"]
+    (warning,) = plan_steps([prepared]).warnings
+    assert "'right.top / upper.bottom' is shorter than a hundredth of its elements and skipped" in warning.text

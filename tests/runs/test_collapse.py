@@ -104,6 +104,7 @@ OWN = {
     "tall wall": (courses(BOND * 4, 1.5, 1.0), 0.6, False),
     "tall wall pushed": (courses(BOND * 3, 1.5, 1.0), 0.9, True),
     "wall with a window": (courses([*BOND, [1.0, -1.0, 1.0], *BOND], 2.0, 0.8), 0.65, False),
+    "joints of a thousandth": (courses([[1.001, 1.0], [1.0, 1.001]] * 2, 1.0, 1.2), 0.65, False),
     "stack bond": (courses([[1.0, 1.0, 1.0]] * 4, 1.0, 0.7), 0.4, False),
     "arcade": (ARCADE, 0.65, False),
 }

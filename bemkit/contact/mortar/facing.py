@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -13,13 +14,31 @@ from bemkit.geometry.vectors import cross, norms, turned_right
 
 _LEAST_OPPOSITION = 0.5
 """Smallest cosine of the angle (60 degrees) between one normal and the reversed other normal of facing elements."""
-_LEAST_COVER = 0.01
-"""Common length, relative to the mean element of the finer side, below which sides only touch at a corner."""
+_LEAST_COVER = 1e-6
+"""Common length, relative to the shorter side, up to which sides only touch at a corner: digits of drawn positions."""
+_LEAST_RESOLVED = 0.01
+"""Common length, relative to the mean element of the finer side, that a node of the mesh can represent."""
 _WHOLE = 1.0 - 1e-6
 """Covered share of a completely covered side, with round-off."""
 _WHOLE_CURVED = 0.98
 """Covered share of a completely covered curved side. Chords and an interference change lengths by less on any mesh, so
 that all meshes of a scene have the same non-mortar side."""
+
+
+class FacingSides(NamedTuple):
+    """Two sides that face each other, by their positions.
+
+    Parameters
+    ----------
+    non_mortar, mortar : int
+        See `is_non_mortar`.
+    is_resolved : bool
+        Whether their common length is at least a hundredth of the mean element of the finer side.
+    """
+
+    non_mortar: int
+    mortar: int
+    is_resolved: bool
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +67,7 @@ class _Elements:
 
 def find_facing(
     sides: Sequence[ContactSide], distance: float, owners: Sequence[int] | None = None, *, has_friction: bool = False
-) -> list[tuple[int, int]]:
+) -> list[FacingSides]:
     """Find the pairs of sides that face each other.
 
     Parameters
@@ -64,30 +83,33 @@ def find_facing(
 
     Returns
     -------
-    list of (int, int)
-        Non-mortar and mortar side, see `is_non_mortar`; sorted by the smaller, then the larger index.
+    list of FacingSides
+        Sorted by the smaller, then the larger index.
 
     Notes
     -----
     Elements face each other if their normals are opposite up to 60 degrees, and if their chords overlap in projection
-    along the mean of both normals. The common length of a pair of sides is at least a hundredth of a mean element of
-    the finer side; less is a corner that touches.
+    along the mean of both normals. Sides that only touch at a corner have a common length of at most a millionth of the
+    shorter one, or what the projection of chords adds where curved sides are a distance apart.
     """
     if not sides:
         return []
     elements = _Elements.of(sides, range(len(sides)) if owners is None else owners)
-    first, second, cover = _facing_elements(elements, distance)
+    first, second, cover, added = _facing_elements(elements, distance)
     pairs, number = np.unique(
         np.stack([elements.side[first], elements.side[second]], axis=1), axis=0, return_inverse=True
     )
     shared = np.bincount(number.ravel(), cover, minlength=len(pairs))
-    return [
-        (int(one), int(two))
-        if _is_first_non_mortar(sides[one], sides[two], length, has_friction=has_friction)
-        else (int(two), int(one))
-        for (one, two), length in zip(pairs, shared, strict=True)
-        if length >= _LEAST_COVER * min(_mean_length(sides[one]), _mean_length(sides[two]))
-    ]
+    least = np.full(len(pairs), np.inf)
+    np.minimum.at(least, number.ravel(), added)
+    found = []
+    for (one, two), length, corner in zip(pairs.tolist(), shared.tolist(), least.tolist(), strict=True):
+        pair = sides[one], sides[two]
+        if length > corner + _LEAST_COVER * min(float(side.lengths.sum()) for side in pair):
+            is_first = _is_first_non_mortar(*pair, length, has_friction=has_friction)
+            is_resolved = length >= _LEAST_RESOLVED * min(map(_mean_length, pair))
+            found.append(FacingSides(*((one, two) if is_first else (two, one)), is_resolved))
+    return found
 
 
 def is_non_mortar(one: ContactSide, two: ContactSide, distance: float = np.inf, *, has_friction: bool = False) -> bool:
@@ -118,7 +140,7 @@ def is_non_mortar(one: ContactSide, two: ContactSide, distance: float = np.inf, 
     resolve that error, those of the coarser side average over it: the pressure of a disc in a ring with three times
     longer elements is uniform to 1e-5 instead of 2e-2. Without friction such a disc would rotate nearly freely.
     """
-    _, _, cover = _facing_elements(_Elements.of([one, two], [0, 1]), distance)
+    _, _, cover, _ = _facing_elements(_Elements.of([one, two], [0, 1]), distance)
     return _is_first_non_mortar(one, two, float(cover.sum()), has_friction=has_friction)
 
 
@@ -137,8 +159,12 @@ def _mean_length(side: ContactSide) -> float:
     return float(side.lengths.mean())
 
 
-def _facing_elements(elements: _Elements, distance: float) -> tuple[IntArray, IntArray, FloatArray]:
-    """Return pairs of elements, first that of the lower side, and their common length (k,) [m]."""
+def _facing_elements(elements: _Elements, distance: float) -> tuple[IntArray, IntArray, FloatArray, FloatArray]:
+    """Return pairs of elements, first that of the lower side, their common length and the projection's part of it [m].
+
+    A chord is at an angle of four times its sagitta to the end of its arc. Where chords are a distance apart, their
+    mean direction is off by half of both angles, and the projection adds at most the distance times that.
+    """
     first, second = _near_elements(elements, distance)
     is_pair = elements.owner[first] != elements.owner[second]
     swap = elements.side[first] > elements.side[second]
@@ -161,6 +187,8 @@ def _facing_elements(elements: _Elements, distance: float) -> tuple[IntArray, In
     ahead1 = (at - a1) / (b1 - a1) * -cross(tangent, end[first] - origin)
     ahead2 = (at - a2) / (b2 - a2) * cross(tangent, end[second] - start[second]) - cross(tangent, end[second] - origin)
     gaps = ahead2 - ahead1
+    off_arc = 2.0 * elements.sagitta / norms(end - start)
+    added = np.abs(gaps).max(axis=0) * (off_arc[first] + off_arc[second])
     nearest = np.where(gaps[0] * gaps[1] <= 0.0, 0.0, np.abs(gaps).min(axis=0))
     slack = elements.sagitta[first] + elements.sagitta[second]
     is_near = (high > low) & (nearest <= distance + slack)
@@ -174,7 +202,7 @@ def _facing_elements(elements: _Elements, distance: float) -> tuple[IntArray, In
         resolution = max(elements.sides[one].resolution, elements.sides[two].resolution)
         meshes = elements.sides[one].mesh, elements.sides[two].mesh
         is_near[rows] &= ~faces_away(*meshes, middle[rows], depth[rows], np.maximum(resolution, 2.0 * slack[rows]))
-    return first[is_near], second[is_near], (high - low)[is_near]
+    return first[is_near], second[is_near], (high - low)[is_near], added[is_near]
 
 
 def _near_elements(elements: _Elements, distance: float) -> tuple[IntArray, IntArray]:
