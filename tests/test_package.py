@@ -31,9 +31,11 @@ NOT_NEEDED = (
     *("operators.half_plane", "operators.kernels", "operators.collocation.curved_elements"),
     *("operators.steklov_poincare.forces_inside", "operators.steklov_poincare.rigid_connection"),
     *("operators.hierarchy", "operators.integrals.curved_geometry", "model.matched_sides", "results.law_jumps"),
+    *("geometry.symmetry", "geometry.surface", "scene.body_forces", "scene.contacts", "scene.copies"),
+    *("scene.load_history", "scene.plane_motion", "scene.profiles", "scene.steps"),
 )
 """Of a scene with one body of straight sides on one obstacle, solved by collocation from a number of elements."""
-MOST_MODULES = 142
+MOST_MODULES = 132
 """Modules of the package that may be loaded to solve a simple scene, packages and command line counted."""
 HEAVY = ("scipy.sparse.linalg", "h5py", "pyamg", "matplotlib", "meshio", "rich", "click")
 

@@ -86,11 +86,14 @@ def run(
     """
 
     def changed(scene: Scene) -> Scene:
-        from bemkit.scene.keys import with_settings
         from bemkit.scene.toml import with_overrides
 
+        if settings:
+            from bemkit.scene.keys import with_settings
+
+            scene = with_settings(scene, settings)
         return with_overrides(
-            with_settings(scene, settings),
+            scene,
             elements=elements,
             accuracy=accuracy,
             discretisation=discretisation,

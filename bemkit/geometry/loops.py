@@ -1,6 +1,9 @@
 """Checks that closed loops of pieces, or arrays of nodes and elements, bound a body on their left."""
 
+from __future__ import annotations
+
 from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -20,8 +23,10 @@ from bemkit.geometry.pieces import (
     split_until_flat,
 )
 from bemkit.geometry.quadrature import gauss_legendre
-from bemkit.geometry.symmetry import Symmetry
 from bemkit.geometry.vectors import angles_between, check_magnitude, cross, norms
+
+if TYPE_CHECKING:
+    from bemkit.geometry.symmetry import Symmetry
 
 _N_AREA_POINTS = 10  # round-off on pieces that turn by less than LARGEST_TURNING
 _CURVE_TOLERANCE = 1e-2  # of the chord: finds a wrong curve or span, forgives a body moved here from far away

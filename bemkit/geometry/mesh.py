@@ -1,10 +1,12 @@
 """Boundary meshes: elements in closed loops, with named parts."""
 
-from collections.abc import Callable, Mapping
+from __future__ import annotations
+
+from collections.abc import Mapping
 from dataclasses import InitVar, dataclass, field, fields
 from functools import cached_property
 from types import MappingProxyType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -22,11 +24,13 @@ from bemkit.geometry.loops import (
     restrict_loops,
     swept_areas,
 )
-from bemkit.geometry.pieces import Pieces, derivative_on, evaluate_curves, make_pieces, point_on
+from bemkit.geometry.pieces import OnCurve, Pieces, derivative_on, evaluate_curves, make_pieces, point_on
 from bemkit.geometry.quadrature import gauss_legendre
-from bemkit.geometry.surface import Surface
-from bemkit.geometry.symmetry import Symmetry, check_half, unfold
 from bemkit.geometry.vectors import norms, turned_right
+
+if TYPE_CHECKING:
+    from bemkit.geometry.surface import Surface
+    from bemkit.geometry.symmetry import Symmetry
 
 _N_LENGTH_POINTS = 16
 
@@ -104,7 +108,7 @@ class BoundaryMesh:
         if self.surface is not None:
             self.surface.check(nodes, elements, self.is_exterior and self.symmetry is None)
         elif self.symmetry is not None:
-            check_half(self.symmetry, nodes, elements, self.is_exterior)
+            self.symmetry.check_half(nodes, elements, self.is_exterior)
             _ = self.whole  # checks its loops
         elif not follows_outline:
             check_mesh_loops(nodes, elements, self._pieces, self.loops, self.is_exterior)
@@ -122,7 +126,7 @@ class BoundaryMesh:
         return BoundaryMesh, (*content, self.is_exterior, self.symmetry, self.surface)
 
     @property
-    def whole(self) -> "BoundaryMesh":
+    def whole(self) -> BoundaryMesh:
         """The mesh of the whole body: itself, or with the images that a symmetry adds.
 
         Element e of image g (see `Symmetry.images`) has the number g * n_elements + e; nodes of this mesh come first.
@@ -287,7 +291,7 @@ class BoundaryMesh:
         derivative = self.derivatives(elements, xi)
         return turned_right(derivative / norms(derivative)[..., None])
 
-    def refined(self, marked: IntArray) -> "BoundaryMesh":
+    def refined(self, marked: IntArray) -> BoundaryMesh:
         """Bisect elements.
 
         Parameters
@@ -311,7 +315,7 @@ class BoundaryMesh:
         halves = bisected(self._content, is_halved, self.centres)
         return BoundaryMesh(*halves, self.is_exterior, self.symmetry, self.surface)
 
-    def transformed(self, shift: tuple[float, float] = (0.0, 0.0), factor: float = 1.0) -> "BoundaryMesh":
+    def transformed(self, shift: tuple[float, float] = (0.0, 0.0), factor: float = 1.0) -> BoundaryMesh:
         """Return the mesh of the body (x - shift) * factor, with the same elements and parts.
 
         Parameters
@@ -336,19 +340,19 @@ class BoundaryMesh:
         return (*content, self.is_exterior, symmetry, self.surface)
 
     @cached_property
-    def unit(self) -> "BoundaryMesh":
+    def unit(self) -> BoundaryMesh:
         """The same mesh about the origin, in units of its diameter."""
         # coordinates lose nothing there: what was found valid is not checked again
         return _unchecked(self._moved(tuple(self.centre.tolist()), 1.0 / self.diameter))
 
-    def unchecked_copy(self, nodes: FloatArray, curves: tuple[Curve, ...]) -> "BoundaryMesh":
+    def unchecked_copy(self, nodes: FloatArray, curves: tuple[Curve, ...]) -> BoundaryMesh:
         """Return the mesh of the body moved rigidly, with its nodes (n_nodes, 2) [m] and curves there; no symmetry."""
         moved = self._content._replace(nodes=read_only(nodes), curves=curves)
         return _unchecked((*moved, self.is_exterior, None, self.surface))
 
     @cached_property
-    def _unfolded(self) -> "BoundaryMesh":
-        return self if self.symmetry is None else BoundaryMesh(*unfold(self.symmetry, self._content))
+    def _unfolded(self) -> BoundaryMesh:
+        return self if self.symmetry is None else BoundaryMesh(*self.symmetry.unfold(self._content))
 
     @property
     def _content(self) -> Elements:
@@ -373,13 +377,7 @@ class BoundaryMesh:
         points = np.concatenate([self.nodes, self.centres])
         return points.min(axis=0), points.max(axis=0)
 
-    def _on_curves(
-        self,
-        elements: IntArray,
-        xi: FloatArray,
-        evaluate: Callable[[Curve, FloatArray], FloatArray],
-        straight: FloatArray,
-    ) -> FloatArray:
+    def _on_curves(self, elements: IntArray, xi: FloatArray, evaluate: OnCurve, straight: FloatArray) -> FloatArray:
         """Replace the values (m, q, 2) of straight elements by those on curves where elements are curved."""
         if not self.curves:
             return straight

@@ -1,8 +1,11 @@
 """Outlines: named sides joined to closed loops around a body, and the pieces of them in a boundary part."""
 
+from __future__ import annotations
+
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -11,8 +14,10 @@ from bemkit.errors import GeometryError, format_point
 from bemkit.geometry.curves import CURVE_MEMBERS, Curve
 from bemkit.geometry.loops import check_loops
 from bemkit.geometry.pieces import RESOLUTION, make_pieces, resolution
-from bemkit.geometry.surface import Surface
 from bemkit.geometry.vectors import check_magnitude, norms
+
+if TYPE_CHECKING:
+    from bemkit.geometry.surface import Surface
 
 _JOINT_TOLERANCE = 64 * RESOLUTION  # times the coordinates: trigonometry and splines lose a few more digits
 _N_SEEN = 4  # points of a side that define its size, also of a closed one

@@ -11,7 +11,7 @@ the size of the body, are seen as they are.
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -19,6 +19,9 @@ from bemkit.arrays import BoolArray, FloatArray, IntArray
 from bemkit.errors import GeometryError
 from bemkit.geometry.curves import Curve
 from bemkit.geometry.vectors import angles_between, cross, norms
+
+OnCurve: TypeAlias = Callable[[Curve, FloatArray], FloatArray]
+"""Curve, parameters (n,) -> values (n, 2)."""
 
 LARGEST_TURNING = np.pi / 4
 """Pieces are split until they turn by less, so that none can meet itself."""
@@ -152,12 +155,7 @@ def derivative_on(curve: Curve, s: FloatArray) -> FloatArray:
     return curve.derivative(s)
 
 
-def evaluate_curves(
-    curves: tuple[Curve, ...],
-    curve: IntArray,
-    s: FloatArray,
-    evaluate: Callable[[Curve, FloatArray], FloatArray],
-) -> FloatArray:
+def evaluate_curves(curves: tuple[Curve, ...], curve: IntArray, s: FloatArray, evaluate: OnCurve) -> FloatArray:
     """Evaluate the curve with index `curve[i]` at the parameters `s[i]`.
 
     Parameters

@@ -1,5 +1,7 @@
 """Shapes: bodies given by a few plain numbers, so that scene files can name them."""
 
+from __future__ import annotations
+
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from functools import cached_property
@@ -11,7 +13,6 @@ import numpy as np
 from bemkit.errors import GeometryError
 from bemkit.geometry.curves import Arc, Segment, as_point, require_positive, reverse_curve
 from bemkit.geometry.outline import Outline, Side
-from bemkit.geometry.surface import Surface
 
 _QUADRANTS = np.pi / 2 * np.arange(5)
 
@@ -299,7 +300,7 @@ class ElasticHalfPlane(CheckedShape):
     @cached_property
     def _outline(self) -> Outline:
         """Return the strip."""
-        return _strip(self.left, self.right, Surface())
+        return _strip(self.left, self.right)
 
 
 @dataclass(frozen=True)
@@ -328,12 +329,14 @@ class PeriodicHalfPlane(CheckedShape):
     @cached_property
     def _outline(self) -> Outline:
         """Return one period."""
-        return _strip(self.left, self.left + self.period, Surface(is_periodic=True))
+        return _strip(self.left, self.left + self.period, is_periodic=True)
 
 
-def _strip(left: float, right: float, surface: Surface) -> Outline:
+def _strip(left: float, right: float, *, is_periodic: bool = False) -> Outline:
+    from bemkit.geometry.surface import Surface
+
     side = Side("surface", Segment((right, 0.0), (left, 0.0)))
-    return Outline(((side,),), is_exterior=True, surface=surface)
+    return Outline(((side,),), is_exterior=True, surface=Surface(is_periodic))
 
 
 def _polygon_loop(vertices: tuple[tuple[float, float], ...], names: tuple[str, ...]) -> tuple[Side, ...]:

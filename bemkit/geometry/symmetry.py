@@ -117,6 +117,58 @@ class Symmetry:
         ]
         return Symmetry(*moved)
 
+    def check_half(self, nodes: FloatArray, elements: IntArray, is_exterior: bool) -> None:
+        """Raise if an element lies on a line, or the body is an exterior."""
+        if is_exterior:
+            raise GeometryError(f"BoundaryMesh: symmetry ({self}) of an exterior is not supported: remove it")
+        start, end = self.meets(nodes)[elements].transpose(1, 0, 2)
+        for element in np.flatnonzero((start & end).any(axis=1)):
+            raise GeometryError(
+                f"BoundaryMesh: element {element} lies on the symmetry line ({self}), inside of the whole body: "
+                "remove it, or remove the symmetry and give the line a roller"
+            )
+
+    def unfold(self, half: Elements) -> Elements:
+        """Return the elements of the whole body.
+
+        Parameters
+        ----------
+        half : Elements
+            Of one side of the lines; nodes on a line lie there to the last digit.
+
+        Returns
+        -------
+        Elements
+            Image by image: the element e of the image g has the number g * n_elements + e, and the first nodes are
+            those of `half`. A part holds all images of its elements.
+        """
+        images = self.images
+        n_elements, n_curves = len(half.elements), len(half.curves)
+        number, nodes = _unfolded_nodes(self, half.nodes)
+        elements = [
+            nodes_of_image[half.elements][:, :: -1 if is_reversing(image) else 1]
+            for nodes_of_image, image in zip(number, images, strict=True)
+        ]
+        parts = {
+            name: np.concatenate([members + g * n_elements for g in range(len(images))])
+            for name, members in half.parts.items()
+            if len(members)
+        }
+        curve, span = half.element_curve, half.element_span
+        if curve is None or span is None:
+            return Elements(nodes, np.concatenate(elements), parts, (), None, None)
+        curves = [reflected_curve(curve, self, image) for image in images[1:] for curve in half.curves]
+        spans = [1.0 - span[:, ::-1] if is_reversing(image) else span for image in images]
+        indices = [np.where(curve < 0, -1, curve + g * n_curves) for g in range(len(images))]
+        return Elements(
+            nodes,
+            np.concatenate(elements),
+            parts,
+            (*half.curves, *curves),
+            np.concatenate(indices),
+            np.concatenate(spans),
+        )
+
 
 def reflected_curve(curve: Curve, symmetry: Symmetry, image: FloatArray) -> TransformedCurve:
     """Return the image of a curve; a single reflection is traversed from the end of the curve to its start.
@@ -139,56 +191,6 @@ def reflected_curve(curve: Curve, symmetry: Symmetry, image: FloatArray) -> Tran
 def is_reversing(image: FloatArray) -> bool:
     """Return whether an image is traversed from the images of ends to the images of starts."""
     return bool(np.prod(image) < 0.0)
-
-
-def check_half(symmetry: Symmetry, nodes: FloatArray, elements: IntArray, is_exterior: bool) -> None:
-    """Raise if an element lies on a line, or the body is an exterior."""
-    if is_exterior:
-        raise GeometryError(f"BoundaryMesh: symmetry ({symmetry}) of an exterior is not supported: remove it")
-    start, end = symmetry.meets(nodes)[elements].transpose(1, 0, 2)
-    for element in np.flatnonzero((start & end).any(axis=1)):
-        raise GeometryError(
-            f"BoundaryMesh: element {element} lies on the symmetry line ({symmetry}), inside of the whole body: "
-            "remove it, or remove the symmetry and give the line a roller"
-        )
-
-
-def unfold(symmetry: Symmetry, half: Elements) -> Elements:
-    """Return the elements of the whole body.
-
-    Parameters
-    ----------
-    symmetry : Symmetry
-    half : Elements
-        Of one side of the lines; nodes on a line lie there to the last digit.
-
-    Returns
-    -------
-    Elements
-        Image by image: the element e of the image g has the number g * n_elements + e, and the first nodes are those
-        of `half`. A part holds all images of its elements.
-    """
-    images = symmetry.images
-    n_elements, n_curves = len(half.elements), len(half.curves)
-    number, nodes = _unfolded_nodes(symmetry, half.nodes)
-    elements = [
-        nodes_of_image[half.elements][:, :: -1 if is_reversing(image) else 1]
-        for nodes_of_image, image in zip(number, images, strict=True)
-    ]
-    parts = {
-        name: np.concatenate([members + g * n_elements for g in range(len(images))])
-        for name, members in half.parts.items()
-        if len(members)
-    }
-    curve, span = half.element_curve, half.element_span
-    if curve is None or span is None:
-        return Elements(nodes, np.concatenate(elements), parts, (), None, None)
-    curves = [reflected_curve(curve, symmetry, image) for image in images[1:] for curve in half.curves]
-    spans = [1.0 - span[:, ::-1] if is_reversing(image) else span for image in images]
-    indices = [np.where(curve < 0, -1, curve + g * n_curves) for g in range(len(images))]
-    return Elements(
-        nodes, np.concatenate(elements), parts, (*half.curves, *curves), np.concatenate(indices), np.concatenate(spans)
-    )
 
 
 def _unfolded_nodes(symmetry: Symmetry, nodes: FloatArray) -> tuple[IntArray, FloatArray]:

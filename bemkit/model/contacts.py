@@ -17,7 +17,7 @@ from bemkit.geometry.spaces import dof_points
 from bemkit.model.contact_data import ContactData, FacingPart, find_contact
 from bemkit.model.placed import PlacedBody, groups
 from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions
-from bemkit.scene.contacts import name_at_obstacle
+from bemkit.scene.conditions import name_at_obstacle
 from bemkit.scene.scene import Scene
 
 if TYPE_CHECKING:

@@ -26,8 +26,8 @@ from bemkit.model.same_bodies import found_contacts, with_found_contacts
 from bemkit.operators.rigid_modes import rigid_motions
 from bemkit.operators.steklov_poincare.forces_inside import ForcesInside
 from bemkit.operators.steklov_poincare.nodal_conditions import free_modes
-from bemkit.scene.conditions import Contact
-from bemkit.scene.contacts import ContactPair, name_at_obstacle
+from bemkit.scene.conditions import Contact, name_at_obstacle
+from bemkit.scene.contacts import ContactPair
 from bemkit.scene.scene import Scene
 
 _ENDS = np.array([-1.0, 1.0])

@@ -23,7 +23,7 @@ from bemkit.operators.pair_form import Tag
 from bemkit.operators.rigid_modes import traction_free_modes
 from bemkit.operators.steklov_poincare import CondensedMap, SteklovPoincare
 from bemkit.result_warning import ResultWarning
-from bemkit.scene.contacts import name_at_obstacle
+from bemkit.scene.conditions import name_at_obstacle
 from bemkit.scene.unit_names import UnitNames, amount
 from bemkit.solvers.active_sets import NodeStatus
 from bemkit.solvers.base import ContactSolution, Status

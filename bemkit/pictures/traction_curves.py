@@ -13,8 +13,7 @@ from bemkit.geometry.neighbours import along_boundary
 from bemkit.geometry.spaces import BoundarySpace, ConstantSpace
 from bemkit.pictures.shown import Result
 from bemkit.results.solved_body import SolvedBody
-from bemkit.scene.conditions import Contact
-from bemkit.scene.contacts import name_at_obstacle
+from bemkit.scene.conditions import Contact, name_at_obstacle
 
 _POINTS_OF_CURVE = 9
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from bemkit.contact.laws import FrictionLaw
-from bemkit.geometry.symmetry import Symmetry
 from bemkit.model.placed import PlacedBody, groups
 from bemkit.model.prepared import Prepared
 from bemkit.operators.rigid_modes import admissible_modes
@@ -16,6 +16,9 @@ from bemkit.operators.steklov_poincare.cost import PlanItem
 from bemkit.scene.body_scene import BodyScene
 from bemkit.scene.registry import BODY_FORCES
 from bemkit.scene.scene import Scene
+
+if TYPE_CHECKING:
+    from bemkit.geometry.symmetry import Symmetry
 
 _MOST_NAMED = 12
 """Largest number of different bodies that have a line each."""

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from bemkit.errors import InputError
-from bemkit.geometry.outline import Outline
-from bemkit.geometry.symmetry import Symmetry
 from bemkit.model.placed import Meshes, groups
 from bemkit.model.prepared import Prepared, prepare_steps
 from bemkit.notebook import ShownInNotebooks
@@ -27,10 +25,13 @@ from bemkit.operators.steklov_poincare.cost import (
 from bemkit.plan.items import Sizes as Sizes
 from bemkit.plan.items import find_sizes, items_of_one, items_of_several
 from bemkit.result_warning import ResultWarning, first_of_each_kind
-from bemkit.scene.load_history import load_steps
-from bemkit.scene.profiles import profile_warnings
 from bemkit.scene.scene import Scene
 from bemkit.stopwatch import announce
+
+if TYPE_CHECKING:
+    from bemkit.geometry.outline import Outline
+    from bemkit.geometry.symmetry import Symmetry
+    from bemkit.scene.body_scene import BodyScene
 
 _BYTES = 8
 _FLOPS_PER_NUMBER = 30.0
@@ -110,6 +111,8 @@ def make_plan(scene: Scene, meshes: Meshes = None, *, proposal: Symmetry | None 
     ValueError
         As `bemkit.model.prepared.prepare_steps`.
     """
+    from bemkit.scene.load_history import load_steps
+
     return plan_steps(prepare_steps(load_steps(scene), meshes), proposal)
 
 
@@ -131,7 +134,7 @@ def plan_steps(steps: Sequence[Prepared], proposal: Symmetry | None = None) -> P
     else:
         items = tuple(items_of_several(first, sizes, len(steps), is_dense=contact.is_dense))
     thinness = [warning for body in drawn for warning in first.thinness_warnings(body)]
-    of_profiles = [each for body in drawn for each in profile_warnings(body.scene.parts, body.scene.units)]
+    of_profiles = [warning for body in drawn for warning in _profile_warnings(body.scene)]
     return Plan(
         linear_solver=linear_solver.solver,
         sizes=sizes,
@@ -150,6 +153,13 @@ def _too_short(contact: str) -> ResultWarning:
         "bodies so that these sides share more or nothing."
     )
     return ResultWarning("contact too short", contact, text)
+
+
+def _profile_warnings(scene: BodyScene) -> Iterator[ResultWarning]:
+    if scene.may_touch_profiles:
+        from bemkit.scene.profiles import profile_warnings
+
+        yield from profile_warnings(scene.parts, scene.units)
 
 
 def _cost_of(steps: Sequence[Prepared], number: int) -> BodyCost:

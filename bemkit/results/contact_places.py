@@ -16,7 +16,7 @@ from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.vectors import norms
 from bemkit.results.transitions import resolved_transitions, unresolved_contacts, unrolled
 from bemkit.results.zone_ends import LYING_AT, Side, ZoneEnd
-from bemkit.scene.contacts import name_at_obstacle
+from bemkit.scene.conditions import name_at_obstacle
 from bemkit.solvers.active_sets import NodeStatus
 
 if TYPE_CHECKING:
@@ -68,7 +68,7 @@ class ContactPlaces:
 
     def _touching(self, name: str) -> IntArray:
         body = self.solution.bodies[name]
-        listed = self.solution.scene.listed_parts(name)
+        listed = self.solution.scene.listed_parts.get(name, ())
         parts = dict.fromkeys([*listed, *(part.name for part in body.scene.contact_parts)])
         return np.unique(np.concatenate([np.zeros(0, np.intp), *(body.mesh.part(part) for part in parts)]))
 
@@ -114,7 +114,7 @@ class ContactPlaces:
         for name, body in solution.bodies.items():
             own = {name_at_obstacle(body.name, part.name): part.name for part in body.scene.contact_parts}
             table, motion = solution.contact.renamed(own), self._motion_of(own)
-            listed = solution.scene.listed_parts(name)
+            listed = solution.scene.listed_parts.get(name, ())
             given[name] = GivenSides(body, table, motion, listed)
             found[name] = list(singular_corners(body, table, motion=motion, unknown=listed))
         for pair in solution.scene.elastic_contacts:

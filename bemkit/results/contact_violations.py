@@ -21,13 +21,12 @@ from bemkit.results.between_nodes import (
 )
 from bemkit.results.least_clearance import Sample, nearest_only, with_least_clearances
 from bemkit.results.part_forces import RigidResult
-from bemkit.scene.conditions import Contact
-from bemkit.scene.contacts import name_at_obstacle
-from bemkit.scene.plane_motion import RigidBody
+from bemkit.scene.conditions import Contact, name_at_obstacle
 
 if TYPE_CHECKING:
     from bemkit.results.solved_scene import SolvedScene
     from bemkit.scene.contacts import ContactPair
+    from bemkit.scene.plane_motion import RigidBody
 
 _LIGHTEST = 1e-3
 """Smallest force that a body is measured by, relative to the forces on the others."""

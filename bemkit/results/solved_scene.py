@@ -17,7 +17,7 @@ from bemkit.results.contact_table import ContactTable
 from bemkit.results.part_forces import ContactForce, PartForce, RigidResult
 from bemkit.results.solved_body import BoundaryFields, SideName, SolvedBody
 from bemkit.results.transitions import Transition
-from bemkit.scene.contacts import name_at_obstacle
+from bemkit.scene.conditions import name_at_obstacle
 from bemkit.scene.scene import Scene
 from bemkit.scene.unit_names import UnitNames
 

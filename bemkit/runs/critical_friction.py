@@ -16,9 +16,9 @@ from bemkit.errors import NoResultError
 from bemkit.model.model import build_model
 from bemkit.model.prepared import prepare
 from bemkit.runs.run import LoadHistoryError, on_its_meshes
-from bemkit.runs.steps import UnsolvableSceneError
+from bemkit.runs.steps import NoContactError, UnsolvableSceneError
 from bemkit.scene.load_history import load_steps
-from bemkit.scene.scene import NoContactError, Scene, check_scene
+from bemkit.scene.scene import Scene, check_scene
 from bemkit.solvers.active_sets import NodeStatus
 from bemkit.solvers.base import solve
 

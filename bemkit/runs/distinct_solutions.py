@@ -9,9 +9,9 @@ from bemkit.model.placed import Meshes
 from bemkit.operators.linear.threads import blas_threads_for
 from bemkit.runs.run import LoadHistoryError, UnsolvableSceneError, on_its_meshes
 from bemkit.runs.solution_of import solution_of
-from bemkit.runs.steps import built, checked, explained, planned
+from bemkit.runs.steps import NoContactError, built, checked, explained, planned
 from bemkit.scene.load_history import load_steps
-from bemkit.scene.scene import NoContactError, Scene, check_scene
+from bemkit.scene.scene import Scene, check_scene
 from bemkit.solvers.multistart import probe
 from bemkit.stopwatch import Stage
 

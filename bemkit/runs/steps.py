@@ -22,8 +22,7 @@ from bemkit.plan import Plan, announce_plan, check_elements, check_memory, plan_
 from bemkit.results.solved_steps import following
 from bemkit.runs.load_path import Callback, IncrementEnd, Path, ReachedStep, advance
 from bemkit.runs.solution_of import solution_of, with_missed_contact_named
-from bemkit.scene.load_history import load_steps
-from bemkit.scene.scene import NoContactError, Scene
+from bemkit.scene.scene import Scene
 from bemkit.solvers.active_sets import NodeStatus
 from bemkit.solvers.base import ContactSolution, Status
 from bemkit.stopwatch import Stage, StageClock, announce, assembly_time
@@ -34,6 +33,10 @@ if TYPE_CHECKING:
     from bemkit.results.load_history import LoadHistory, LoadStep
     from bemkit.results.solution import Solution
     from bemkit.solvers.base import StepRecord
+
+
+class NoContactError(InputError):
+    """A method that needs contact, for a scene without contact."""
 
 
 class UnsolvableSceneError(InputError):
@@ -174,13 +177,21 @@ def solved_history(
     History, tuple of solutions
         See `solve_steps`.
     """
-    steps = [step for each in scenes for step in load_steps(each)]
+    steps = [step for each in scenes for step in _load_steps(each)]
     history: History = History.of(scenes[-1], steps, done, finished)
     prepared, plan, clock = planned(steps, meshes)
     with blas_threads_for(prepared[0].largest_matrix):
         model, clock = built(prepared[0], clock, executor)
         start = None if guess is None else guess(model)
         return history, solve_steps(model, prepared, plan, history, clock=clock, guess=start, callback=callback)
+
+
+def _load_steps(scene: Scene) -> tuple[Scene, ...]:
+    if scene.is_one_load:
+        return (scene,)
+    from bemkit.scene.load_history import load_steps
+
+    return load_steps(scene)
 
 
 def solve_steps(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,16 +13,17 @@ from bemkit.errors import InputError
 from bemkit.formulas import choices
 from bemkit.geometry.placement import Placement
 from bemkit.geometry.shapes import Shape
-from bemkit.geometry.symmetry import Symmetry
 from bemkit.operators.material import Material
-from bemkit.scene.body_forces import BodyForce
 from bemkit.scene.conditions import Clamped, Contact, Free, Part, PrescribedDisplacement, Roller
-from bemkit.scene.copies import Copies
 from bemkit.scene.discretisation import Discretisation
 from bemkit.scene.mesh_options import MeshOptions
-from bemkit.scene.objects import check_objects, outline_of
-from bemkit.scene.plane_motion import FarField
-from bemkit.scene.steps import check_names
+from bemkit.scene.objects import check_names, check_objects, outline_of
+
+if TYPE_CHECKING:
+    from bemkit.geometry.symmetry import Symmetry
+    from bemkit.scene.body_forces import BodyForce
+    from bemkit.scene.copies import Copies
+    from bemkit.scene.plane_motion import FarField
 
 _ALONG = np.linspace(0.0, 1.0, 33)
 """Parameters of curves at which the extent of a body is measured."""
@@ -134,7 +136,9 @@ def lines_across(body: Body, symmetry: Symmetry | None) -> Symmetry | None:
     margin = _ON_LINE * float((high - low).max())
     places = zip((symmetry.x, symmetry.y), (low + margin).tolist(), (high - margin).tolist(), strict=True)
     x, y = (place if place is not None and below < place < above else None for place, below, above in places)
-    return None if x is None and y is None else Symmetry(x, y)
+    if x is None and y is None:
+        return None
+    return replace(symmetry, x=x, y=y)
 
 
 def check_accuracy(mesh: MeshOptions, bodies: Sequence[Body]) -> None:

@@ -10,6 +10,7 @@ import numpy as np
 
 from bemkit.arrays import FloatArray, IntArray
 from bemkit.contact.laws import FrictionLaw
+from bemkit.contact.obstacle import SIMPLE_OBSTACLES
 from bemkit.contact.problem import LawError
 from bemkit.errors import InputError, Mistakes
 from bemkit.formulas import choices
@@ -18,19 +19,19 @@ from bemkit.geometry.meshing.discretise import discretise
 from bemkit.geometry.meshing.division import divide
 from bemkit.geometry.outline import Outline, Selection
 from bemkit.geometry.shapes import Shape
-from bemkit.geometry.symmetry import Symmetry
 from bemkit.operators.material import Material
-from bemkit.scene.body_forces import BodyForce
 from bemkit.scene.conditions import Clamped, Contact, Free, Part, PrescribedDisplacement, RigidConnection, Roller
 from bemkit.scene.discretisation import Discretisation, Galerkin
 from bemkit.scene.mesh_options import MeshOptions
-from bemkit.scene.plane_motion import FarField
-from bemkit.scene.profiles import check_profiles
-from bemkit.scene.steps import Step, check_laws
-from bemkit.scene.unit_names import UnitNames, check_length_of_file
+from bemkit.scene.objects import check_laws
 
 if TYPE_CHECKING:
     from bemkit.geometry.meshing.partition import Partition
+    from bemkit.geometry.symmetry import Symmetry
+    from bemkit.scene.body_forces import BodyForce
+    from bemkit.scene.plane_motion import FarField
+    from bemkit.scene.steps import Step
+    from bemkit.scene.unit_names import UnitNames
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -95,10 +96,15 @@ class BodyScene:
         with mistakes.collected():
             self._check_rigid_connections(outline)
         if self.units is not None:
+            from bemkit.scene.unit_names import check_length_of_file
+
             with mistakes.collected():
                 if outline.drawing is not None:
                     check_length_of_file(outline.drawing.unit, self.units)
-                check_profiles(self.parts, self.units)
+                if self.may_touch_profiles:
+                    from bemkit.scene.profiles import check_profiles
+
+                    check_profiles(self.parts, self.units)
         with mistakes.collected():
             self._check_body_forces(outline)
         for part in self.parts:
@@ -144,6 +150,12 @@ class BodyScene:
     def contact_parts(self) -> tuple[Part, ...]:
         """The parts that may touch an obstacle."""
         return tuple(part for part in self.parts if isinstance(part.condition, Contact))
+
+    @property
+    def may_touch_profiles(self) -> bool:
+        """Whether an obstacle may be a measured profile; only such scenes load the module of profiles."""
+        obstacles = [part.condition.obstacle for part in self.parts if isinstance(part.condition, Contact)]
+        return any(not isinstance(obstacle, SIMPLE_OBSTACLES) for obstacle in obstacles)
 
     @property
     def cannot_turn(self) -> bool:

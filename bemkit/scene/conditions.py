@@ -231,6 +231,11 @@ class Contact:
         check_objects(self)
 
 
+def name_at_obstacle(body: str, part: str) -> str:
+    """Return the name of the contact of a part with a fixed obstacle: ``"body.part"``, or the part."""
+    return f"{body}.{part}" if body else part
+
+
 Condition: TypeAlias = Clamped | Roller | PrescribedDisplacement | Traction | Pressure | Force | Contact | Free
 
 

@@ -23,11 +23,6 @@ def body_and_part(side: str) -> tuple[str, str]:
     return body, part
 
 
-def name_at_obstacle(body: str, part: str) -> str:
-    """Return the name of the contact of a part with a fixed obstacle: ``"body.part"``, or the part."""
-    return f"{body}.{part}" if body else part
-
-
 @dataclass(frozen=True)
 class ContactPair:
     """Two sides of bodies that may touch.

@@ -13,10 +13,7 @@ import numpy as np
 
 from bemkit.errors import InputError
 from bemkit.formulas import closest
-from bemkit.scene.body import Body
-from bemkit.scene.conditions import Part
-from bemkit.scene.plane_motion import RigidBody
-from bemkit.scene.registry import SYNONYMS, hints_of
+from bemkit.scene.registry import HEADINGS, SYNONYMS, reference_of, type_of_field
 from bemkit.scene.unit_names import UnitNames
 
 _NAME = r'(?:"[^"]+"|[^.\[\]"=\s]+)'
@@ -186,14 +183,14 @@ def _inside(node: Any, declared: Any, name: str | int, path: str) -> tuple[Any, 
         if name >= len(node):
             raise SceneKeyError(f"{inner_path}: unknown entry: {path} has {len(node)}, counted from 0")
         return node[name], _entry_type(declared, name, node[name]), inner_path
-    if isinstance(node, tuple | list) and node and isinstance(node[0], Part | Body | RigidBody):
+    if isinstance(node, tuple | list) and node and reference_of(type(node[0])) in HEADINGS:
         named = {entry.name: entry for entry in node}
         return named[_known(name, list(named), path)], type(node[0]), inner_path
     if isinstance(node, Mapping):
         return node.get(name), (get_args(declared) or (None, float))[1], inner_path
     if is_dataclass(node):
         _known(name, [entry.name for entry in fields(node) if entry.init and entry.name != "name"], path)
-        return getattr(node, name), hints_of(cast(type, type(node)))[name], inner_path
+        return getattr(node, name), type_of_field(cast(type, type(node)), name), inner_path
     kind = "a list: give the number of an entry, such as [0]" if isinstance(node, tuple | list) else "not a table"
     raise SceneKeyError(f"{path}.{name}: unknown key: {path} is {kind}")
 

@@ -41,11 +41,10 @@ def load_steps(scene: Scene) -> tuple[Scene, ...]:
     SceneKeyError
         If a step names a place that the scene does not have, or a value that does not fit there.
     """
-    if not scene.steps and len(scene.load_factors) == 1:
-        (factor,) = scene.load_factors
-        return (scene,) if factor == 1.0 else (with_scaled_loads(scene, factor),)
-    if len(scene.steps) == 1 and scene.steps[0].is_plain:
+    if scene.is_one_load:
         return (scene,)
+    if not scene.steps and len(scene.load_factors) == 1:
+        return (with_scaled_loads(scene, scene.load_factors[0]),)
     factors = enumerate(scene.load_factors, start=1)
     steps = scene.steps or [Step(float(number), load_factor=factor) for number, factor in factors]
     base: Scene = replace(scene, load_factors=(1.0,), steps=(Step(steps[-1].time),))

@@ -1,14 +1,21 @@
-"""Checks of scenes made in Python: objects where scene files have words, tuples where they have lists."""
+"""Checks that scenes and their bodies share: types of objects made in Python, names, laws, load steps."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+import math
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from itertools import pairwise
 from types import MappingProxyType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from bemkit.errors import InputError, called
 from bemkit.geometry.outline import Outline
 from bemkit.geometry.shapes import Shape
+
+if TYPE_CHECKING:
+    from bemkit.contact.laws import FrictionLaw
+    from bemkit.scene.steps import Step
 
 _EXAMPLES: Mapping[str, str] = MappingProxyType(
     {
@@ -80,3 +87,36 @@ def check_objects(owner: Any, name: str = "") -> None:
         value = getattr(owner, attribute, ())
         if isinstance(value, str) or not isinstance(value, Iterable):
             raise InputError(f"{begin}{attribute} is {value!r}: give a tuple, such as ({value!r},)")
+
+
+def check_names(owner: str, names: Iterable[str], kind: str) -> None:
+    """Raise InputError if two parts or bodies have one name."""
+    for name, count in Counter(names).items():
+        if count > 1:
+            raise InputError(f"{owner}: {name!r} is the name of two {kind}: give each its own name")
+
+
+def check_laws(laws: Mapping[str, FrictionLaw], steps: Sequence[Step]) -> None:
+    """Check that laws that depend on slip or time have a load history.
+
+    Raises
+    ------
+    InputError
+        Naming the place and the law.
+    """
+    for place, law in laws.items():
+        if law.needs_history and not steps:
+            raise InputError(
+                f"{place} is {type(law).__name__}, which depends on slip or time: give [[steps]] with their times"
+            )
+
+
+def check_steps(load_factors: Sequence[float], steps: Sequence[Step]) -> None:
+    """Raise InputError unless load factors are finite, times increase, and only one of both describes the history."""
+    if not (load_factors and all(map(math.isfinite, load_factors))):
+        raise InputError(f"load_factors is {load_factors}: give finite numbers such as (0.5, 1.0)")
+    if steps and load_factors != (1.0,):
+        raise InputError(f"load_factors is {load_factors} besides {len(steps)} steps: give each step its load_factor")
+    for number, (before, step) in enumerate(pairwise(steps), start=1):
+        if step.time <= before.time:
+            raise InputError(f"steps[{number}]: time is {step.time:g} after {before.time:g}: give times that increase")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from bemkit.contact.obstacle import SIMPLE_OBSTACLES, Obstacle
+from bemkit.contact.rough_profile import Profile, ProfilePoints
 from bemkit.result_warning import ResultWarning
 from bemkit.scene.conditions import Contact, Part
 from bemkit.scene.unit_names import UnitNames, amount, check_length_of_file
@@ -12,18 +12,15 @@ from bemkit.scene.unit_names import UnitNames, amount, check_length_of_file
 
 def check_profiles(parts: Sequence[Part], units: UnitNames) -> None:
     """Raise InputError if the file of a profile states another unit of length than its scene."""
-    for part, obstacle in _other_obstacles(parts):
-        from bemkit.contact.rough_profile import Profile
-
-        if isinstance(obstacle, Profile):
-            check_length_of_file(obstacle.unit, units, f"profile of part {part.name!r}")
+    for part in parts:
+        if isinstance(part.condition, Contact) and isinstance(profile := part.condition.obstacle, Profile):
+            check_length_of_file(profile.unit, units, f"profile of part {part.name!r}")
 
 
 def profile_warnings(parts: Sequence[Part], units: UnitNames | None) -> Iterator[ResultWarning]:
     """Warn of periodic profiles that jump where their period ends."""
-    for part, obstacle in _other_obstacles(parts):
-        from bemkit.contact.rough_profile import Profile, ProfilePoints
-
+    for part in parts:
+        obstacle = part.condition.obstacle if isinstance(part.condition, Contact) else None
         if isinstance(obstacle, Profile | ProfilePoints) and (jump := obstacle.seam_jump):
             profile = obstacle.profile if isinstance(obstacle, Profile) else obstacle
             yield ResultWarning(
@@ -34,10 +31,3 @@ def profile_warnings(parts: Sequence[Part], units: UnitNames | None) -> Iterator
                 "where its ends meet.",
                 jump,
             )
-
-
-def _other_obstacles(parts: Sequence[Part]) -> Iterator[tuple[Part, Obstacle]]:
-    """Yield the parts whose obstacles may be profiles; only these load modules of profiles."""
-    for part in parts:
-        if isinstance(part.condition, Contact) and not isinstance(part.condition.obstacle, SIMPLE_OBSTACLES):
-            yield part, part.condition.obstacle

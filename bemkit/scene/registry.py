@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import inspect
+import re
+import sys
 import types
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import MISSING, Field, dataclass, field, is_dataclass
 from functools import cache
 from importlib.metadata import EntryPoint, entry_points
-from types import MappingProxyType
+from types import MappingProxyType, SimpleNamespace
 from typing import Any, Union, get_args, get_origin, get_type_hints
 
 from bemkit.errors import InputError
@@ -310,6 +313,18 @@ HEADINGS = {
 }
 """Classes of which several are in tables headed by their names, and the word before the name."""
 
+_DEFERRED: Mapping[str, str] = MappingProxyType(
+    {
+        reference.split(":")[1]: reference
+        for reference in (
+            *(*HEADINGS, COPIES.protocol, "bemkit.scene.plane_motion:FarField", "bemkit.scene.steps:Step"),
+            *("bemkit.scene.contacts:ContactPair", "bemkit.scene.contacts:Touching"),
+            *("bemkit.scene.body_forces:BodyForce", "bemkit.geometry.symmetry:Symmetry"),
+        )
+    }
+)
+"""Types of fields that are imported once a scene has such a field."""
+
 SYNONYMS: Mapping[str, tuple[str, ...]] = MappingProxyType(
     {
         **dict.fromkeys(("e", "young", "young_modulus", "elastic_modulus", "modulus"), ("youngs_modulus",)),
@@ -356,9 +371,14 @@ def options_of(declared: Any) -> tuple[Any, ...]:
 
 
 @cache
-def hints_of(declared: type) -> dict[str, Any]:
-    """Return the declared types of the fields of a dataclass by name."""
-    return get_type_hints(declared)
+def type_of_field(owner: type, name: str) -> Any:
+    """Return the declared type of a field of a dataclass."""
+    declaring = next(parent for parent in owner.__mro__ if name in inspect.get_annotations(parent))
+    declared = inspect.get_annotations(declaring)[name]
+    words = re.findall(r"\w+", declared) if isinstance(declared, str) else ()
+    deferred = {word: EntryPoint(word, _DEFERRED[word], "").load() for word in words if word in _DEFERRED}
+    alone = SimpleNamespace(__annotations__={name: declared})  # types of other fields remain unresolved
+    return get_type_hints(alone, vars(sys.modules[declaring.__module__]), deferred)[name]
 
 
 def is_required(entry: Field[Any]) -> bool:

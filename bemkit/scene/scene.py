@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -18,23 +18,25 @@ from bemkit.contact.laws import FrictionLaw, Frictionless
 from bemkit.errors import InputError, Mistakes
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.shapes import Shape
-from bemkit.geometry.symmetry import Symmetry
 from bemkit.notebook import ShownInNotebooks
 from bemkit.operators.linear.solvers import Automatic, LinearSolverChoice
 from bemkit.operators.material import Material
 from bemkit.scene.body import Body, check_accuracy, check_place, lines_across
-from bemkit.scene.body_forces import BodyForce
 from bemkit.scene.body_scene import BodyScene
 from bemkit.scene.conditions import Contact, Force, Free, Part
-from bemkit.scene.contacts import ContactPair, Touching, check_contacts
 from bemkit.scene.discretisation import Discretisation, Galerkin
 from bemkit.scene.mesh_options import MeshOptions
-from bemkit.scene.objects import check_objects, outline_of
-from bemkit.scene.plane_motion import FarField, RigidBody
-from bemkit.scene.steps import Step, check_laws, check_names, check_steps
+from bemkit.scene.objects import check_laws, check_names, check_objects, check_steps, outline_of
 from bemkit.scene.unit_names import UnitNames
 from bemkit.solvers.base import ContactSolver
 from bemkit.solvers.fallbacks import Fallbacks
+
+if TYPE_CHECKING:
+    from bemkit.geometry.symmetry import Symmetry
+    from bemkit.scene.body_forces import BodyForce
+    from bemkit.scene.contacts import ContactPair, Touching
+    from bemkit.scene.plane_motion import FarField, RigidBody
+    from bemkit.scene.steps import Step
 
 _OF_COPY = ("name", "placement", "copies")
 """Fields of a body that differ between its copies."""
@@ -42,10 +44,6 @@ OF_ONE_BODY = ("shape", "material", "parts", "body_forces", "far")
 """Fields of the short form."""
 OF_SEVERAL = ("bodies", "rigid", "contacts", "touching")
 """Fields that the short form lacks."""
-
-
-class NoContactError(InputError):
-    """A method that needs contact, for a scene without contact."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -172,7 +170,10 @@ class Scene(ShownInNotebooks):
         check_laws(({"law": self.law} if self.bodies else {}) | laws, self.steps)
         if not self.has_contact:
             self._check_without_contact()
-        check_contacts(self.contacts, self.rigid, self._by_name, self._side_names)
+        if self.contacts or self.rigid:
+            from bemkit.scene.contacts import check_contacts
+
+            check_contacts(self.contacts, self.rigid, self._by_name, self._side_names)
 
     def _check_symmetry(self) -> None:
         if self.symmetry is not None and self.bodies:
@@ -210,11 +211,10 @@ class Scene(ShownInNotebooks):
 
     def _side_names(self, body: Body) -> tuple[tuple[str, str], ...]:
         """Return the name and the group of each side of a body; copies share them, since making an outline is slow."""
-        if id(body.shape) not in self._sides:
-            self._sides[id(body.shape)] = tuple(
-                (side.name, side.group or side.name) for side in outline_of(body.shape).sides
-            )
-        return self._sides[id(body.shape)]
+        key = id(body.shape)
+        if key not in self._sides:
+            self._sides[key] = tuple((side.name, side.group or side.name) for side in outline_of(body.shape).sides)
+        return self._sides[key]
 
     @cached_property
     def _sides(self) -> dict[int, tuple[tuple[str, str], ...]]:
@@ -225,6 +225,11 @@ class Scene(ShownInNotebooks):
     def n_steps(self) -> int:
         """Number of load steps, increments counted."""
         return sum(step.increments for step in self.steps) if self.steps else len(self.load_factors)
+
+    @property
+    def is_one_load(self) -> bool:
+        """Whether there is a single load step without changes: all loads at once, or one state of a history."""
+        return self.load_factors == (1.0,) and len(self.steps) <= 1 and all(step.is_plain for step in self.steps)
 
     @cached_property
     def placed_bodies(self) -> tuple[Body, ...]:
@@ -252,8 +257,7 @@ class Scene(ShownInNotebooks):
     def has_contact(self) -> bool:
         """Whether anything may touch: obstacles, rigid bodies or other bodies."""
         parts = (*self.parts, *(part for body in self.bodies for part in body.parts))
-        at_obstacles = any(isinstance(part.condition, Contact) for part in parts)
-        return at_obstacles or bool(self.contacts) or self.touching is not None
+        return any(isinstance(part.condition, Contact) for part in parts) or bool(self.contacts or self.touching)
 
     @property
     def has_obstacles_only(self) -> bool:
@@ -293,20 +297,17 @@ class Scene(ShownInNotebooks):
         return {body.name: body for body in self.placed_bodies}
 
     @cached_property
-    def _listed_parts(self) -> Mapping[str, tuple[str, ...]]:
+    def listed_parts(self) -> Mapping[str, tuple[str, ...]]:
+        """The parts and sides of placed bodies that contacts name, by the body."""
         named: dict[str, list[str]] = {}
         for pair in self.contacts:
             for body, part in pair.elastic_parts:
                 named.setdefault(body, []).append(part)
         return {body: tuple(dict.fromkeys(parts)) for body, parts in named.items()}
 
-    def listed_parts(self, body: str) -> tuple[str, ...]:
-        """Return the parts and sides of a placed body that contacts name."""
-        return self._listed_parts.get(body, ())
-
     def touching_parts(self, body: Body) -> tuple[str, ...]:
         """Return the names of the parts and sides of a placed body that may touch other bodies."""
-        listed = self.listed_parts(body.name)
+        listed = self.listed_parts.get(body.name, ())
         if self.touching is None:
             return listed
         parts = (*body.parts, *(body.contact_part(name) for name in listed))
@@ -328,9 +329,9 @@ class Scene(ShownInNotebooks):
         Copies without moments share it, and so do bodies that consist of the same objects.
         """
         has_moment = any(isinstance(part.condition, Force) and part.condition.moment for part in body.parts)
-        own = [getattr(body, each.name) for each in fields(body) if each.name not in _OF_COPY]
+        own = [_identity(each.name, getattr(body, each.name)) for each in fields(body) if each.name not in _OF_COPY]
         placement = body.placement if has_moment else None
-        key = (*map(_identity, own), self.touching_parts(body), self._lines_across(body), placement)
+        key = (*own, self.touching_parts(body), self._lines_across(body), placement)
         if key not in self._scenes:
             self._scenes[key] = self._new_scene(body)
         return self._scenes[key]
@@ -379,11 +380,11 @@ class Scene(ShownInNotebooks):
         return replace(self, contacts=contacts, touching=None)
 
 
-def _identity(value: object) -> object:
-    """Return a key that equal values share: numbers are compared, other objects must be identical."""
+def _identity(name: str, value: object) -> object:
+    """Return a key that equal fields of bodies share: numbers are compared, other objects must be identical."""
     if isinstance(value, tuple):
         return tuple(id(entry) for entry in value)
-    return value if isinstance(value, Material | FarField) else id(value)
+    return value if name in ("material", "far") else id(value)
 
 
 def check_scene(scene: object) -> None:

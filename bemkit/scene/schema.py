@@ -23,10 +23,10 @@ from bemkit.scene.registry import (
     Registry,
     default_of,
     heading_of,
-    hints_of,
     is_required,
     options_of,
     registry_of,
+    type_of_field,
 )
 from bemkit.scene.scene import OF_ONE_BODY, OF_SEVERAL, Scene
 from bemkit.scene.written_tables import unstructure
@@ -128,9 +128,10 @@ class _Definitions:
     def table(self, owner: type, *, leave_out: str = "") -> Schema:
         """Return the schema of a table with the fields of a dataclass."""
         entries = [entry for entry in fields(owner) if entry.init and entry.name != leave_out]
-        hints, texts = hints_of(owner), parameters(inspect.getdoc(owner) or "")
+        texts = parameters(inspect.getdoc(owner) or "")
+        types = {entry.name: type_of_field(owner, entry.name) for entry in entries}
         described = {
-            entry.name: _described(self.of_type(hints[entry.name]), entry, hints[entry.name], texts.get(entry.name, ""))
+            entry.name: _described(self.of_type(types[entry.name]), entry, types[entry.name], texts.get(entry.name, ""))
             for entry in entries
         }
         return {

@@ -20,7 +20,7 @@ import numpy as np
 from bemkit.arrays import FloatArray
 from bemkit.errors import InputError
 from bemkit.formulas import Expression, closest, nearest, shorten
-from bemkit.scene.registry import SYNONYMS, Registry, heading_of, hints_of, is_required, options_of, registry_of
+from bemkit.scene.registry import SYNONYMS, Registry, heading_of, is_required, options_of, registry_of, type_of_field
 from bemkit.scene.unit_names import UnitNames, in_units_of_scene
 
 T = TypeVar("T")
@@ -272,7 +272,9 @@ def _table(value: object, declared: Any, at: _Place) -> Any:
         for name in missing
         if name not in misspelt
     ]
-    entries = {name: (table[name], hints_of(declared)[name], at.key(name, declared)) for name in known if name in table}
+    entries = {
+        name: (table[name], type_of_field(declared, name), at.key(name, declared)) for name in known if name in table
+    }
     return _made(at, declared, **_structured_all(entries, mistakes))
 
 

@@ -1,16 +1,13 @@
-"""Steps of a load history, and checks of names and laws that scenes and their bodies share."""
+"""Steps of a load history."""
 
 from __future__ import annotations
 
 import math
-from collections import Counter
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from itertools import pairwise
 from types import MappingProxyType
 from typing import Any, TypeAlias
 
-from bemkit.contact.laws import FrictionLaw
 from bemkit.errors import InputError
 
 TimeValue: TypeAlias = float | str | Callable[[float], float]
@@ -61,36 +58,3 @@ class Step:
     def is_plain(self) -> bool:
         """Whether it has a time and nothing else, as the steps of results do."""
         return not self.changes and self.load_factor is None and self.increments == 1
-
-
-def check_steps(load_factors: Sequence[float], steps: Sequence[Step]) -> None:
-    """Raise InputError unless load factors are finite, times increase, and only one of both describes the history."""
-    if not (load_factors and all(map(math.isfinite, load_factors))):
-        raise InputError(f"load_factors is {load_factors}: give finite numbers such as (0.5, 1.0)")
-    if steps and load_factors != (1.0,):
-        raise InputError(f"load_factors is {load_factors} besides {len(steps)} steps: give each step its load_factor")
-    for number, (before, step) in enumerate(pairwise(steps), start=1):
-        if step.time <= before.time:
-            raise InputError(f"steps[{number}]: time is {step.time:g} after {before.time:g}: give times that increase")
-
-
-def check_names(owner: str, names: Iterable[str], kind: str) -> None:
-    """Raise InputError if two parts or bodies have one name."""
-    for name, count in Counter(names).items():
-        if count > 1:
-            raise InputError(f"{owner}: {name!r} is the name of two {kind}: give each its own name")
-
-
-def check_laws(laws: Mapping[str, FrictionLaw], steps: Sequence[Step]) -> None:
-    """Check that laws that depend on slip or time have a load history.
-
-    Raises
-    ------
-    InputError
-        Naming the place and the law.
-    """
-    for place, law in laws.items():
-        if law.needs_history and not steps:
-            raise InputError(
-                f"{place} is {type(law).__name__}, which depends on slip or time: give [[steps]] with their times"
-            )

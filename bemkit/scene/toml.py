@@ -15,7 +15,6 @@ from typing import Any, Literal, cast
 from bemkit.errors import InputError, printable
 from bemkit.formulas import closest
 from bemkit.scene.discretisation import Discretisation, Galerkin
-from bemkit.scene.load_history import load_steps
 from bemkit.scene.mesh_options import MeshOptions
 from bemkit.scene.registry import FILE_KINDS, RISING, SOLVERS
 from bemkit.scene.scene import Scene
@@ -155,6 +154,8 @@ def scene_from_table(table: dict[str, Any], folder: Path | None = None) -> Scene
     try:
         scene = structure(table, Scene, _units_of(table))
         if scene.steps:
+            from bemkit.scene.load_history import load_steps
+
             _ = load_steps(scene)  # every change of a step is checked
     except StructureError as error:
         raise SceneError("\n".join(map(printable, error.mistakes))) from error

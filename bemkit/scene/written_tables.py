@@ -12,7 +12,7 @@ import numpy as np
 from bemkit.contact.laws import FrictionLaw
 from bemkit.errors import InputError
 from bemkit.formulas import Expression, shorten
-from bemkit.scene.registry import LAWS, default_of, hints_of, is_required, registry_of
+from bemkit.scene.registry import LAWS, default_of, is_required, registry_of, type_of_field
 
 
 class UnstructureError(InputError):
@@ -75,10 +75,9 @@ def _without_file(value: Any) -> Any:
 
 
 def _unstructure_dataclass(value: Any, declared: Any, path: str, keep_defaults: bool) -> Any:
-    hints = hints_of(cast(type, type(value)))
     prefix = f"{path}." if path else ""
     table = {
-        entry.name: unstructure(content, hints[entry.name], prefix + entry.name)
+        entry.name: unstructure(content, type_of_field(cast(type, type(value)), entry.name), prefix + entry.name)
         for entry, content in _written_fields(value, keep_defaults)
     }
     registry = LAWS if isinstance(value, FrictionLaw) else registry_of(declared)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 import tomllib
 from dataclasses import MISSING, fields
-from typing import get_type_hints
 
 import pytest
 import tomli_w
@@ -96,7 +95,6 @@ def check_keys(owner: type, rows: list[Row]) -> None:
     """Compare rows of key, value, default and meaning with the fields of a class."""
     entries = {entry.name: entry for entry in fields(owner) if entry.init}
     assert sorted(plain(row[0]) for row in rows) == sorted(entries), owner
-    hints = get_type_hints(owner)
     for key, value, default, _ in rows:
         entry = entries[plain(key)]
         assert value, key
@@ -107,7 +105,7 @@ def check_keys(owner: type, rows: list[Row]) -> None:
         else:
             documented = tomllib.loads(f"value = {plain(default)}")["value"]
             actual = entry.default if entry.default_factory is MISSING else entry.default_factory()
-            assert structure(documented, hints[entry.name]) == actual, key
+            assert structure(documented, kinds.type_of_field(owner, entry.name)) == actual, key
 
 
 @pytest.mark.parametrize("heading", FAMILIES)

@@ -25,8 +25,8 @@ from bemkit.results.solution import Solution
 from bemkit.results.tables import to_csv, to_json
 from bemkit.runs.distinct_solutions import distinct_solutions
 from bemkit.runs.nested import CascadeError, run_nested
+from bemkit.runs.steps import NoContactError
 from bemkit.scene.discretisation import Discretisation
-from bemkit.scene.scene import NoContactError
 from bemkit.scene.toml import SceneError, scene_from_toml, scene_to_toml
 from bemkit.solvers.base import StepRecord
 from bemkit.studies.stability.axes import find_axes

@@ -14,9 +14,8 @@ from bemkit.cli.main import main
 from bemkit.runs.critical_friction import NoSlidingStateError
 from bemkit.runs.distinct_solutions import distinct_solutions
 from bemkit.runs.run import LoadHistoryError
-from bemkit.runs.steps import UnsolvableSceneError
+from bemkit.runs.steps import NoContactError, UnsolvableSceneError
 from bemkit.scene.load_history import with_scaled_loads
-from bemkit.scene.scene import NoContactError
 
 LEG = bk.load_scene("wedged-leg")
 

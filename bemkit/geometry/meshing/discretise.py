@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
@@ -19,7 +19,9 @@ from bemkit.errors import GeometryError
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.meshing.division import Division, divide
 from bemkit.geometry.outline import Outline, Selection
-from bemkit.geometry.symmetry import Symmetry
+
+if TYPE_CHECKING:
+    from bemkit.geometry.symmetry import Symmetry
 
 ALIKE = 1.2
 """Largest ratio of two neighbouring element lengths without a gradual transition."""

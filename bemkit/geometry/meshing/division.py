@@ -1,8 +1,11 @@
 """An outline cut into pieces, each in one boundary part or in none, ready to be divided into elements."""
 
+from __future__ import annotations
+
 import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,8 +15,10 @@ from bemkit.geometry.loops import following_in_loops
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.outline import N_SAMPLES, Outline, Selection, Side, breakpoints, merge_breakpoints
 from bemkit.geometry.quadrature import gauss_legendre
-from bemkit.geometry.symmetry import Symmetry
 from bemkit.geometry.vectors import norms
+
+if TYPE_CHECKING:
+    from bemkit.geometry.symmetry import Symmetry
 
 _INNER = np.array([0.25, 0.5, 0.75])
 _N_PANELS, _N_POINTS = 64, 6
@@ -60,7 +65,7 @@ class Division:
     part_names: tuple[str, ...]
     symmetry: Symmetry | None = None
 
-    def cut(self, cuts: Mapping[int, Sequence[float]]) -> "Division":
+    def cut(self, cuts: Mapping[int, Sequence[float]]) -> Division:
         """Return the division with further cuts.
 
         Parameters
@@ -76,7 +81,7 @@ class Division:
             pieces += [replace(piece, span=span) for span in itertools.pairwise(ends)]
         return replace(self, pieces=tuple(pieces))
 
-    def half(self, symmetry: Symmetry) -> "Division":
+    def half(self, symmetry: Symmetry) -> Division:
         """Return the pieces on the side x <= a, y <= b of symmetry lines.
 
         Raises

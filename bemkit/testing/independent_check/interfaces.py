@@ -13,7 +13,8 @@ from bemkit.contact.laws import FrictionLaw
 from bemkit.results.contact_table import ContactTable
 from bemkit.results.solution import Solution
 from bemkit.results.solved_body import SideName
-from bemkit.scene.contacts import ContactPair, name_at_obstacle
+from bemkit.scene.conditions import name_at_obstacle
+from bemkit.scene.contacts import ContactPair
 from bemkit.testing.independent_check.bodies import BodyMeasurements
 from bemkit.testing.independent_check.boundary import trusted_stress
 from bemkit.testing.independent_check.check import ContactMeasurements, measure

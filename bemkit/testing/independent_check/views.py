@@ -14,8 +14,7 @@ from bemkit.results.contact_table import ContactTable
 from bemkit.results.solution import Solution
 from bemkit.results.solved_body import BoundaryFields, SolvedBody
 from bemkit.scene.body_scene import BodyScene
-from bemkit.scene.conditions import Contact, Free
-from bemkit.scene.contacts import name_at_obstacle
+from bemkit.scene.conditions import Contact, Free, name_at_obstacle
 
 _NO_TABLE = ContactTable((), *(np.zeros(0),) * 9, status=np.zeros(0, np.intp), weight=np.zeros(0))
 

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from bemkit.arrays import ComplexArray, IntArray
-from bemkit.geometry import BoundaryMesh, PlateWithHole, Rectangle, Symmetry, discretise
+from bemkit.geometry import BoundaryMesh, PlateWithHole, Rectangle, discretise
+from bemkit.geometry.symmetry import Symmetry
 from bemkit.operators.collocation import compiled
 from bemkit.operators.collocation.curved_elements import CurvedElements
 from bemkit.operators.collocation.equations import NOWHERE, point_forces

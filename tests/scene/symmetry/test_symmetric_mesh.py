@@ -9,6 +9,7 @@ import pytest
 
 import bemkit as bk
 from bemkit.errors import GeometryError
+from bemkit.geometry.files.meshio_files import read_mesh, write_mesh
 from bemkit.geometry.neighbours import along_boundary, break_nodes, corner_nodes
 from bemkit.geometry.outline import Selection
 from bemkit.geometry.spaces import BoundarySpace, ConstantSpace, LinearSpace, QuadraticSpace
@@ -148,5 +149,5 @@ def test_what_is_no_half_of_a_body_is_refused(changes: dict[str, object], messag
 def test_mesh_files_hold_the_whole_body(tmp_path: object) -> None:
     pytest.importorskip("meshio")
     path = f"{tmp_path}/half.msh"
-    bk.geometry.write_mesh(path, half_square())
-    assert bk.geometry.read_mesh(path).area == pytest.approx(1.0, rel=1e-14)
+    write_mesh(path, half_square())
+    assert read_mesh(path).area == pytest.approx(1.0, rel=1e-14)
