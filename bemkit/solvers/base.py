@@ -285,6 +285,8 @@ class _Run:
                     following = self.solver.step(self.problem, iterate)
                 except SingularResponse as error:
                     following = replace(iterate, ended=Status.SINGULAR, message=str(error))
+                if not following.state.is_finite:  # the state before is the last one of use
+                    following = replace(iterate, linear_solves=following.linear_solves, ended=Status.NOT_FINITE)
                 following = self._without_contact(following, contact_free)
                 new_sets = contact_sets(self.problem, following.state)
                 change = _relative_change(following.state, iterate.state)
@@ -366,7 +368,6 @@ class _Run:
     ) -> ContactSolution:
         last = history[-1]
         worst = f"worst certificate entry {certificate.worst:.1e} after {last.step} steps"
-        remark = f" ({iterate.message})" if iterate.message else ""
         return ContactSolution(
             state=iterate.state,
             status=status,
@@ -374,18 +375,17 @@ class _Run:
             node_status=sets.node_status,
             steps=last.step,
             linear_solves=iterate.linear_solves,
-            message=f"{status.value} [{worst}]{remark}",
+            message=f"{status.value} [{worst}]" + (f" ({iterate.message})" if iterate.message else ""),
             history=tuple(history),
         )
 
     def _without_state(self, status: Status, message: str) -> ContactSolution:
-        n_contact = self.problem.n_contact
-        unknown = np.full((n_contact, 2), np.nan)
+        unknown = np.full((self.problem.n_contact, 2), np.nan)
         return ContactSolution(
             state=ContactState(unknown, unknown),
             status=status,
             certificate=Certificate(*[float("nan")] * len(fields(Certificate))),
-            node_status=np.full(n_contact, NodeStatus.SEPARATED, dtype=np.intp),
+            node_status=np.full(len(unknown), NodeStatus.SEPARATED, dtype=np.intp),
             steps=0,
             linear_solves=0,
             message=f"{status.value} {message}",

@@ -95,6 +95,8 @@ class Fallbacks:
             raise TypeError(f"iterate is a {type(iterate).__name__}; give a result of init or step of this solver")
         driver, n_steps = self.drivers[iterate.index], iterate.n_steps + 1
         inner = driver.step(problem, iterate.inner)
+        if not inner.state.is_finite:
+            inner = replace(inner, state=iterate.state, ended=Status.NOT_FINITE, message="numbers overflowed")
         if inner.ended is None and n_steps >= driver.max_steps:
             inner = replace(
                 inner,
@@ -110,7 +112,7 @@ class Fallbacks:
             inner=inner,
             n_steps=n_steps,
         )
-        if inner.ended is None or not inner.state.is_finite or _is_satisfied(problem, inner.state):
+        if inner.ended is None or _is_satisfied(problem, inner.state):
             return following
         return self._begun(problem, replace(following, reasons=(*iterate.reasons, self._reason(iterate.index, inner))))
 

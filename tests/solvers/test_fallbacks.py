@@ -33,6 +33,15 @@ class Idle:
         return replace(iterate, linear_solves=iterate.linear_solves + 3)
 
 
+@dataclass(frozen=True)
+class Overflowing(Idle):
+    """Its displacements are undefined after the first step."""
+
+    def step(self, problem, iterate):
+        undefined = replace(iterate.state, displacement=np.full((problem.n_contact, 2), np.nan))
+        return replace(super().step(problem, iterate), state=undefined)
+
+
 def messages(solution):
     return [record.message for record in solution.history]
 
@@ -60,6 +69,26 @@ def test_linear_solves_of_all_drivers_are_counted():
     after = solve(problem, Fallbacks((Idle(2), Idle(1), SemismoothNewton())))
     assert [record.linear_solves for record in after.history[:4]] == [2, 5, 9, 12]
     assert after.linear_solves == alone.linear_solves + 1 + 2 * 3 + 1 + 3
+
+
+def test_a_driver_that_overflows_hands_on_its_last_state():
+    problem = block_problem(Coulomb(0.5))
+    alone = solve(problem, SemismoothNewton())
+    found = solve(problem, Fallbacks((Overflowing(), SemismoothNewton())))
+    assert messages(found)[1] == "numbers overflowed; SemismoothNewton is next"
+    assert found.linear_solves == alone.linear_solves + 1 + 3
+    np.testing.assert_array_equal(found.state.traction, alone.state.traction)
+
+
+def test_what_overflows_ends_with_the_last_state():
+    problem = block_problem(Coulomb(0.5))
+    for driver in (Overflowing(), Fallbacks((Overflowing(),))):
+        found = solve(problem, driver, throw=False)
+        assert found.status is Status.NOT_FINITE
+        assert found.state.is_finite
+        assert np.isfinite(found.certificate.worst)
+        assert found.steps == 1
+        assert found.linear_solves == 2 + 3  # that of the cold start, too
 
 
 def test_drivers_that_cannot_help_are_skipped():
