@@ -17,6 +17,13 @@ class SingularResponse(BemkitError, ArithmeticError):  # noqa: N818 - a response
     """The conditions at the contact nodes do not hold the body, or contradict each other."""
 
 
+class ClosedVolume(SingularResponse):
+    """Supports and the conditions at the contact nodes hold the whole boundary of an incompressible body."""
+
+    def __init__(self) -> None:
+        super().__init__("displacements at the contact nodes cannot keep the volume of a body of poisson_ratio 0.5")
+
+
 @dataclass(frozen=True, eq=False)
 class ContactState:
     """Displacements and tractions at the contact nodes, in (n, t) components.
@@ -224,6 +231,10 @@ class LinearBody(Protocol):
     def partners_of(self, coefficients: FloatArray) -> str:
         """Name the bodies or obstacles that these bodies may touch, for messages."""
         return "the obstacle"
+
+    def lacks_room(self, gap: FloatArray) -> bool:
+        """Whether displacements within gaps (n_contact,) [m] cannot keep the volume of a body; by default never."""
+        return False
 
     def shares(self, forces: FloatArray) -> FloatArray:
         """Return the share of the largest force that scales each node in the certificate; by default 1.

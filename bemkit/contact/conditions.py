@@ -196,6 +196,21 @@ class LinearConditions:
             self.value + spring * displacement,
         )
 
+    def softened(self, stiffness: float) -> LinearConditions:
+        """Return the conditions with springs between nodes and the displacements that conditions prescribe.
+
+        Parameters
+        ----------
+        stiffness : float [Pa/m]
+        """
+        yields = ~np.any(self.on_traction != 0.0, axis=2)
+        springs = np.abs(self.on_displacement).max(axis=2) / stiffness
+        return LinearConditions(
+            self.on_displacement,
+            self.on_traction + np.where(yields, springs, 0.0)[:, :, None] * np.eye(2),
+            self.value,
+        )
+
 
 def separated(n_contact: int) -> LinearConditions:
     """Return the conditions of open nodes: ``t = 0``."""

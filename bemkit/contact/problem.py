@@ -9,13 +9,14 @@ from typing import Any, TypeVar
 import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray, read_only
-from bemkit.contact.body import ContactState, LinearBody, SingularResponse
+from bemkit.contact.body import ClosedVolume, ContactState, LinearBody, SingularResponse
 from bemkit.contact.condensation.dense_body import DenseBody
 from bemkit.contact.conditions import LinearConditions, separated, stick
 from bemkit.contact.laws import FrictionLaw, LawError
 from bemkit.errors import InputError
 
 __all__ = [
+    "ClosedVolume",
     "ContactProblem",
     "ContactState",
     "DenseBody",
@@ -88,7 +89,8 @@ class ContactProblem:
         """Response with all nodes sticking and none overlapping: the cold start, and the scale of the load.
 
         Nodes are held at ``u_n = min(g, 0)`` and ``u_t = reference_slip``. Nodes whose tangent follows have
-        ``sigma_t = 0``, as do frictionless nodes unless the body could then move.
+        ``sigma_t = 0``, as do frictionless nodes unless the body could then move. Springs hold an incompressible body
+        that is in contact all around, because it cannot follow any displacement of its boundary.
         """
         return self.for_all_laws("sticking_state", self._sticking)
 
@@ -100,7 +102,7 @@ class ContactProblem:
             rows = np.stack([np.zeros_like(is_smooth), is_smooth], axis=1)
             with suppress(SingularResponse):
                 return self.respond(sticking.replaced(rows, separated(self.n_contact)))
-        return self.respond(sticking)
+        return self.respond_with_room(sticking)
 
     @cached_property
     def modulus(self) -> float:
@@ -129,6 +131,17 @@ class ContactProblem:
             If the conditions do not determine the response.
         """
         return self.body.respond(self.possible(conditions))
+
+    def respond_with_room(self, conditions: LinearConditions) -> ContactState:
+        """Return the response, on springs if the conditions leave an incompressible body no room.
+
+        The springs hold all displacements that conditions prescribe. If all nodes press on them, no displacements
+        within these keep the volume.
+        """
+        try:
+            return self.respond(conditions)
+        except ClosedVolume:
+            return self.respond(conditions.softened(self.body.stiffness_scale))
 
     def possible(self, conditions: LinearConditions) -> LinearConditions:
         """Return the conditions with ``sigma_t = 0`` in place of those on tangential displacements that follow."""
@@ -227,7 +240,7 @@ def _check_members(body: LinearBody, law: FrictionLaw) -> None:
 
 _BODY_MEMBERS = (
     *("weights", "n_contact", "stiffness_scale", "accuracy", "responses_are_expensive", "tangent_follows"),
-    *("respond", "rigid_motions", "rigid_load", "moving_bodies", "partners_of", "shares", "imbalance"),
+    *("respond", "rigid_motions", "rigid_load", "moving_bodies", "partners_of", "lacks_room", "shares", "imbalance"),
 )
 _LAW_MEMBERS = ("bound", "bound_derivative", "is_frictionless", "acts_across_gap", "scaled")
 

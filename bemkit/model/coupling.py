@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from scipy import sparse
 
@@ -12,15 +14,15 @@ from bemkit.model.rigid import rigid_motions
 from bemkit.model.units import motion_units
 
 
-def _nodal(body: PreparedBody) -> sparse.csr_array:
-    """Return how retained displacements move nodes in the axes of the scene, sparse (2 n_nodes, n_retained)."""
+def _nodal(body: PreparedBody, n_pressures: int) -> sparse.csr_array:
+    """Return how retained unknowns move nodes in the axes of the scene, sparse (2 n_nodes, n_retained)."""
     conditions = body.conditions
     directions = body.turn.turned(conditions.frame)  # (n_nodes, 2, 2): rows are vectors
     node, k = np.nonzero(conditions.is_retained)
     vectors = directions[node, k]
     rows = 2 * node[:, None] + np.arange(2)
     columns = np.broadcast_to(np.arange(node.size)[:, None], rows.shape)
-    shape = (2 * len(directions), node.size)
+    shape = (2 * len(directions), node.size + n_pressures)
     return sparse.csr_array((vectors.ravel(), (rows.ravel(), columns.ravel())), shape)
 
 
@@ -73,9 +75,16 @@ def _rigid_coupling(prepared: Prepared) -> sparse.csr_array:
     return sparse.csr_array(_frames(prepared) @ sparse.csr_array(by_motions.reshape(2 * begin, 3 * n_rigid)))
 
 
-def gap_operator(prepared: Prepared) -> sparse.csr_array:
-    """Return how the retained displacements of all bodies move the contact nodes, (2 n_contact, n_retained)."""
-    nodal = [_nodal(body) for body in prepared.bodies]
+def gap_operator(prepared: Prepared, n_pressures: Sequence[int]) -> sparse.csr_array:
+    """Return how the retained unknowns of all bodies move the contact nodes, (2 n_contact, n_retained).
+
+    Parameters
+    ----------
+    prepared : Prepared
+    n_pressures : sequence of int
+        Number of retained pressures of each body, its last unknowns, which move nothing.
+    """
+    nodal = [_nodal(body, n) for body, n in zip(prepared.bodies, n_pressures, strict=True)]
     result = sparse.csr_array(coupling(prepared) @ diagonal_blocks(nodal))
     if prepared.scene.rigid:
         chosen = [rigid_motions(body, prepared.units)[0] for body in prepared.scene.rigid]

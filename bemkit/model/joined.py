@@ -15,6 +15,7 @@ from bemkit.model.placed import groups, shape_numbers
 from bemkit.model.prepared import Prepared, PreparedBody
 from bemkit.model.rigid import rigid_members
 from bemkit.operators.counts import OperationCounts
+from bemkit.operators.material import Material
 from bemkit.operators.steklov_poincare import CondensedMap, SteklovPoincare
 from bemkit.operators.steklov_poincare.forces_inside import condensed_under
 
@@ -22,7 +23,8 @@ from bemkit.operators.steklov_poincare.forces_inside import condensed_under
 def joined_bodies(prepared: Prepared, condensed: Sequence[CondensedMap]) -> JoinedBodies:
     """Return bodies that are condensed, one of each shape with its stiffness, joined at their contacts."""
     numbers, firsts = shape_numbers(prepared.bodies), [int(group[0]) for group in groups(prepared.bodies)]
-    motions = [_motions(prepared.bodies[first]) for first in firsts]
+    motions = [_motions(prepared.bodies[first], condensed[first].n_pressures) for first in firsts]
+    n_pressures = [map_.n_pressures for map_ in condensed]
     members = tuple(
         Member(
             stiffness=condensed[firsts[number]].stiffness,
@@ -30,15 +32,18 @@ def joined_bodies(prepared: Prepared, condensed: Sequence[CondensedMap]) -> Join
             motions=motions[number],
             modulus=body.material.plane_modulus / prepared.units.modulus,
             name=body.name,
+            n_pressures=map_.n_pressures,
+            bulk_modulus=_bulk_modulus(body.material) / prepared.units.modulus,
         )
         for map_, body, number in zip(condensed, prepared.bodies, numbers, strict=True)
     )
     return JoinedBodies(
         members=(*members, *rigid_members(prepared)),
-        gap_operator=gap_operator(prepared),
+        gap_operator=gap_operator(prepared, n_pressures),
         prescribed=prescribed(prepared),
         weights=prepared.column("weights") / prepared.units.length,
         tangent_follows=prepared.tangent_follows,
+        is_dense=any(n_pressures) or None,
     )
 
 
@@ -100,8 +105,12 @@ def _is_loaded_alike(one: PreparedBody, two: PreparedBody) -> bool:
     return one.far_motion == two.far_motion and all(a is b for a, b in zip(data, other, strict=True))
 
 
-def _motions(body: PreparedBody) -> FloatArray:
-    """Return the rigid motions (n_motions, n_retained) that no support resists."""
+def _bulk_modulus(material: Material) -> float:
+    return 0.0 if material.is_incompressible else 1.0 / material.plane_compressibility
+
+
+def _motions(body: PreparedBody, n_pressures: int) -> FloatArray:
+    """Return the rigid motions (n_motions, n_retained) that no support resists; they cause no pressure."""
     conditions = body.conditions
     along = np.einsum("nkc,mnc->mnk", conditions.frame, body.free_modes)
-    return np.asarray(along[:, conditions.is_retained])
+    return np.pad(along[:, conditions.is_retained], ((0, 0), (0, n_pressures)))

@@ -163,7 +163,7 @@ def _negative_energy_of(
     if sensitivity is None:  # a node resists by about E' per displacement, for any elements around it
         sensitivity = np.full(displacement.shape, elastic.material.plane_modulus)
     # a symmetric map is negative in no direction but for round-off, which the work of the solution shows
-    if Tag.SYMMETRIC not in elastic.tags and is_indefinite(condensed.stiffness, sensitivity):
+    if Tag.SYMMETRIC not in elastic.tags and is_indefinite(condensed.at_constant_volume, sensitivity):
         return "the stiffness that the contact boundary sees is negative in some direction"
     return _negative_work(elastic, displacement, force, body.own_space, sensitivity)
 

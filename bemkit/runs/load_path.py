@@ -34,7 +34,7 @@ _FAST, _SLOW = 10, 20
 """The next increment is twice as large after at most this number of steps of the solver, and half as large after more
 than the second number."""
 
-_NOT_RETRIED = (Status.UNSOLVABLE_LOAD, Status.TOO_FAR, Status.TOO_COSTLY)
+_NOT_RETRIED = (Status.UNSOLVABLE_LOAD, Status.CLOSED_VOLUME, Status.TOO_FAR, Status.TOO_COSTLY)
 """Failures that smaller increments cannot cure."""
 _RETRIED = (Status.MAX_STEPS, Status.STALLED, Status.CYCLING, Status.SINGULAR)
 """Failures that may come from the solver or from a collapse."""

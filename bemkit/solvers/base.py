@@ -10,7 +10,7 @@ import numpy as np
 
 from bemkit.arrays import IntArray
 from bemkit.contact.certificate import Certificate, certify
-from bemkit.contact.problem import ContactProblem, ContactState, SingularResponse
+from bemkit.contact.problem import ClosedVolume, ContactProblem, ContactState, SingularResponse
 from bemkit.contact.solvability import find_long_motion, find_unsolvable_load, needs_contact
 from bemkit.errors import InputError, NoResultError
 from bemkit.interrupts import interruptible, raise_missed_interrupt
@@ -30,6 +30,7 @@ class Status(Enum):
         "The iterates repeat themselves; add solvers such as SolutionPath to Fallbacks, or try another one: "
         "the problem may have no solution, or several."
     )
+    CLOSED_VOLUME = "Contact leaves an incompressible body no room; load less, or give a poisson_ratio of 0.499999."
     SINGULAR = "The body can move freely for every state of its contact nodes; hold it by its boundary conditions."
     UNSOLVABLE_LOAD = "No contact tractions can balance this load; change the load or hold the body."
     TOO_FAR = (
@@ -90,7 +91,6 @@ class ContactSolver(Protocol):
     @property
     def max_steps(self) -> int:
         """Default largest number of steps in `solve`."""
-        ...
 
     def init(self, problem: ContactProblem, start: ContactState) -> Iterate:
         """Return the first iterate.
@@ -101,7 +101,6 @@ class ContactSolver(Protocol):
         start : ContactState
             A response of the body.
         """
-        ...
 
     def step(self, problem: ContactProblem, iterate: Iterate) -> Iterate:
         """Return the next iterate.
@@ -117,7 +116,6 @@ class ContactSolver(Protocol):
         SingularResponse
             If the body has no response; `solve` converts it to a status.
         """
-        ...
 
 
 @dataclass(frozen=True)
@@ -269,14 +267,15 @@ class _Run:
         # no warnings of overflow: it ends in the status NOT_FINITE
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
             try:
+                if self.problem.body.lacks_room(self.problem.gap):
+                    raise ClosedVolume
                 contact_free = self._contact_free_response()
                 if contact_free is None and (unsolvable := find_unsolvable_load(self.problem)) is not None:
                     return self._without_state(Status.UNSOLVABLE_LOAD, unsolvable.description)
-                iterate = self._without_contact(
-                    self._first(start, n_before=int(contact_free is not None)), contact_free
-                )
+                first = self._first(start, n_before=int(contact_free is not None))
+                iterate = self._without_contact(first, contact_free)
             except SingularResponse as error:
-                return self._without_state(Status.SINGULAR, str(error))
+                return self._without_state(_status_of(error), str(error))
             sets = contact_sets(self.problem, iterate.state)
             history = [self._record(iterate, sets, 0, float("inf"), 0)]
             while (status := self._status(iterate, history)) is None:
@@ -284,7 +283,7 @@ class _Run:
                 try:
                     following = self.solver.step(self.problem, iterate)
                 except SingularResponse as error:
-                    following = replace(iterate, ended=Status.SINGULAR, message=str(error))
+                    following = replace(iterate, ended=_status_of(error), message=str(error))
                 if not following.state.is_finite:  # the state before is the last one of use
                     following = replace(iterate, linear_solves=following.linear_solves, ended=Status.NOT_FINITE)
                 following = self._without_contact(following, contact_free)
@@ -309,9 +308,8 @@ class _Run:
 
     def _contact_free_response(self) -> FloatingResponse | None:
         """Return the response without contact, if there is one; it does not depend on the law."""
-        problem = self.problem
-        return problem.for_all_laws(
-            "contact_free", lambda: None if needs_contact(problem) else contact_free_response(problem.body)
+        return self.problem.for_all_laws(
+            "contact_free", lambda: None if needs_contact(self.problem) else contact_free_response(self.problem.body)
         )
 
     def _first(self, start: ContactState | None, n_before: int) -> Iterate:
@@ -359,9 +357,7 @@ class _Run:
             return Status.NOT_FINITE
         if history[-1].certificate.is_below(self.tolerance):
             return Status.CONVERGED
-        if iterate.ended is not None:
-            return iterate.ended
-        return Status.MAX_STEPS if history[-1].step >= self.max_steps else None
+        return iterate.ended or (Status.MAX_STEPS if history[-1].step >= self.max_steps else None)
 
     def _solution(
         self, iterate: Iterate, status: Status, sets: ActiveSets, certificate: Certificate, history: list[StepRecord]
@@ -391,6 +387,10 @@ class _Run:
             message=f"{status.value} {message}",
             history=(),
         )
+
+
+def _status_of(error: SingularResponse) -> Status:
+    return Status.CLOSED_VOLUME if isinstance(error, ClosedVolume) else Status.SINGULAR
 
 
 def _relative_change(state: ContactState, previous: ContactState) -> float:

@@ -11,7 +11,7 @@ import numpy as np
 from bemkit.arrays import FloatArray, IntArray, spread_fractions
 from bemkit.contact.conditions import as_dense, stick
 from bemkit.contact.further_laws import law_name
-from bemkit.contact.problem import ContactProblem, ContactState, LawError
+from bemkit.contact.problem import ClosedVolume, ContactProblem, ContactState, LawError
 from bemkit.solvers.base import Iterate, Status, check_max_steps
 from bemkit.solvers.newton import spring_stiffness
 
@@ -71,7 +71,11 @@ class LemkePivoting:
         """Pivot from the origin to a solution; it takes two responses for each contact node."""
         if problem.body.responses_are_expensive:
             return replace(iterate, ended=Status.TOO_COSTLY)
-        stiffness, load, linear_solves = _probed(problem)
+        try:
+            stiffness, load, linear_solves = _probed(problem)
+        except ClosedVolume:
+            reason = "an incompressible body whose volume only contact nodes change has no stiffness, which Lemke takes"
+            return replace(iterate, ended=Status.STALLED, message=reason)
         springs, spring_load = _springs(problem, iterate.state)
         try:
             compliance = np.asarray(np.linalg.inv(stiffness + springs), dtype=float)

@@ -19,7 +19,7 @@ from bemkit.contact.conditions import (
     separated,
     stick,
 )
-from bemkit.contact.problem import ContactProblem, ContactState, LinearBody, SingularResponse
+from bemkit.contact.problem import ClosedVolume, ContactProblem, ContactState, LinearBody, SingularResponse
 from bemkit.errors import InputError
 from bemkit.solvers.active_sets import ActiveSets, ProjectionEquations, Residual, coheres
 
@@ -72,7 +72,8 @@ def respond(equations: ProjectionEquations, residual: Residual, sets: ActiveSets
     """Solve the equations linearised at a residual, for the given sets.
 
     A body that the sets do not hold moves to the nearest admissible position if its forces are in equilibrium;
-    otherwise weak springs hold it in this step.
+    otherwise weak springs hold it in this step. Springs also take the place of an obstacle that leaves an
+    incompressible body no room, once for each sets.
 
     Parameters
     ----------
@@ -87,19 +88,23 @@ def respond(equations: ProjectionEquations, residual: Residual, sets: ActiveSets
     ------
     SingularResponse
         If springs at all free nodes do not hold the body.
+    ClosedVolume
+        If the sets leave an incompressible body no room, and are those of the last step with springs.
     """
-    body = equations.problem.body
-    linear = equations.linearised(residual, sets)
+    problem, body = equations.problem, equations.problem.body
+    linear, held = equations.linearised(residual, sets), problem.respond if n_regularised else problem.respond_with_room
     try:
         return Response(body.respond(linear), 1, is_regularised=False)
+    except ClosedVolume:
+        return Response(held(linear), 2, is_regularised=True)
     except SingularResponse:
         floating = floating_response(body, linear)
         if floating is not None:
             return Response(floating.nearest(residual.state.displacement), 2, is_regularised=False)
         decrease = _SPRING_DECREASE ** min(n_regularised, WEAKEST_AFTER)
-        stiffness = spring_stiffness(equations.problem, residual.state) * decrease
+        stiffness = spring_stiffness(problem, residual.state) * decrease
         springs = linear.regularised(residual.state.displacement, stiffness)
-        return Response(equations.problem.respond(springs), 2, is_regularised=True)
+        return Response(held(springs), 2, is_regularised=True)
 
 
 def spring_stiffness(problem: ContactProblem, state: ContactState) -> float:

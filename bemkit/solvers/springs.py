@@ -97,7 +97,7 @@ class Springs:
             return self._released(iterate, self.then.step(problem, iterate.released))
         equations, stiffness = self._equations(problem), iterate.spring * problem.body.stiffness_scale
         linear = equations.linearised(iterate.residual, iterate.sets)
-        state = problem.respond(linear.regularised(iterate.anchor.displacement, stiffness))
+        state = problem.respond_with_room(linear.regularised(iterate.anchor.displacement, stiffness))
         residual = equations.evaluate(state)
         sets = equations.through_stick(residual, iterate.sets)
         following = replace(

@@ -53,6 +53,18 @@ HINDRANCES = {
         material=bk.Material(1.0, 0.5),
         discretisation=bk.ConstantCollocation(),
     ),
+    "contact and supports take all of the boundary of the incompressible body": bk.Scene(
+        title="half disc",
+        shape=bk.Sector(1.0, 180.0, 360.0),
+        material=bk.Material(1.0, 0.5),
+        parts=(
+            bk.Part("flat", bk.PrescribedDisplacement(0.0, -1e-2), ("start", "end")),
+            bk.Part("arc", bk.Contact(bk.RigidHalfPlane((0.0, -1.0))), ("arc",)),
+        ),
+        law=bk.Coulomb(0.3),
+        mesh=bk.MeshOptions(elements=240),
+        discretisation=bk.ConstantCollocation(),
+    ),
     "closed curves": squeezed(Perforated(8, 12), mesh=bk.MeshOptions(elements=2400), **SYMMETRIC),
 }
 

@@ -57,6 +57,21 @@ def unbalanced_problem():
     )
 
 
+class Unaware(DenseBody):
+    """A body that does not compare its volume with the gaps."""
+
+    def lacks_room(self, gap):
+        return False
+
+
+def enclosed_problem(kind):
+    """Two nodes that forces press to their obstacles, on a body of constant volume, whose pressure is unknown."""
+    stiffness = np.diag([2.0, 1.0, 2.0, 1.0, 0.0])
+    stiffness[4, [0, 2]] = stiffness[[0, 2], 4] = 1.0
+    body = kind(stiffness, np.array([1.0, 0.0, 1.0, 0.0, 0.0]), np.ones(2), n_pressures=1)
+    return ContactProblem(body, np.full(2, -1e-3), Coulomb(0.1))
+
+
 CASES = {
     "converged": (Status.CONVERGED, random_problem(0), SemismoothNewton(), {}),
     "max steps": (Status.MAX_STEPS, block_problem(Coulomb(0.5)), AugmentedLagrangian(), {"max_steps": 1}),
@@ -91,6 +106,8 @@ CASES = {
         SemismoothNewton(),
         {},
     ),
+    "closed volume": (Status.CLOSED_VOLUME, enclosed_problem(DenseBody), SemismoothNewton(), {}),
+    "closed volume, later": (Status.CLOSED_VOLUME, enclosed_problem(Unaware), SemismoothNewton(), {}),
     "unsolvable load": (Status.UNSOLVABLE_LOAD, block_problem(Coulomb(0.5), press=-1.0), SemismoothNewton(), {}),
     "too far": (
         Status.TOO_FAR,

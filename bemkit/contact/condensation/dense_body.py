@@ -6,16 +6,20 @@ from functools import cached_property
 
 import numpy as np
 
-from bemkit.arrays import BoolArray, FloatArray, IntArray, read_only, spread_fractions
-from bemkit.contact.body import ContactState, LinearBody, SingularResponse
+from bemkit.arrays import AnyArray, BoolArray, FloatArray, IntArray, read_only, spread_fractions
+from bemkit.contact.body import ClosedVolume, ContactState, LinearBody, SingularResponse
 from bemkit.contact.condensation.held_friction import HeldFriction
 from bemkit.contact.conditions import LinearConditions, orthonormal
 from bemkit.contact.equilibrium import Imbalance, Unbalanced
 from bemkit.errors import InputError
+from bemkit.operators.steklov_poincare.nodal_conditions import SLIDES
 
 _SMALLEST_RCOND = 1e-13
 """Below this reciprocal condition number of a row-scaled system its matrix counts as singular. The condensed stiffness
 of a floating body leaves 1e-15 of its free motions; solvers that are refused without need only take other steps."""
+
+_NO_ROOM = 1e-3
+"""Change of volume that errors of normals explain, see `DenseBody._room`: squares of angles."""
 
 _LEFT_OVER = 1e-9
 """Stiffness that may be round-off of zero, relative to the largest."""
@@ -29,7 +33,7 @@ class FollowingTangents:
     ----------
     nodes : (n_following,) array
         Indices of the contact nodes, ascending.
-    response, at_rest : (n_following, n_unknowns) array [-], (n_following,) array [m]
+    response, at_rest : (n_following, n) array [-], (n_following,) array [m]
         Their tangential displacements are ``at_rest + response @ unknowns``. Friction may act where the normal
         displacement of the node itself is the only unknown; see `bemkit.contact.condensation.held_friction`.
     """
@@ -45,10 +49,10 @@ class DenseBody(LinearBody):
 
     Parameters
     ----------
-    stiffness : (n_unknowns, n_unknowns) array [Pa]
+    stiffness : (n, n) array [Pa]
         Condensed stiffness, index ``2 node + component`` with component 0 = normal, 1 = tangential, without the
-        tangents that follow. It need not be symmetric.
-    load : (n_unknowns,) array [N/m]
+        tangents that follow; then pressures, n = n_unknowns + n_pressures. It need not be symmetric.
+    load : (n,) array [N/m]
         Condensed load: the nodal forces that would act on the contact nodes of the clamped body, reversed.
     weights : (n_contact,) array [m]
         Length that belongs to each node.
@@ -59,6 +63,11 @@ class DenseBody(LinearBody):
     modulus : float, optional [Pa]
         E' of the material: force per displacement of one node. By default the median of the diagonal normal
         stiffnesses, of those that are more than round-off.
+    n_pressures : int
+        Number of further unknowns, which no contact condition concerns and on which no force acts: uniform pressures of
+        incompressible bodies; see `bemkit.operators.steklov_poincare.protocol.CondensedMap`.
+    largest_modulus : float, optional [Pa]
+        The largest modulus of several bodies, of their shapes or volumes; by default `modulus`.
 
     Raises
     ------
@@ -73,14 +82,16 @@ class DenseBody(LinearBody):
     motions: FloatArray | None = None
     following_tangents: FollowingTangents | None = None
     modulus: float | None = None
+    n_pressures: int = 0
+    largest_modulus: float | None = None
 
     def __post_init__(self) -> None:
         n_contact, n_unknowns = self.n_contact, self.n_unknowns
         motions = np.zeros((0, n_contact, 2)) if self.motions is None else self.motions
         shapes = {
             "weights": (n_contact,),
-            "stiffness": (n_unknowns, n_unknowns),
-            "load": (n_unknowns,),
+            "stiffness": (n_unknowns + self.n_pressures, n_unknowns + self.n_pressures),
+            "load": (n_unknowns + self.n_pressures,),
             "motions": (len(motions), n_contact, 2),
         }
         for name, shape in shapes.items():
@@ -132,8 +143,9 @@ class DenseBody(LinearBody):
         if self.modulus is not None:
             return self.modulus / float(np.median(self.weights))
         weights = self.weights[self.unknown_dofs // 2]
-        diagonal = np.diagonal(self.stiffness) / weights
-        largest = float((np.abs(self.stiffness).max(axis=1) / weights).max())
+        stiffness = self.stiffness[: self.n_unknowns, : self.n_unknowns]
+        diagonal = np.diagonal(stiffness) / weights
+        largest = float((np.abs(stiffness).max(axis=1) / weights).max())
         stiff = diagonal[(diagonal > _LEFT_OVER * largest) & (self.unknown_dofs % 2 == 0)]
         return float(np.median(stiff)) if stiff.size else largest or 1.0
 
@@ -161,15 +173,15 @@ class DenseBody(LinearBody):
 
         displacement = np.zeros_like(conditions.value)
         np.divide(conditions.value, conditions.on_displacement[:, own, own], out=displacement, where=gives_displacement)
-        unknowns = displacement.ravel()[self.unknown_dofs]
-        is_given = gives_displacement.ravel()[self.unknown_dofs]
+        unknowns = self._with_pressures(displacement.ravel()[self.unknown_dofs])
+        is_given = self._with_pressures(gives_displacement.ravel()[self.unknown_dofs])
         if not is_given.all():
             unknowns[~is_given] = self._solved(conditions, unknowns, is_given)
-            displacement.flat[self.unknown_dofs] = unknowns
+            displacement.flat[self.unknown_dofs] = unknowns[: self.n_unknowns]
         displacement[self.tangent_follows, 1] = self._followed(unknowns)
 
         traction = np.zeros_like(displacement)
-        traction.flat[self.unknown_dofs] = self.stiffness @ unknowns - self.load
+        traction.flat[self.unknown_dofs] = (self.stiffness @ unknowns - self.load)[: self.n_unknowns]
         traction /= self.weights[:, None]
         state = ContactState(displacement, conditions.with_given_tractions(traction))
         return self.held_friction.restored(given, state)
@@ -181,6 +193,17 @@ class DenseBody(LinearBody):
     def rigid_load(self) -> FloatArray:
         """Return the work of the load on these motions."""
         return self.motions_of_unknowns @ self.load
+
+    def lacks_room(self, gap: FloatArray) -> bool:
+        """Whether an incompressible body has more volume than fits between its supports and closed contacts."""
+        n, room = self.n_unknowns, self._room if self.n_pressures else np.zeros((0, 0))
+        for row, change, needed in zip(room, self.stiffness[n:], self.load[n:], strict=True):
+            moved = np.flatnonzero(row[:n])
+            if np.abs(row[n:]).max() < _NO_ROOM and (self.unknown_dofs[moved] % 2 == 0).all() and row[moved].min() > 0:
+                largest = change[moved] * gap[self.unknown_dofs[moved] // 2]
+                if needed > largest.sum() + _LEFT_OVER * (np.abs(largest).sum() + abs(needed)):
+                    return True
+        return False
 
     def imbalance(self, state: ContactState) -> Imbalance:
         """Return how far the state is from equilibrium, relative to load and contact forces; see `unbalanced`."""
@@ -196,7 +219,7 @@ class DenseBody(LinearBody):
         of the rigid part of the displacements, and that of the sums.
         """
         contact = (self.weights[:, None] * state.traction).ravel()
-        forces, unknowns = self._forces_on_unknowns(contact), state.displacement.ravel()[self.unknown_dofs]
+        forces, unknowns = self._forces_on_unknowns(contact), self.unknowns_of(state)
         missing = np.abs(self.stiffness @ unknowns - self.load - forces).max()
         motions, basis = self.motions_of_unknowns, self._orthonormal_motions
         left_by_motions = float(np.abs(self.stiffness @ (basis @ (basis.T @ unknowns))).max(initial=0.0))
@@ -215,16 +238,30 @@ class DenseBody(LinearBody):
             terms=float(largest_terms.max()),
         )
 
+    def unknowns_of(self, state: ContactState) -> FloatArray:
+        """Return the unknowns (n,) of a state, with the pressures that best explain its tractions."""
+        unknowns = self._with_pressures(state.displacement.ravel()[self.unknown_dofs])
+        if self.n_pressures:
+            forces = self._forces_on_unknowns((self.weights[:, None] * state.traction).ravel())
+            missing = forces + self.load - self.stiffness @ unknowns
+            by_pressures = self.stiffness[:, self.n_unknowns :]
+            unknowns[self.n_unknowns :] = np.linalg.lstsq(by_pressures, missing, rcond=None)[0]
+        return unknowns
+
+    def _with_pressures(self, values: AnyArray) -> AnyArray:
+        """Return values (n_unknowns, ...) followed by zeros for the pressures, as a new array."""
+        return np.concatenate([values, np.zeros((self.n_pressures, *values.shape[1:]), values.dtype)])
+
     @cached_property
     def _column_sizes(self) -> FloatArray:
-        """(2, n_unknowns) array [Pa]: the largest entry of each column of the stiffness, and the sum of all."""
+        """(2, n) array [Pa]: the largest entry of each column of the stiffness, and the sum of all."""
         sizes = np.abs(self.stiffness)
         return np.stack([sizes.max(axis=0), sizes.sum(axis=0)])
 
     @cached_property
     def motions_of_unknowns(self) -> FloatArray:
-        """(n_motions, n_unknowns) array: what the rigid motions are in the unknowns."""
-        return self.rigid_motions().reshape(-1, 2 * self.n_contact)[:, self.unknown_dofs]
+        """(n_motions, n) array: what the rigid motions are in the unknowns."""
+        return self._with_pressures(self.rigid_motions().reshape(-1, 2 * self.n_contact)[:, self.unknown_dofs].T).T
 
     @cached_property
     def _rigid_basis(self) -> FloatArray:
@@ -244,8 +281,8 @@ class DenseBody(LinearBody):
         )
 
     def _forces_on_unknowns(self, contact: FloatArray) -> FloatArray:
-        """Return the forces (n_unknowns,) on the unknowns of nodal forces (2 n_contact,) [N/m]."""
-        tangents, forces = self.following_tangents, contact[self.unknown_dofs]
+        """Return the forces (n,) on the unknowns of nodal forces (2 n_contact,) [N/m]."""
+        tangents, forces = self.following_tangents, self._with_pressures(contact[self.unknown_dofs])
         return forces if tangents is None else forces + contact[2 * tangents.nodes + 1] @ tangents.response
 
     def _followed(self, unknowns: FloatArray) -> FloatArray:
@@ -260,29 +297,33 @@ class DenseBody(LinearBody):
         return float(np.max(self.weights[rows] * self.stiffness_scale * missed, initial=0.0))
 
     def _solved(self, conditions: LinearConditions, unknowns: FloatArray, is_given: BoolArray) -> FloatArray:
-        """Solve ``(A_u + A_t T) u = c + A_t t_free`` for the displacements that are not given, every row scaled to one.
+        """Solve ``(A_u + A_t T) u = c + A_t t_free`` for the unknowns that are not given, every row scaled to one.
 
         Parameters
         ----------
         conditions : LinearConditions
-        unknowns : (n_unknowns,) array [m]
+        unknowns : (n,) array [m]
             The given displacements among them.
-        is_given : (n_unknowns,) bool array
+        is_given : (n,) bool array
         """
         # before any matrix, whose rows may hold nothing but what round-off leaves of rigid motions
         if not conditions.hold(self._rigid_basis):
             raise SingularResponse("the contact conditions leave a rigid motion free")
+        if self.n_pressures and np.linalg.svd(self._room[:, ~is_given], compute_uv=False)[-1] < _NO_ROOM:
+            raise ClosedVolume
         # one equation, the condition of the same index, for each displacement that is sought
         sought = np.flatnonzero(~is_given)
-        node, component = np.divmod(self.unknown_dofs[sought], 2)
+        n_displacements = sought.size - self.n_pressures
+        node, component = np.divmod(self.unknown_dofs[sought[:n_displacements]], 2)
         unknown_of = np.full((self.n_contact, 2), -1)  # index among the unknowns of each displacement
         unknown_of.flat[self.unknown_dofs] = np.arange(self.n_unknowns)
         column_of = np.cumsum(~is_given) - 1  # index among those sought of each unknown
         # displacements and nodal forces where all that is sought vanishes
         given = np.where(is_given, unknowns, 0.0)
         forces = self.stiffness @ given - self.load
-        right_side = conditions.value[node, component]
+        right_side = np.append(conditions.value[node, component], -forces[self.n_unknowns :])
         matrix = np.zeros((sought.size, sought.size))
+        matrix[n_displacements:] = self.stiffness[self.n_unknowns :, sought]  # the volume must not change
         for other in (component, 1 - component):  # a condition may couple both components of its node
             on_displacement = conditions.on_displacement[node, component, other]
             on_traction = conditions.on_traction[node, component, other]
@@ -313,5 +354,20 @@ class DenseBody(LinearBody):
 
     @cached_property
     def _probe(self) -> FloatArray:
-        """(n_unknowns,) array around one: not orthogonal to rigid motions, and without any pattern."""
-        return 0.5 + spread_fractions(self.n_unknowns)
+        """(n,) array around one: not orthogonal to rigid motions, and without any pattern."""
+        return 0.5 + spread_fractions(len(self.load))
+
+    @cached_property
+    def _room(self) -> FloatArray:
+        """(n_pressures, n) array [-]: change of each volume by unknowns, per length, then by pressures.
+
+        Displacements along the boundary, which change the volume by the errors of its normals, count as zero. Pressures
+        change it where other bodies yield; a boundary that yields like the stiffest body has the size one.
+        """
+        n, stiffness = self.n_unknowns, self.stiffness[self.n_unknowns :]
+        per_length = stiffness[:, :n] / self.weights[self.unknown_dofs // 2]
+        per_length = per_length / np.abs(per_length).max(axis=1, keepdims=True)
+        change = np.abs(stiffness[:, :n]).sum(axis=1)
+        modulus = self.largest_modulus or self.modulus or self.stiffness_scale * float(np.median(self.weights))
+        yields = stiffness[:, n:] * modulus / change / change[:, None]
+        return np.hstack([np.where(np.abs(per_length) > SLIDES, per_length, 0.0), yields])

@@ -76,7 +76,7 @@ class WholeBody:
     def motions(self) -> FloatArray:
         """(n_motions, n_retained) array: the rigid motions along the retained directions."""
         along = np.einsum("nkc,mnc->mnk", self.conditions.frame, self.modes)
-        return np.asarray(along[:, self.conditions.is_retained])
+        return np.pad(along[:, self.conditions.is_retained], ((0, 0), (0, self.condensed.n_pressures)))
 
     @cached_property
     def stiffness(self) -> FloatArray:
@@ -187,7 +187,7 @@ class DirectBody(DenseBody):
     @classmethod
     def of(cls, whole: WholeBody, nodes: ContactNodes, modulus: float) -> DirectBody:
         """Return a body whose contact nodes are retained."""
-        coupling = NodeCoupling.of(whole.conditions, nodes)
+        coupling = NodeCoupling.of(whole.conditions, nodes, whole.condensed.n_pressures)
         motions = coupling.moved(whole.motions)
         stiffness = coupling.stiffness(whole.stiffness, motions)
         offset = _prescribed(whole.conditions, nodes)
@@ -198,6 +198,7 @@ class DirectBody(DenseBody):
             motions=motions,
             following_tangents=coupling.following(offset),
             modulus=modulus,
+            n_pressures=whole.condensed.n_pressures,
             whole=whole,
             coupling=coupling,
             nodes=nodes,
@@ -233,7 +234,9 @@ class DirectBody(DenseBody):
 
     def retained(self, state: ContactState) -> FloatArray:
         """Return the retained displacements (n_retained,) [m] of a state."""
-        return self.coupling.retained((state.displacement.ravel() - self.offset)[self.unknown_dofs])
+        unknowns = self.unknowns_of(state)
+        unknowns[: self.n_unknowns] -= self.offset[self.unknown_dofs]
+        return self.coupling.retained(unknowns)
 
     def recover(self, state: ContactState) -> tuple[FloatArray, FloatArray]:
         """Return displacement (n_nodes, 2) and total force (n_nodes, 2) of all boundary nodes, in x and y."""

@@ -31,6 +31,8 @@ class NodeCoupling:
         a direction that a support holds.
     blocks : (n_contact, 2, 2) array
         Entries of B, axes (node, component, direction); zero where there is no direction.
+    n_pressures : int
+        Pressures that are retained; they are the last unknowns on both sides.
 
     Notes
     -----
@@ -40,15 +42,16 @@ class NodeCoupling:
 
     columns: IntArray
     blocks: FloatArray
+    n_pressures: int = 0
 
     @classmethod
-    def of(cls, conditions: NodalConditions, contact: ContactNodes) -> NodeCoupling:
+    def of(cls, conditions: NodalConditions, contact: ContactNodes, n_pressures: int) -> NodeCoupling:
         """Return the coupling of contact nodes to the retained directions of the conditions."""
         is_retained = conditions.is_retained
         number = np.where(is_retained, np.cumsum(is_retained).reshape(is_retained.shape) - 1, -1)
         columns = number[contact.nodes]
         blocks = np.einsum("nkc,njc->nkj", contact.frame, conditions.frame[contact.nodes])
-        return cls(columns, np.where(columns[:, None] >= 0, blocks, 0.0))
+        return cls(columns, np.where(columns[:, None] >= 0, blocks, 0.0), n_pressures)
 
     @cached_property
     def partner(self) -> IntArray:
@@ -96,13 +99,14 @@ class NodeCoupling:
         """Return ``R^T f`` (n_unknowns, ...) of forces (n_retained, ...) along the retained directions."""
         index, value = self.inverse
         parts = [(value[:, k] * forces[index[:, k]].T).T for k in (0, 1)]
-        return np.asarray(parts[0] + parts[1])
+        return np.concatenate([parts[0] + parts[1], forces[len(value) :]])
 
     def retained(self, unknowns: FloatArray) -> FloatArray:
         """Return ``R w`` (n_retained,) of the unknown relative displacements (n_unknowns,) without offset."""
         index, value = self.inverse
-        amounts = (value * unknowns[:, None]).ravel()
-        return np.asarray(np.bincount(index.ravel(), amounts, minlength=unknowns.size), dtype=float)
+        displacements, pressures = np.split(unknowns, [len(value)])
+        amounts = (value * displacements[:, None]).ravel()
+        return np.append(np.bincount(index.ravel(), amounts, minlength=len(value)), pressures)
 
     def moved(self, retained: FloatArray) -> FloatArray:
         """Return ``B u`` (..., n_contact, 2) of retained displacements (..., n_retained)."""
@@ -115,7 +119,7 @@ class NodeCoupling:
         node = np.flatnonzero(self.tangent_follows)
         position = np.full((len(self.columns), 2), -1)
         position.flat[self.unknown_dofs] = np.arange(self.unknown_dofs.size)
-        response, each = np.zeros((node.size, self.unknown_dofs.size)), np.arange(node.size)
+        response, each = np.zeros((node.size, self.unknown_dofs.size + self.n_pressures)), np.arange(node.size)
         _, value = self.inverse
         for rows in (node, self.partner[node]):
             unknown = position[rows, 0]
@@ -127,7 +131,7 @@ class NodeCoupling:
         nodes = np.flatnonzero(self.tangent_follows)
         if not nodes.size:
             return None
-        at_rest = offset[2 * nodes + 1] - self.follow @ offset[self.unknown_dofs]
+        at_rest = offset[2 * nodes + 1] - self.follow[:, : self.unknown_dofs.size] @ offset[self.unknown_dofs]
         return FollowingTangents(nodes, self.follow, at_rest)
 
     def stiffness(self, of_body: FloatArray, motions: FloatArray) -> FloatArray:
@@ -136,11 +140,12 @@ class NodeCoupling:
         It resists none of the rigid motions (n_motions, n_contact, 2) of the contact nodes; see `resisting_none`.
         """
         of_unknowns = motions.reshape(-1, 2 * len(self.columns))[:, self.unknown_dofs]
+        of_unknowns = np.pad(of_unknowns, ((0, 0), (0, self.n_pressures)))
         return resisting_none(self.on_unknowns(self.on_unknowns(of_body.T).T), of_unknowns)
 
     def load(self, of_body: FloatArray, stiffness: FloatArray, offset: FloatArray) -> FloatArray:
         """Return the load (n_unknowns,) ``K_w o + R^T f`` of that on the body under an offset (2 n_contact,) [m]."""
-        return self.on_unknowns(of_body) + stiffness @ offset[self.unknown_dofs]
+        return self.on_unknowns(of_body) + stiffness[:, : self.unknown_dofs.size] @ offset[self.unknown_dofs]
 
 
 def resisting_none(stiffness: FloatArray, motions: FloatArray) -> FloatArray:

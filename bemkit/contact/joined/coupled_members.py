@@ -107,6 +107,13 @@ class CoupledMembers:
         return np.concatenate([member.load for member in self.members])
 
     @cached_property
+    def pressures(self) -> IntArray:
+        """(n_pressures,) array: the components that are pressures."""
+        ends = np.cumsum([member.n_components for member in self.members])
+        counts = [member.n_pressures for member in self.members]
+        return np.concatenate([np.arange(end - count, end) for end, count in zip(ends, counts, strict=True)])
+
+    @cached_property
     def shapes(self) -> tuple[Shape, ...]:
         """The members by shape."""
         return shapes_of(self.members)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from functools import cached_property
 
 import numpy as np
+from scipy import sparse
 
 from bemkit.arrays import FloatArray
 from bemkit.contact.condensation.dense_body import DenseBody, FollowingTangents
@@ -30,14 +31,16 @@ class RelativeStiffness:
     -----
     With the flexibility G of the members, their motions R and the coupling B the unknowns p (nodal forces) and a
     (motions) solve ``B G B^T p + B R a = w - o - B G f`` and ``R^T B^T p = -R^T f``; the inverse of this matrix holds
-    the stiffness of w. The rows of tangents that follow are not equations.
+    the stiffness of w. The rows of tangents that follow are not equations. Pressures of incompressible members are
+    further rows of B and entries of w, so that the stiffness is that of both.
     """
 
     def __init__(self, joined: CoupledMembers) -> None:
         is_kept = np.ones((joined.n_contact, 2), bool)
         is_kept[joined.tangent_follows, 1] = False
         self._is_kept = is_kept.ravel()
-        self._coupling = joined.gap_operator[self._is_kept]
+        of_pressures = sparse.eye_array(joined.gap_operator.shape[1], format="csr")[joined.pressures]
+        self._coupling = sparse.vstack([joined.gap_operator[self._is_kept], of_pressures], format="csr")
         self._followers = joined.gap_operator[~self._is_kept]
         self._follows, self._slope = joined.tangent_follows, joined.tangents[0][joined.tangent_follows]
         self._unit_deformation = joined.deformation(self._coupling.T.toarray())
@@ -59,9 +62,8 @@ class RelativeStiffness:
         """Return the body under the loads and offsets of `joined`."""
         n_kept, load = self._coupling.shape[0], joined.load
         loaded = joined.deformation(load)
-        right_side = np.append(
-            -(joined.prescribed[self._is_kept] + self._coupling @ loaded), -(joined.motions.T @ load) / joined.modulus
-        )
+        offset = np.append(joined.prescribed[self._is_kept], np.zeros(joined.pressures.size))
+        right_side = np.append(-(offset + self._coupling @ loaded), -(joined.motions.T @ load) / joined.modulus)
         at_rest = self._inverse @ right_side  # p and a where no relative displacement is allowed
         return DenseBody(
             stiffness=self._stiffness,
@@ -70,6 +72,8 @@ class RelativeStiffness:
             motions=(joined.gap_operator @ joined.motions).T.toarray().reshape(-1, joined.n_contact, 2),
             following_tangents=self._followed(joined, loaded, at_rest),
             modulus=joined.stiffness_scale * float(np.median(joined.weights)),
+            n_pressures=joined.pressures.size,
+            largest_modulus=max(max(member.modulus, member.bulk_modulus) for member in joined.members),
         )
 
     def _followed(self, joined: CoupledMembers, loaded: FloatArray, at_rest: FloatArray) -> FollowingTangents | None:

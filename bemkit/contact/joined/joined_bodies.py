@@ -31,6 +31,7 @@ _ROUND_OFF = 1e-12
 _WITHOUT_LOAD = (
     *(
         "shapes",
+        "pressures",
         "motions",
         "relative_motions",
         "is_symmetric",
@@ -141,6 +142,10 @@ class JoinedBodies(CoupledMembers, LinearBody):
     def rigid_load(self) -> FloatArray:
         """Return the work of the loads on these motions."""
         return np.asarray(self.motions.T @ self.load)
+
+    def lacks_room(self, gap: FloatArray) -> bool:
+        """Whether an incompressible member has more volume than fits between its supports and closed contacts."""
+        return self.pressures.size > 0 and not self.responses_are_expensive and self._dense.lacks_room(gap)
 
     def shares(self, forces: FloatArray) -> FloatArray:
         """Return the largest of the forces on the partner that carries less, relative to the largest of all."""

@@ -36,6 +36,11 @@ class Member:
         E' of the material.
     name : str, optional
         For messages.
+    n_pressures : int
+        Number of pressures, the last components, that belong to the volume of an incompressible body; see
+        `bemkit.operators.steklov_poincare.protocol.CondensedMap`. No contact concerns them.
+    bulk_modulus : float [Pa]
+        Pressure by unit of dilatation; zero if the body keeps its volume.
 
     Raises
     ------
@@ -48,6 +53,8 @@ class Member:
     motions: FloatArray
     modulus: float
     name: str = ""
+    n_pressures: int = 0
+    bulk_modulus: float = 0.0
 
     def __post_init__(self) -> None:
         n = len(self.load)

@@ -12,7 +12,7 @@ from bemkit.geometry.spaces import BoundarySpace, ConstantSpace
 from bemkit.operators.collocation.images import collocation_equations, displacement_rows
 from bemkit.operators.collocation.layers import straight_layer
 from bemkit.operators.counts import Entries, OperationCounts
-from bemkit.operators.linear.dense import DenseLU
+from bemkit.operators.linear.dense import DenseLU, SingularMatrixError
 from bemkit.operators.linear.threads import for_each_chunk
 from bemkit.operators.material import Material
 from bemkit.operators.pair_form import Tag
@@ -64,13 +64,25 @@ class CollocationElasticity(BoundaryMap):
         return collocation_cost(case, takes_slopes=self.slopes)
 
     def stiffness(self) -> FloatArray:
-        """Return S, (n_dofs, n_dofs) [Pa]: the stiffness with all displacements retained."""
+        """Return S, (n_dofs, n_dofs) [Pa]: the stiffness with all displacements retained.
+
+        Raises
+        ------
+        SingularMatrixError
+            If the body is bounded and incompressible.
+        """
         shape = self.mesh.n_elements, 2
         frame = np.broadcast_to(np.eye(2), (*shape, 2))
         retained = NodalConditions(frame, np.zeros(shape, bool), np.zeros(shape), np.ones(shape, bool))
         name = "the single layer operator"
         system = MixedSystem(self.mesh, self.material, retained, name, np.zeros(shape), slopes=self.slopes)
-        return system.condensed().stiffness
+        condensed = system.condensed()
+        if condensed.n_pressures:
+            raise SingularMatrixError(
+                "displacements leave the pressure in an incompressible body (poisson_ratio 0.5) undetermined: give a "
+                "smaller poisson_ratio, or condense the map"
+            )
+        return condensed.stiffness
 
     def condense(self, conditions: NodalConditions, force: FloatArray) -> CondensedMap:
         """Solve for all unknowns under unit displacements of the retained directions and the given load.
@@ -112,7 +124,8 @@ class MixedSystem:
     Raises
     ------
     SingularMatrixError
-        If the body can move while its supports and its retained directions are held.
+        If the body can move while its supports and its retained directions are held, or if supports leave an
+        incompressible body no free boundary.
 
     Notes
     -----
@@ -123,7 +136,9 @@ class MixedSystem:
     the last one takes another sweep over the element pairs.
 
     The equations for resultants and reciprocities follow the displacement equations; each adds an unknown, an error of
-    the displacement equations.
+    the displacement equations. The reciprocity of the outer curve of an incompressible body is its change of volume.
+    If the pressure is retained (`Volume.retained_pressure`), the mean normal traction where the boundary is not free
+    takes the place of this equation, which then follows the retained displacements.
     """
 
     def __init__(
@@ -150,6 +165,7 @@ class MixedSystem:
         )
         for columns in (self._on_traction, self._on_displacement):
             turn_columns(columns, frame)
+        pressures = self._retain_pressure()
 
         # displacement equations with the columns of their errors, then the balances
         n_rows, order = self._weights.size, self._weights.size + len(balances)
@@ -159,6 +175,7 @@ class MixedSystem:
         matrix[:n_rows, n_rows:] = border.errors
         matrix[n_rows:, :n_rows] = np.where(conditions.is_free.ravel(), self._on_displacement, -self._on_traction)
         right[n_rows:] = self._on_displacement[:, self._retained]
+        right = np.hstack([right, np.pad(pressures, ((n_rows, 0), (0, 0)))]) if pressures.size else right
 
         self._factor = DenseLU(matrix, name)
         self._response = -self._factor.solve(right)[:n_rows]
@@ -166,13 +183,40 @@ class MixedSystem:
             single_layer=Entries.full(n_rows, n_rows - self._free.size),
             double_layer=Entries.full(n_rows, self._free.size + self._retained.size),
             factorisations=(self._factor.factorisation,),
-            right_hand_sides=self._retained.size + 1,
+            right_hand_sides=right.shape[1] + 1,
         )
         self._work, self._base = work, _Solved(data, self._solution(data, known))
 
     def condensed(self) -> CondensedMap:
         """Return the condensed map under the first load."""
         return self._condensed(self._force, self._base.data, self._base, 1.0, self._work)
+
+    def _retain_pressure(self) -> FloatArray:
+        """Replace the change of volume by the mean normal traction if the pressure is retained.
+
+        Returns
+        -------
+        (n_balances, n_pressures) array [Pa]
+            The pressure in each of the balances.
+        """
+        n_balances = len(self._on_traction)
+        self._volume = np.zeros((self._weights.size, 0))
+        if not self._material.is_incompressible:
+            return np.zeros((n_balances, 0))
+        from bemkit.operators.steklov_poincare.volume_constraint import Volume
+
+        is_volume = np.zeros(n_balances, bool)  # the reciprocities of all loops come last
+        is_volume[-len(self._mesh.loops) :] = np.asarray(self._mesh.loop_areas) > 0.0
+        volume = Volume(self._on_displacement[is_volume].T.copy(), 0.0)
+        unit = volume.retained_pressure(self._conditions, self._material.plane_modulus)
+        self._volume = volume.change @ unit
+        if unit.size:
+            normal = self._conditions.in_frames(self._mesh.normals).ravel() * self._weights
+            held = np.where(self._conditions.is_free.ravel(), 0.0, normal)
+            self._on_traction[is_volume], self._on_displacement[is_volume] = held / np.abs(held).sum(), 0.0
+        pressures = np.zeros((n_balances, unit.shape[1]))
+        pressures[is_volume] = unit
+        return pressures
 
     @assembling()
     def _sweep(
@@ -228,25 +272,36 @@ class MixedSystem:
     ) -> CondensedMap:
         """Return the condensed map under forces (n_elements, 2) and data that are `factor` times those of `base`."""
         traction = self._conditions.in_frames(force).ravel() / self._weights
-        at_rest = factor * base.at_rest
-        weights, retained = self._weights[self._retained], self._retained
+        at_rest, given, retained = factor * base.at_rest, data.displacement.ravel(), self._retained
+        weights = self._weights[retained]
+        stiffness, load = (
+            weights[:, None] * self._response[retained],
+            weights * (traction[retained] - at_rest[retained]),
+        )
+        if self._volume.size:
+            of_free = self._volume[self._free].T
+            change = of_free @ self._response[self._free]
+            change[:, : retained.size] += self._volume[retained].T
+            stiffness = np.vstack([stiffness, change])
+            load = np.append(load, -self._volume[self._fixed].T @ given[self._fixed] - of_free @ at_rest[self._free])
         return _MixedMap(
-            stiffness=weights[:, None] * self._response[retained],
-            load=weights * (traction[retained] - at_rest[retained]),
+            stiffness=stiffness,
+            load=load,
+            n_pressures=self._volume.shape[1],
             work=work,
             system=self,
             at_rest=at_rest,
             traction=traction,
-            given=data.displacement.ravel(),
+            given=given,
             base=base,
         )
 
     def recovered(self, loaded: _MixedMap, retained: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return displacement and force of all elements under retained displacements (n_retained,)."""
+        """Return displacement and force of all elements under retained unknowns (n_retained,)."""
         is_free = self._conditions.is_free.ravel()
         unknowns = loaded.at_rest + self._response @ retained
         local = np.where(is_free, unknowns, loaded.given)
-        local[self._retained] = retained
+        local[self._retained] = retained[: self._retained.size]
         force = self._weights * np.where(is_free, loaded.traction, unknowns)
         return self._conditions.in_plane(local), self._conditions.in_plane(force)
 

@@ -87,10 +87,11 @@ class ForcesInside:
         conditions : NodalConditions
         """
         along = conditions.in_frames(self.displacement)
-        shift = along[conditions.is_retained]
+        shift = np.append(along[conditions.is_retained], np.zeros(without_body_forces.n_pressures))
         return _MapWithBodyForces(
             stiffness=without_body_forces.stiffness,
             load=without_body_forces.load + without_body_forces.stiffness @ shift,
+            n_pressures=without_body_forces.n_pressures,
             sensitivity=without_body_forces.sensitivity,
             work=without_body_forces.work,
             volume_force=self.volume_force,

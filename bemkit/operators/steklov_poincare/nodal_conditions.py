@@ -32,6 +32,10 @@ _FACTOR_TOLERANCE = 4.0 * np.finfo(float).eps
 TractionField = Callable[[FloatArray, FloatArray], FloatArray]
 """Tractions on the boundary: (n, 2) points [m] and (n, 2) outward unit normals -> (n, 2) values [Pa]."""
 
+SLIDES = 0.02
+"""Angle between a displacement and the boundary up to which a body only slides along the boundary: errors of normals
+are smaller."""
+
 
 class ConflictingSupportsError(InputError):
     """Two boundary parts prescribe different displacements at their common node.

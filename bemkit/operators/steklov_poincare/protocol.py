@@ -23,12 +23,17 @@ if TYPE_CHECKING:
 class CondensedMap(ABC):
     """A body reduced to its retained directions: force = stiffness @ displacement - load.
 
+    If only retained directions can change the volume of an incompressible body, its uniform pressure is one more
+    unknown, the last one, whose "force" is the change of volume, which must vanish.
+
     Parameters
     ----------
     stiffness : (n_retained, n_retained) array
         In weak form: forces, not tractions.
     load : (n_retained,) array
         Forces that given loads and supports exert on the retained directions.
+    n_pressures : int
+        Number of retained pressures, 0 or 1.
     sensitivity : (n_nodes, 2) array, optional
         Sum of the magnitudes of all forces that a unit displacement of each node causes. For thin bodies it is many
         orders larger than the resulting forces, which then contain its round-off.
@@ -47,11 +52,20 @@ class CondensedMap(ABC):
 
     stiffness: FloatArray
     load: FloatArray
+    n_pressures: int = 0
     sensitivity: FloatArray | None = None
     work: OperationCounts = field(default_factory=OperationCounts)
     volume_force: FloatArray | None = None
     inner_force: float = 0.0
     without_body_forces: CondensedMap | None = None
+
+    @property
+    def at_constant_volume(self) -> FloatArray:
+        """The stiffness (n, n) of the displacements, if a pressure is unknown, of their parts that keep the volume."""
+        n = len(self.stiffness) - self.n_pressures
+        stiffness, change = self.stiffness[:n, :n], np.linalg.qr(self.stiffness[n:, :n].T)[0]
+        left = stiffness - change @ (change.T @ stiffness)
+        return np.asarray(left - (left @ change) @ change.T)
 
     @abstractmethod
     def recover(self, retained_displacement: FloatArray) -> tuple[FloatArray, FloatArray]:

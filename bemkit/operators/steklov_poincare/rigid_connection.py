@@ -143,6 +143,7 @@ class _Connections:
         return _ConnectedMap(
             stiffness=self.stiffness,
             load=fixed.load + self.coupling @ at_rest,
+            n_pressures=fixed.n_pressures,
             sensitivity=fixed.sensitivity,
             work=work,
             volume_force=fixed.volume_force,

@@ -22,6 +22,8 @@ _ROWS = 128
 class SchurCondensation:
     """A body reduced to its retained directions; the free ones are eliminated from S.
 
+    So is the uniform pressure, unless it is one more retained unknown; see `Volume.retained_pressure`.
+
     Parameters
     ----------
     matrix : (n_dofs, n_dofs) array
@@ -36,7 +38,8 @@ class SchurCondensation:
     Raises
     ------
     SingularMatrixError
-        If the body can move while its supports and its retained directions are held.
+        If the body can move while its supports and its retained directions are held, or if supports leave an
+        incompressible body no free boundary.
     """
 
     matrix: FloatArray
@@ -53,21 +56,32 @@ class SchurCondensation:
             np.flatnonzero(x) for x in (conditions.is_free, conditions.is_retained, conditions.is_fixed)
         )
         self.factor = self.solver.factor(block_of(matrix, self._free, self._free), self.name)
-        self._coupling = block_of(matrix, self._free, self._retained)
         self._of_fixed = matrix[:, self._fixed]
-        self._volume = volume = self.volume.in_frames(conditions.frame).change
-        self._constrained = VolumeConstraint(self.factor, without_round_off(volume)[self._free], self.volume.compliance)
-        self._response, self._pressures = self._constrained.solve(-self._coupling, -volume[self._retained].T)
-        stiffness = block_of(matrix, self._retained, self._retained) + multiply(self._coupling.T, self._response)
-        stiffness += volume[self._retained] @ self._pressures
+        volume = self.volume.in_frames(conditions.frame)
+        unit = volume.retained_pressure(conditions, float(np.abs(np.diagonal(matrix)).max()))
+        self._volume, self._by_pressure = volume.change, volume.change @ unit
+        self._constrained = VolumeConstraint(
+            self.factor, without_round_off(volume.change)[self._free], volume.compliance, is_eliminated=not unit.size
+        )
+        coupling, stiffness = (block_of(matrix, rows, self._retained) for rows in (self._free, self._retained))
+        if unit.size:
+            forces = self._by_pressure[self._retained]
+            coupling = np.hstack([coupling, self._by_pressure[self._free]])
+            stiffness = np.block([[stiffness, forces], [forces.T, np.zeros((1, 1))]])
+        self._coupling = coupling
+        self._of_volume = np.pad(volume.change[self._retained], ((0, unit.shape[1]), (0, 0)))
+        self._response, self._pressures = self._constrained.solve(-coupling, -self._of_volume.T)
+        stiffness = stiffness + multiply(coupling.T, self._response)
+        stiffness += self._of_volume @ self._pressures
         self._stiffness = 0.5 * (stiffness + stiffness.T)
+        self._pressures[:, self._retained.size :] = unit
         rows = (self.matrix[first : first + _ROWS] for first in range(0, len(self.matrix), _ROWS))
         self._sensitivity = sum(np.abs(chunk).sum(axis=0) for chunk in rows).reshape(-1, 2)
 
     @property
     def work(self) -> OperationCounts:
         """Return the operation counts of the elimination."""
-        n_columns = self._retained.size + self._volume.shape[1]
+        n_columns = self._retained.size + self._volume.shape[1]  # a pressure is retained or eliminated
         return OperationCounts(factorisations=self.factor.factorisations, right_hand_sides=n_columns)
 
     def under(self, force: FloatArray, displacement: FloatArray) -> CondensedMap:
@@ -75,10 +89,12 @@ class SchurCondensation:
         prescribed = displacement.ravel()[self._fixed]
         known = self.conditions.in_frames(force).ravel() - self._of_fixed @ prescribed
         at_rest, pressure = self._constrained.solve(known[self._free], -self._volume[self._fixed].T @ prescribed)
-        load = known[self._retained] - self._coupling.T @ at_rest - self._volume[self._retained] @ pressure
+        load = np.append(known[self._retained], -self._by_pressure[self._fixed].T @ prescribed)
+        load -= self._coupling.T @ at_rest + self._of_volume @ pressure
         return _SchurMap(
             stiffness=self._stiffness,
             load=load,
+            n_pressures=self._by_pressure.shape[1],
             sensitivity=self._sensitivity,
             work=OperationCounts(right_hand_sides=1),
             condensation=self,
@@ -88,9 +104,9 @@ class SchurCondensation:
         )
 
     def recovered(self, loaded: _SchurMap, retained: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return displacement and force of all nodes under retained displacements (n_retained,)."""
+        """Return displacement and force of all nodes under retained unknowns (n_retained,)."""
         local = np.empty(len(self.matrix))
-        local[self._fixed], local[self._retained] = loaded.prescribed, retained
+        local[self._fixed], local[self._retained] = loaded.prescribed, retained[: self._retained.size]
         local[self._free] = loaded.at_rest + self._response @ retained
         displacement = self.conditions.in_plane(local)
         force = self.matrix @ displacement.ravel()

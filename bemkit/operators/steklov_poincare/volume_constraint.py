@@ -10,7 +10,7 @@ import numpy as np
 from bemkit.arrays import FloatArray
 from bemkit.operators.linear.dense import SingularMatrixError
 from bemkit.operators.linear.solvers import Factor
-from bemkit.operators.steklov_poincare.nodal_conditions import turn_columns
+from bemkit.operators.steklov_poincare.nodal_conditions import SLIDES, NodalConditions, turn_columns
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,6 +36,44 @@ class Volume:
         turn_columns(change.T, frame)
         return replace(self, change=change)
 
+    def retained_pressure(self, conditions: NodalConditions, stiffness: float) -> FloatArray:
+        """Return the unit of a pressure that only retained displacements determine, as column of an array.
+
+        This is so if the body is incompressible and all its free directions slide along the boundary. Until contact
+        is known, nothing then decides whether a displacement of the retained directions keeps the volume.
+
+        Parameters
+        ----------
+        conditions : NodalConditions
+            In whose frames this change of volume is.
+        stiffness : float [Pa]
+            Largest force of the body by a unit displacement; a unit of the pressure causes forces of this size.
+
+        Returns
+        -------
+        (0 or 1, 0 or 1) array [Pa]
+            Without column if the pressure can be eliminated.
+
+        Raises
+        ------
+        SingularMatrixError
+            If no retained displacement changes the volume, either.
+        """
+        n_pressures = self.change.shape[1]
+        if self.compliance or not n_pressures:
+            return np.zeros((n_pressures, 0))
+        at_nodes = without_round_off(self.change).reshape(-1, 2, n_pressures)
+        sizes = np.linalg.norm(at_nodes, axis=1, keepdims=True)
+        is_changing = np.any(np.abs(at_nodes) > SLIDES * sizes, axis=2)
+        if np.any(is_changing & conditions.is_free):
+            return np.zeros((n_pressures, 0))
+        if not np.any(is_changing & conditions.is_retained):
+            raise SingularMatrixError(
+                "the incompressible body (poisson_ratio 0.5) has no free boundary, because supports take all of it: "
+                "leave a part free, or give a poisson_ratio of 0.499999"
+            )
+        return np.array([[stiffness / np.abs(self.change).max()]])
+
 
 @dataclass(frozen=True, eq=False)
 class VolumeConstraint:
@@ -49,29 +87,25 @@ class VolumeConstraint:
         Change of volume per free displacement.
     compliance : float
         See `Volume`.
+    is_eliminated : bool
+        Whether to solve for the pressure; otherwise it is zero.
     """
 
     stiffness: Factor
     volume: FloatArray
     compliance: float
+    is_eliminated: bool
 
     @cached_property
     def _compliance(self) -> tuple[FloatArray, FloatArray]:
         """Displacements under a unit pressure, and the total compliance."""
         displacement = self.stiffness.solve(self.volume)
-        total_compliance = self.volume.T @ displacement + self.compliance
-        if total_compliance.size and not total_compliance.min() > 0.0:
-            raise SingularMatrixError(
-                "the incompressible body (poisson_ratio 0.5) has no free boundary, because supports and contact take "
-                "all of it: leave a part free, end the contact part by `where` before the boundary that never "
-                "touches, or give a poisson_ratio of 0.499999"
-            )
-        return displacement, total_compliance
+        return displacement, self.volume.T @ displacement + self.compliance
 
     def solve(self, right: FloatArray, volume: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return displacements and pressure for given forces (n_free, ...) and changes of volume (0 or 1, ...)."""
         free = self.stiffness.solve(right)
-        if not self.volume.shape[1]:
+        if not (self.volume.shape[1] and self.is_eliminated):
             return free, np.zeros(volume.shape)
         displacement, total_compliance = self._compliance
         pressure = (self.volume.T @ free - volume) / total_compliance[0, 0]
