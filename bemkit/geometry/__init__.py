@@ -1,5 +1,7 @@
 """Curves, shapes, selections, gradings and boundary meshes."""
 
+from typing import TYPE_CHECKING, Any
+
 from bemkit.errors import GeometryError as GeometryError
 from bemkit.errors import UnknownPartError as UnknownPartError
 from bemkit.geometry.curves import Arc as Arc
@@ -24,3 +26,21 @@ from bemkit.geometry.shapes import Rectangle as Rectangle
 from bemkit.geometry.shapes import Ring as Ring
 from bemkit.geometry.shapes import Sector as Sector
 from bemkit.geometry.shapes import Shape as Shape
+
+if TYPE_CHECKING:
+    from bemkit.geometry.files.meshio_files import read_mesh as read_mesh
+    from bemkit.geometry.files.meshio_files import write_mesh as write_mesh
+    from bemkit.geometry.symmetry import Symmetry as Symmetry
+else:
+
+    def __getattr__(name: str) -> Any:
+        """Import symmetry, and what reads and writes files of meshes, when it is first used."""
+        if name == "Symmetry":
+            from bemkit.geometry.symmetry import Symmetry
+
+            return Symmetry
+        if name not in ("read_mesh", "write_mesh"):
+            raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+        from bemkit.geometry.files import meshio_files
+
+        return getattr(meshio_files, name)
