@@ -24,6 +24,16 @@ class ClosedVolume(SingularResponse):
         super().__init__("displacements at the contact nodes cannot keep the volume of a body of poisson_ratio 0.5")
 
 
+class FreeMotion(SingularResponse):
+    """Under the conditions at the contact nodes something can move as a rigid body."""
+
+    def __init__(self, who: str = "the body") -> None:
+        super().__init__(
+            f"the contact conditions leave a rigid motion free: hold {who} by a support, or start with more nodes in "
+            "contact"
+        )
+
+
 @dataclass(frozen=True, eq=False)
 class ContactState:
     """Displacements and tractions at the contact nodes, in (n, t) components.

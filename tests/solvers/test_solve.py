@@ -215,7 +215,7 @@ def test_statuses_that_do_not_hold_the_body_begin_no_path():
     bound = AffineBound.tangent(problem, np.zeros(12))
     end = follow_path(problem, bound, ActiveSets(np.zeros(12, bool), np.zeros(12, np.intp)))
     assert end.state is None
-    assert "leave a rigid motion free" in end.reason
+    assert "leave a rigid motion free: hold the body by a support" in end.reason
 
 
 # ------------------------------------------------------------------------------------------------------- metamorphic

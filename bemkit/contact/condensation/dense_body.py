@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from bemkit.arrays import AnyArray, BoolArray, FloatArray, IntArray, read_only, spread_fractions
-from bemkit.contact.body import ClosedVolume, ContactState, LinearBody, SingularResponse
+from bemkit.contact.body import ClosedVolume, ContactState, FreeMotion, LinearBody, SingularResponse
 from bemkit.contact.condensation.held_friction import HeldFriction
 from bemkit.contact.conditions import LinearConditions, orthonormal
 from bemkit.contact.equilibrium import Imbalance, Unbalanced
@@ -308,7 +308,7 @@ class DenseBody(LinearBody):
         """
         # before any matrix, whose rows may hold nothing but what round-off leaves of rigid motions
         if not conditions.hold(self._rigid_basis):
-            raise SingularResponse("the contact conditions leave a rigid motion free")
+            raise FreeMotion
         if self.n_pressures and np.linalg.svd(self._room[:, ~is_given], compute_uv=False)[-1] < _NO_ROOM:
             raise ClosedVolume
         # one equation, the condition of the same index, for each displacement that is sought

@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray, IntArray, spread_fractions
-from bemkit.contact.body import ContactState, LinearBody, SingularResponse
+from bemkit.contact.body import ContactState, FreeMotion, LinearBody, SingularResponse
 from bemkit.contact.condensation.held_friction import HeldFriction
 from bemkit.contact.condensation.nodes import ContactNodes, NoContactNodesError, free_motions, held_nodes
 from bemkit.contact.conditions import LinearConditions, stick
@@ -176,7 +176,7 @@ class HierarchicalBody(LinearBody):
         Prescribed displacements, zero tractions and slip tractions are fulfilled exactly, as by `DenseBody`.
         """
         if len(conditions.free_motions(self.rigid_motions())):
-            raise SingularResponse("the contact conditions leave a rigid motion free")
+            raise FreeMotion
         self._fields.clear()
         substituted = self._held_friction.substituted(conditions)
         state = self._held_friction.restored(conditions, self._solved(substituted))

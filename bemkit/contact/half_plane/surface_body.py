@@ -16,7 +16,7 @@ from functools import cached_property
 import numpy as np
 
 from bemkit.arrays import ComplexArray, FloatArray, IntArray
-from bemkit.contact.body import ContactState, LinearBody, SingularResponse
+from bemkit.contact.body import ContactState, FreeMotion, LinearBody
 from bemkit.contact.condensation.nodes import ContactNodes
 from bemkit.contact.conditions import LinearConditions, separated
 from bemkit.contact.equilibrium import Imbalance
@@ -181,7 +181,7 @@ class SurfaceBody(LinearBody):
     def respond(self, conditions: LinearConditions) -> ContactState:
         """Return the response; see `LinearBody.respond`."""
         if len(conditions.free_motions(self.rigid_motions())):
-            raise SingularResponse("the contact conditions leave a rigid motion free")
+            raise FreeMotion
         traction, motion = self._solved(ReducedConditions.of(_joined(conditions, self._supports)))
         displacement, n = self.rest + self.displacement_by(traction) + motion @ self.motions, self.n_contact
         return ContactState(

@@ -9,9 +9,9 @@ from functools import cached_property
 import numpy as np
 
 from bemkit.arrays import FloatArray
-from bemkit.contact.body import ContactState, LinearBody, SingularResponse
+from bemkit.contact.body import ContactState, FreeMotion, LinearBody, SingularResponse
 from bemkit.contact.condensation.dense_body import DenseBody
-from bemkit.contact.conditions import LinearConditions, RigidMotions
+from bemkit.contact.conditions import LinearConditions, RigidMotions, as_dense
 from bemkit.contact.equilibrium import NOISE_FACTOR, Imbalance
 from bemkit.contact.joined.coupled_members import CoupledMembers
 from bemkit.contact.joined.dense_form import RelativeStiffness
@@ -111,11 +111,21 @@ class JoinedBodies(CoupledMembers, LinearBody):
     def respond(self, conditions: LinearConditions) -> ContactState:
         """Return relative displacements and tractions; see `LinearBody.respond`."""
         if not self.responses_are_expensive:
-            return self._refined(conditions, self._dense.respond(conditions))
+            try:
+                return self._refined(conditions, self._dense.respond(conditions))
+            except SingularResponse:
+                self._check_moved(conditions)
+                raise
         self.held_friction.check(conditions)
-        if conditions.free_motions(self.rigid_motions()).shape[0]:
-            raise SingularResponse("the contact conditions leave a rigid motion free")
+        self._check_moved(conditions)
         return sparse_response(self, self._compliance, conditions)
+
+    def _check_moved(self, conditions: LinearConditions) -> None:
+        """Raise SingularResponse, which names them, if the conditions leave members free to move."""
+        free = conditions.free_motions(self.rigid_motions())
+        if free.shape[0]:
+            fitted = [np.abs(self._motion_fit(motion.ravel())) for motion in as_dense(free, self.n_contact)]
+            raise FreeMotion(self.moving_bodies(np.sum(fitted, axis=0)))
 
     def _refined(self, conditions: LinearConditions, state: ContactState) -> ContactState:
         """Return a response after one step of iterative refinement, against the round-off of the dense stiffness.
