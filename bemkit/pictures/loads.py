@@ -1,20 +1,23 @@
-"""Loads as arrows: tractions and pressures along the boundary, the weight, forces on rigid bodies."""
+"""Loads as arrows: tractions and pressures, the weight, forces on rigid bodies and on parts that move as such."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from bemkit.arrays import FloatArray
+from bemkit.geometry.vectors import cross
 from bemkit.pictures.drawing import VERMILION, Axes
 from bemkit.pictures.plane import BoundaryPoints, draw_arrows, evenly_spaced
 from bemkit.pictures.shown import DrawnBody, DrawnScene
 from bemkit.scene.body_forces import Gravity
-from bemkit.scene.conditions import Load
+from bemkit.scene.conditions import Load, RigidConnection
 
 _SPACING, _LONGEST = 0.04, 0.1
 """Distance of arrows, and length of the longest, relative to the picture."""
 _LEAST = 0.02
 """Least load that has an arrow, relative to the largest."""
+_POINTS_OF_BAR = 9
+"""Points of an element along which a rigid connection is drawn."""
 _MANY = 12
 """Least number of bodies whose weight is drawn once for all."""
 
@@ -30,7 +33,7 @@ def draw_loads(axes: Axes, shown: DrawnScene, factor: float) -> FloatArray:
     loaded: list[tuple[BoundaryPoints, FloatArray]] = []
     for body in shown.bodies:
         for part, elements in body.parts:
-            if isinstance(part.condition, Load):
+            if isinstance(part.condition, Load) and not isinstance(part.condition, RigidConnection):
                 places = evenly_spaced(body, elements, _SPACING * shown.size, factor)
                 loaded.append((places, part.condition.at(places.points, places.normals)))
     largest = max((float(np.hypot(*load.T).max()) for _, load in loaded), default=0.0)
@@ -38,6 +41,7 @@ def draw_loads(axes: Axes, shown: DrawnScene, factor: float) -> FloatArray:
     for places, load in loaded if largest > 0.0 else ():
         label = "load" if len(ends) == 1 else None
         ends.append(_draw_load(axes, places, _LONGEST * shown.size * load / largest, _LEAST, shown.size, label))
+    ends.append(_draw_connections(axes, shown, factor))
     ends.append(_draw_weights(axes, shown, factor))
     ends.append(_draw_forces(axes, shown, factor))
     return np.concatenate(ends)
@@ -53,6 +57,33 @@ def _draw_load(
     tails = np.where(presses[:, None], drawn - arrows, drawn)
     draw_arrows(axes, tails, arrows, VERMILION, label)
     return np.concatenate([tails, tails + arrows])
+
+
+def _draw_connections(axes: Axes, shown: DrawnScene, factor: float) -> FloatArray:
+    """Draw rigid connections as bars, with the force or else the moment in their middle; return the ends of arrows."""
+    from matplotlib.collections import LineCollection
+
+    ends, label = [np.zeros((0, 2))], "rigid connection"
+    connected = [(body, part.condition, elements) for body in shown.bodies for part, elements in body.parts]
+    for body, condition, elements in connected:
+        if not isinstance(condition, RigidConnection):
+            continue
+        xi = np.linspace(-1.0, 1.0, _POINTS_OF_BAR)
+        lines = body.mesh.points(elements, xi) + factor * body.displacement_at(elements, xi)
+        axes.add_collection(LineCollection(list(lines), colors=VERMILION, linewidths=4.0, zorder=2.5, label=label))
+        label = "_"  # none for the others
+        places = evenly_spaced(body, elements, _SPACING * shown.size, factor)
+        tractions = condition.at(places.points, places.normals)
+        middle = BoundaryPoints(*(values.mean(axis=0)[None] for values in places))
+        mean = tractions.mean(axis=0)[None]
+        if np.hypot(*mean.T) > _LEAST * np.hypot(*tractions.T).max():
+            arrow = _LONGEST * shown.size * mean / np.hypot(*mean.T)
+            ends.append(_draw_load(axes, middle, arrow, _LEAST, shown.size, "resultant" if len(ends) == 1 else None))
+        elif tractions.any():
+            is_left = cross(places.drawn - middle.drawn, tractions).sum() > 0.0
+            marker = r"$\circlearrowleft$" if is_left else r"$\circlearrowright$"
+            axes.plot(*middle.drawn.T, linestyle="", marker=marker, markersize=18, color=VERMILION, zorder=3)
+    return np.concatenate(ends)
 
 
 def _draw_weights(axes: Axes, shown: DrawnScene, factor: float) -> FloatArray:

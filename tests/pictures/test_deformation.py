@@ -147,6 +147,23 @@ def test_loads_are_arrows_with_their_heads_on_the_boundary_where_they_press() ->
     np.testing.assert_allclose(pull.U, 0.5 * pull.Y * push.U[0], rtol=1e-9)
 
 
+def test_rigid_connections_are_bars_with_their_resultant_in_the_middle() -> None:
+    parts = (
+        bk.Part("left", bk.Force(x=2.0, y=-2.0, is_rigid=True), ("left",)),
+        bk.Part("right", bk.Force(moment=1.0, is_rigid=True), ("right",)),
+    )
+    axes = draw_scene(pressed(bk.RigidHalfPlane((0.0, 1.5), (0.0, -1.0)), *parts))
+    legend = [text.get_text() for text in axes.get_legend().get_texts()]
+    assert legend == ["clamped", "rigid connection", "resultant", "obstacle"]
+    bars = [each for each in axes.collections if each.get_label() == "rigid connection"]
+    assert np.all(np.concatenate(bars[0].get_segments())[:, 0] == 0.0)
+    (arrow,) = (each for each in axes.collections if isinstance(each, Quiver))
+    np.testing.assert_allclose([arrow.X + arrow.U, arrow.Y + arrow.V], [[0.0], [0.5]], atol=1e-12)
+    np.testing.assert_allclose(arrow.U, -arrow.V)
+    turned = [line for line in axes.lines if line.get_marker() == r"$\circlearrowleft$"]
+    np.testing.assert_allclose(turned[0].get_xydata(), [[2.0, 0.5]])
+
+
 def test_supports_have_their_symbols_outside_of_the_body() -> None:
     parts = (
         bk.Part("left", bk.Roller(), ("left",)),
