@@ -72,7 +72,7 @@ class RigidResult(PartForce):
 
 @dataclass(frozen=True)
 class ContactForce(PartForce):
-    """Forces and sizes of a contact; forces and moment act on the body whose nodes carry the multipliers.
+    """Forces and sizes of a contact; forces and moment act on the body of the first elastic side in its name.
 
     Parameters
     ----------

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING
@@ -62,6 +63,7 @@ def solution_of(
     law = prepared.law if motion is None else prepared.law.at_slip(motion)
     sides = _contact_sides(prepared)
     resultants = _resultants(prepared, table)
+    on_first = [_on_first_side(own, sides[own[0].name]) for own in resultants]
     on_parts = forces_on_parts(
         pair
         for own in resultants
@@ -79,7 +81,7 @@ def solution_of(
         contact_sides=sides,
         contact_directions=prepared.frame[:, 0].copy(),
         friction_bound=bound_at(table, law),
-        contacts=contact_forces(table, depth, [own[0] for own in resultants], lengths, transitions),
+        contacts=contact_forces(table, depth, on_first, lengths, transitions),
         rigid={
             body.name: RigidResult(body.name, *(depth * reaction).tolist(), *moved.tolist())
             for body, (moved, reaction) in zip(prepared.scene.rigid, model.rigid_bodies(state), strict=True)
@@ -111,6 +113,12 @@ def _resultants(prepared: Prepared, table: ContactTable) -> list[list[PartForce]
         signed = zip((own, -own), rows.acting_at(prepared.bodies), strict=False)  # a rigid partner has no points
         resultants.append([nodal_resultant(rows.name, each, points) for each, points in signed])
     return resultants
+
+
+def _on_first_side(own: Sequence[PartForce], sides: Sequence[SideName]) -> PartForce:
+    """Return the resultant of a contact on the first elastic side of its name, whichever side has the nodes."""
+    is_second = len(own) > 1 and own[0].name.startswith(f"{sides[1].body}.{sides[1].part} / ")
+    return own[1] if is_second else own[0]
 
 
 def _contact_sides(prepared: Prepared) -> dict[str, tuple[SideName, ...]]:
