@@ -26,8 +26,7 @@ from rich.table import Table
 
 import bemkit as bk
 from bemkit.operators.collocation import compiled
-from bemkit.operators.collocation.equations import CollocationEquations
-from bemkit.operators.collocation.images import collocation_equations
+from bemkit.operators.collocation.equations import CollocationEquations, collocation_equations
 from bemkit.operators.hierarchy.tree import ClusterTree
 from bemkit.operators.matrix_free.fast_multipole import LEAF_SIZE, FastMultipole
 from bemkit.operators.steklov_poincare.hierarchical import HierarchicalCollocation

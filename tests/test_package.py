@@ -18,7 +18,7 @@ PACKAGE = Path(bemkit.__file__).parent
 CONTRIBUTING = Path(__file__).parent.parent / "CONTRIBUTING.md"
 NAME = "bemkit"
 NOT_NEEDED = (
-    *("operators.steklov_poincare.galerkin", "operators.forms", "operators.assembly", "operators.integrals.sweep"),
+    *("operators.steklov_poincare.galerkin", "operators.forms", "operators.assembly"),
     "operators.matrix_free.cost",
     *("operators.particular_solutions", "model.particular", "model.free_motion", "model.contact_free_body"),
     *("geometry.drawn", "geometry.nurbs", "geometry.files", "geometry.arclength"),
@@ -30,12 +30,15 @@ NOT_NEEDED = (
     *("model.obstacle_travel", "model.overlaps", "model.shapes", "results.load_history", "scene.written_tables"),
     *("operators.half_plane", "operators.kernels", "operators.collocation.curved_elements"),
     *("operators.steklov_poincare.forces_inside", "operators.steklov_poincare.rigid_connection"),
-    *("operators.hierarchy", "operators.integrals.curved_geometry", "model.matched_sides", "results.law_jumps"),
+    *("operators.hierarchy", "model.matched_sides", "results.law_jumps"),
     *("geometry.symmetry", "geometry.surface", "scene.body_forces", "scene.contacts", "scene.copies"),
     *("scene.load_history", "scene.plane_motion", "scene.profiles", "scene.steps"),
+    *("operators.integrals", "operators.collocation.images"),
+    *("operators.linear.null_space", "contact.condensation.held_friction", "table", "atomic_files"),
+    *("model.finite_sliding", "results.moved_contacts"),
 )
 """Of a scene with one body of straight sides on one obstacle, solved by collocation from a number of elements."""
-MOST_MODULES = 132
+MOST_MODULES = 122
 """Modules of the package that may be loaded to solve a simple scene, packages and command line counted."""
 HEAVY = ("scipy.sparse.linalg", "h5py", "pyamg", "matplotlib", "meshio", "rich", "click")
 

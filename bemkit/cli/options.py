@@ -164,9 +164,9 @@ def study_output(target: str | None, table: Callable[[Content], Table]) -> tuple
 
 def reserve(paths: Iterable[Path]) -> None:
     """Keep files, if any, for this process until the command ends; see `bemkit.atomic_files.reserved`."""
-    from bemkit.atomic_files import reserved
-
     if files := list(paths):
+        from bemkit.atomic_files import reserved
+
         click.get_current_context().with_resource(reserved(files))
 
 

@@ -8,24 +8,27 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Generic, TypeVar
 
-from bemkit.atomic_files import OutputFileError, check_target, write_text
 from bemkit.cli.streams import print_data
-from bemkit.table import Table
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from rich.console import Console
     from rich.table import Table as PrintedTable
 
+    from bemkit.table import Table
+
 STDOUT = "-"
 Content = TypeVar("Content")
-TABLE_TEXTS: dict[str, Callable[[Table], str]] = {
-    ".csv": Table.to_csv,
-    ".json": Table.to_json,
-    ".md": Table.to_markdown,
-}
+_TABLE_TEXTS: Mapping[str, Callable[[Table], str]] = MappingProxyType(
+    {
+        ".csv": lambda table: table.to_csv(),
+        ".json": lambda table: table.to_json(),
+        ".md": lambda table: table.to_markdown(),
+    }
+)
 """Texts of a table by the ending of a file."""
 
 
@@ -50,7 +53,7 @@ class TextFile(Generic[Content]):
         ------
         OutputFileError
         """
-        return [] if self.target in (None, STDOUT) else [check_target(Path(str(self.target)))]
+        return [] if self.target in (None, STDOUT) else [_checked(Path(str(self.target)))]
 
     def write(self, content: Content) -> None:
         """Write the text of some content to the file or to standard output, if it is wanted.
@@ -62,7 +65,7 @@ class TextFile(Generic[Content]):
         if self.target == STDOUT:
             print_data(self.text(content))
         elif self.target is not None:
-            write_text(Path(self.target), self.text(content))
+            _write(Path(self.target), self.text(content))
 
 
 @dataclass(frozen=True)
@@ -89,13 +92,15 @@ class TableFile(Generic[Content]):
         if self.target is None:
             return []
         path = Path(self.target)
-        if path.suffix.lower() not in (*TABLE_TEXTS, ".h5", ".hdf5"):
-            endings = ", ".join((*TABLE_TEXTS, ".h5"))
+        if path.suffix.lower() not in (*_TABLE_TEXTS, ".h5", ".hdf5"):
+            endings = ", ".join((*_TABLE_TEXTS, ".h5"))
+            from bemkit.atomic_files import OutputFileError
+
             raise OutputFileError(
                 f"{path}: the ending {path.suffix!r} names no format of tables: give one of {endings}, or .jsonl for "
                 "rows that an interrupted study resumes from"
             )
-        return [check_target(path)]
+        return [_checked(path)]
 
     def write(self, content: Content) -> None:
         """Write the table of some content, if it is wanted.
@@ -107,8 +112,8 @@ class TableFile(Generic[Content]):
         if self.target is None:
             return
         path, table = Path(self.target), self.table(content)
-        if path.suffix.lower() in TABLE_TEXTS:
-            write_text(path, TABLE_TEXTS[path.suffix.lower()](table))
+        if path.suffix.lower() in _TABLE_TEXTS:
+            _write(path, _TABLE_TEXTS[path.suffix.lower()](table))
         else:
             table.to_hdf5(path)
 
@@ -152,6 +157,8 @@ class Outputs(Generic[Content]):
         places = [text.target for text in self.texts if text.target is not None]
         if len(set(targets)) < len(targets) or places.count(STDOUT) > 1:
             shown = ", ".join([*map(str, others), *places])
+            from bemkit.atomic_files import OutputFileError
+
             raise OutputFileError(f"two outputs go to the same file ({shown}): name two files")
         if self.folder is not None:
             from bemkit.pictures.figure_files import check_figure_folder
@@ -172,6 +179,18 @@ class Outputs(Generic[Content]):
             from bemkit.pictures.figure_files import write_figures
 
             write_figures(self.figures(content), Path(self.folder), self.dots_per_inch)
+
+
+def _checked(path: Path) -> Path:
+    from bemkit.atomic_files import check_target  # only needed where something is written
+
+    return check_target(path)
+
+
+def _write(path: Path, text: str) -> None:
+    from bemkit.atomic_files import write_text
+
+    write_text(path, text)
 
 
 def stdout_console(console: Console | None = None, *, width: int | None = None) -> Console:

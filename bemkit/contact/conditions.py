@@ -13,7 +13,7 @@ import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray
 from bemkit.errors import InputError
-from bemkit.operators.linear.null_space import NULL_TOLERANCE, null_space
+from bemkit.operators.rigid_modes import NULL_TOLERANCE
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
@@ -169,6 +169,8 @@ class LinearConditions:
 
     def _sparse_free_motions(self, motions: csr_array) -> csr_array:
         from scipy import sparse
+
+        from bemkit.operators.linear.null_space import null_space
 
         nodes = np.arange(self.n_contact)
         blocks = np.ascontiguousarray(self._scaled_on_displacement)

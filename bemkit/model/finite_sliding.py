@@ -7,8 +7,6 @@ the wrong place: bodies may then come to rest where there is no equilibrium.
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray
@@ -16,53 +14,25 @@ from bemkit.contact.obstacle import SIMPLE_OBSTACLES, Obstacle, measure_contact
 from bemkit.geometry.spaces import element_nodes
 from bemkit.geometry.vectors import norms
 from bemkit.model.contacts import ContactInterface
-from bemkit.model.model import Model
 from bemkit.model.placed import PlacedBody
 from bemkit.model.prepared import Prepared
 from bemkit.scene.conditions import Contact
 from bemkit.scene.unit_names import amount
-from bemkit.solvers.base import ContactSolution, Status
 
-_BY_DEFORMATION = 5.0
-"""Largest motion along a contact that counts as deformation, in displacements by contact forces."""
 _OFF = 0.2
 """Change of gaps that makes pressures wrong, relative to the displacement by contact forces."""
 _LEAST_COSINE = 0.866
 """Cosine of the angle by which a direction of contact may turn: 30 degrees."""
 _LEAST_FACING = 0.5
 """Cosine of 60 degrees between the normal of a body and the direction of contact, below which contact is oblique."""
-_ROUND_OFF = 1e-9
-"""Displacement by contact forces that is round-off, relative to the largest one."""
 _SHARE_OF_ZONE = 0.05
 """Largest motion that is longer than an element, relative to the length of contact."""
 
 
-def with_sliding_checked(model: Model, result: ContactSolution) -> ContactSolution:
-    """Return the outcome of a solve, named FINITE_SLIDING if a contact has moved too far along its surface."""
-    prepared = model.prepared
-    if not result.is_converged or not prepared.n_contact:
-        return result
-    ends = np.cumsum([rows.n_contact for rows in prepared.rows])[:-1]
-    displacements = np.split(result.state.displacement * prepared.units.displacement, ends)
-    tractions = np.split(result.state.traction * prepared.units.stress, ends)
-    forces = [rows.weights @ norms(traction) for rows, traction in zip(prepared.rows, tractions, strict=True)]
-    softest = min(body.material.plane_modulus for body in prepared.bodies)
-    deformation = float(max(forces)) / softest
-    if deformation <= _ROUND_OFF * max(float(np.abs(displacement).max()) for displacement in displacements):
-        return result
-    for rows, displacement, traction in zip(prepared.rows, displacements, tractions, strict=True):
-        # not by their friction, which some laws exert across a gap
-        reason = _moved(prepared, rows, displacement, traction[:, 0] != 0.0, deformation)
-        if reason:
-            status = Status.FINITE_SLIDING
-            return replace(result, status=status, message=f"{status.value} [{reason}]")
-    return result
-
-
-def _moved(
+def why_off(
     prepared: Prepared, rows: ContactInterface, displacement: FloatArray, is_pressed: BoolArray, deformation: float
 ) -> str:
-    """Describe how far the pressed nodes of a contact move along it; empty if gaps and directions still hold.
+    """Describe how far the pressed nodes of a contact move; empty if gaps and directions still hold.
 
     Parameters
     ----------
@@ -74,8 +44,6 @@ def _moved(
     deformation : float [m]
         The displacement that contact forces cause.
     """
-    if not is_pressed.any() or norms(displacement[is_pressed]).max() <= _BY_DEFORMATION * deformation:
-        return ""
     number = rows.other - len(prepared.bodies)
     if number < 0 <= rows.other:
         is_off = _is_off_side(rows, displacement[:, 1], is_pressed, deformation)

@@ -15,16 +15,20 @@ from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.spaces import BoundarySpace, element_nodes
 from bemkit.model.units import Units
 from bemkit.operators.linear.solvers import (
+    Automatic,
     ChosenLinearSolver,
+    DenseCholesky,
     Hierarchical,
+    LinearSolver,
     LinearSolverChoice,
+    MatrixFree,
     choose_linear_solver,
 )
 from bemkit.operators.pair_form import Tag
 from bemkit.operators.steklov_poincare import SteklovPoincare, TractionField
 from bemkit.operators.steklov_poincare.cost import BodyCase, physical_memory
-from bemkit.operators.steklov_poincare.hierarchical_cost import choose_collocation_solver
 from bemkit.operators.steklov_poincare.nodal_conditions import (
+    SLIDES,
     ConflictingSupportsError,
     GivenData,
     NodalConditions,
@@ -47,6 +51,14 @@ from bemkit.scene.conditions import (
 if TYPE_CHECKING:
     from bemkit.operators.half_plane.far_motion import FarMotion
     from bemkit.operators.steklov_poincare.forces_inside import ForcesInside
+
+_DIRECT: LinearSolver = DenseCholesky()
+_FEWEST_ELEMENTS = 200
+"""Smallest number of elements of compressed equations."""
+_MOST_LOOPS = 41
+"""An outer curve and 40 holes: each closed curve adds an equation that passes through the whole tree."""
+_LEAST_COMPRESSIBILITY = 1e-8
+"""Smallest 1/2 - nu of a body with holes; below, the clusters of the tree are nearly singular."""
 
 
 def held_nodes(scene: BodyScene, mesh: BoundaryMesh, units: Units, space: BoundarySpace) -> NodalConditions:
@@ -253,7 +265,7 @@ def linear_solver_of(
 
         # a map that derives from collocation may change what it condenses: only bemkit's own equations are compressed
         hindrance = "" if type(elastic) is CollocationElasticity else f"{method} has no such equations"
-        return choose_collocation_solver(requested, case, physical_memory(), hindrance)
+        return _collocation_solver(requested, case, hindrance)
     if isinstance(requested, Hierarchical) and case.mesh.surface is None:
         raise InputError(
             f"linear_solver is 'hierarchical', but discretisation {method} has dense equations only: "
@@ -261,3 +273,64 @@ def linear_solver_of(
             'linear_solver = "automatic"'
         )
     return choose_linear_solver(requested)
+
+
+def _collocation_solver(requested: LinearSolverChoice, case: BodyCase, hindrance: str = "") -> ChosenLinearSolver:
+    """Choose between the dense and the compressed equations of collocation.
+
+    Parameters
+    ----------
+    requested : LinearSolver, Hierarchical or Automatic
+    case : BodyCase
+        Its linear solver is ignored.
+    hindrance : str, optional
+        Further reason why the equations cannot be compressed.
+
+    Returns
+    -------
+    ChosenLinearSolver
+        Compressed equations if they are requested, predicted to be at least twice as fast, or the only ones that fit
+        into memory.
+    """
+    if isinstance(requested, MatrixFree):
+        from bemkit.operators.matrix_free.cost import why_stored
+
+        if not (stored := hindrance or why_stored(case)):
+            return ChosenLinearSolver(_DIRECT, "asked for", requested)
+        other = _collocation_solver(Automatic(), case, hindrance)
+        return replace(other, reason=f"not matrix-free, because {stored}; {other.reason}")
+    if not isinstance(requested, Automatic | Hierarchical):
+        return ChosenLinearSolver(requested, "asked for")
+    if hindrance := hindrance or _why_dense(case):
+        return ChosenLinearSolver(_DIRECT, f"the equations are not compressed, because {hindrance}")
+    if isinstance(requested, Hierarchical):
+        return ChosenLinearSolver(_DIRECT, "asked for", requested)
+    from bemkit.operators.steklov_poincare.hierarchical_cost import compressed_if_cheaper
+
+    return compressed_if_cheaper(case, physical_memory())
+
+
+def _why_dense(case: BodyCase) -> str:
+    """Return why the equations of a body cannot be compressed; empty if they can."""
+    mesh = case.mesh
+    if mesh.n_elements < _FEWEST_ELEMENTS:
+        return f"{mesh.n_elements} elements are few"
+    if len(mesh.loops) > _MOST_LOOPS:
+        return f"the boundary has {len(mesh.loops)} closed curves"
+    if _is_incompressible_with_holes(case):
+        return "the material is incompressible, and the body has holes"
+    if _is_enclosed(case):
+        return "contact and supports take all of the boundary of the incompressible body"
+    return ""
+
+
+def _is_incompressible_with_holes(case: BodyCase) -> bool:
+    """Whether the pressure in each hole is nearly undetermined, which makes clusters around holes nearly singular."""
+    return len(case.mesh.loops) > 1 and case.material.effective_poisson_ratio > 0.5 - _LEAST_COMPRESSIBILITY
+
+
+def _is_enclosed(case: BodyCase) -> bool:
+    """Whether the pressure of an incompressible body is unknown until contact is: clusters do not determine it."""
+    normals = case.conditions.in_frames(case.mesh.normals)
+    changes = case.conditions.is_free & (np.abs(normals) > SLIDES)
+    return case.material.is_incompressible and not case.mesh.is_exterior and not changes.any()

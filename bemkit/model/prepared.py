@@ -36,13 +36,7 @@ from bemkit.operators.material import Material
 from bemkit.operators.pair_form import Tag
 from bemkit.operators.steklov_poincare import SteklovPoincare
 from bemkit.operators.steklov_poincare.cost import BodyCase
-from bemkit.operators.steklov_poincare.hierarchical_cost import LARGEST_BLOCK
-from bemkit.operators.steklov_poincare.nodal_conditions import (
-    GivenData,
-    NodalConditions,
-    free_modes,
-    turning,
-)
+from bemkit.operators.steklov_poincare.nodal_conditions import GivenData, NodalConditions, free_modes, turning
 from bemkit.result_warning import ResultWarning
 from bemkit.scene.mesh_options import thinness_warnings
 from bemkit.scene.scene import Scene
@@ -185,8 +179,11 @@ class Prepared:
     def largest_matrix(self) -> int:
         """Order of the largest matrix that is factored, roughly."""
         body = max(self.bodies, key=lambda body: body.space.n_dofs)
-        is_compressed = self.linear_solver(body).hierarchical is not None
-        return min(LARGEST_BLOCK, body.space.n_dofs) if is_compressed else body.space.n_dofs
+        if self.linear_solver(body).hierarchical is None:
+            return body.space.n_dofs
+        from bemkit.operators.steklov_poincare.hierarchical_cost import LARGEST_BLOCK
+
+        return min(LARGEST_BLOCK, body.space.n_dofs)
 
     def column(self, name: str) -> FloatArray:
         """Return a column of `ContactInterface` for all contact nodes."""

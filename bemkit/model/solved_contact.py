@@ -1,4 +1,4 @@
-"""Checks of a solved contact state: warnings in sentences, negative energy.
+"""Checks of a solved contact state: warnings in sentences, negative energy, long motions.
 
 The elastic energy of no body can be negative, but that of a discrete one can. Collocation does not make the stiffness
 symmetric and positive semidefinite, as Galerkin's method does: on elements that are much longer than a body is thick it
@@ -16,6 +16,7 @@ import numpy as np
 from bemkit.arrays import FloatArray, IntArray
 from bemkit.contact.equilibrium import NOISE_FACTOR, round_off_of
 from bemkit.geometry.spaces import BoundarySpace, dof_points
+from bemkit.geometry.vectors import norms
 from bemkit.model.contacts import ContactInterface
 from bemkit.model.model import Model
 from bemkit.model.prepared import PreparedBody
@@ -40,6 +41,10 @@ _OF_DIFFERENCES = 4.0
 """Rounding errors in a strain, of the size of the displacements: of these, of the motion, of their difference."""
 _ELIMINATION_TOLERANCE = 64.0 * float(np.finfo(float).eps)
 """Round-off of the condensed stiffness, relative to the sensitivity of the whole body."""
+_BY_DEFORMATION = 5.0
+"""Largest motion along a contact that counts as deformation, in displacements by contact forces."""
+_NO_FORCE = 1e-9
+"""Displacement by contact forces that is round-off, relative to the largest one."""
 
 
 def contact_warnings(
@@ -252,3 +257,28 @@ def _named_negative(result: ContactSolution, reason: str) -> ContactSolution:
     """Return an outcome with the status NEGATIVE_ENERGY and a reason."""
     status = Status.NEGATIVE_ENERGY
     return replace(result, status=status, message=f"{status.value} [{reason}]")
+
+
+def with_sliding_checked(model: Model, result: ContactSolution) -> ContactSolution:
+    """Return the outcome of a solve, named FINITE_SLIDING if a contact has moved too far along its surface."""
+    prepared = model.prepared
+    if not result.is_converged or not prepared.n_contact:
+        return result
+    ends = np.cumsum([rows.n_contact for rows in prepared.rows])[:-1]
+    displacements = np.split(result.state.displacement * prepared.units.displacement, ends)
+    tractions = np.split(result.state.traction * prepared.units.stress, ends)
+    forces = [rows.weights @ norms(traction) for rows, traction in zip(prepared.rows, tractions, strict=True)]
+    softest = min(body.material.plane_modulus for body in prepared.bodies)
+    deformation = float(max(forces)) / softest
+    if deformation <= _NO_FORCE * max(float(np.abs(displacement).max()) for displacement in displacements):
+        return result
+    for rows, displacement, traction in zip(prepared.rows, displacements, tractions, strict=True):
+        is_pressed = traction[:, 0] != 0.0  # not by their friction, which some laws exert across a gap
+        if not is_pressed.any() or norms(displacement[is_pressed]).max() <= _BY_DEFORMATION * deformation:
+            continue
+        from bemkit.model.finite_sliding import why_off
+
+        if reason := why_off(prepared, rows, displacement, is_pressed, deformation):
+            status = Status.FINITE_SLIDING
+            return replace(result, status=status, message=f"{status.value} [{reason}]")
+    return result

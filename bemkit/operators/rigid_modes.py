@@ -7,6 +7,10 @@ import numpy as np
 from bemkit.arrays import FloatArray
 from bemkit.geometry.mesh import BoundaryMesh
 
+NULL_TOLERANCE = 1e-9
+"""Largest singular value of conditions that leave a motion free. Round-off of normals gives 1e-16, one held node in a
+million 1e-3."""
+
 
 def rigid_motions(points: FloatArray, centre: FloatArray, length: float) -> FloatArray:
     """Return the displacements of two unit translations and of the rotation about `centre`.

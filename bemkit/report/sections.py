@@ -9,7 +9,7 @@ from bemkit.hdf5 import provenance
 from bemkit.pictures.shown import Result
 from bemkit.plan import Plan
 from bemkit.report.html import Element, element, facts, number, table
-from bemkit.results.contact_table import CONTACT_COLUMNS
+from bemkit.results.file_meanings import CONTACT_COLUMNS
 from bemkit.results.tables import RESULTANT_COLUMNS, history_columns, in_units
 from bemkit.scene.toml import SceneError, scene_to_toml
 from bemkit.scene.written_tables import UnstructureError

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cached_property
 from types import MappingProxyType
 from typing import Any
@@ -14,7 +14,6 @@ from bemkit.arrays import BoolArray, FloatArray, IntArray, read_only
 from bemkit.contact.laws import FrictionLaw
 from bemkit.errors import InputError
 from bemkit.solvers.active_sets import NodeStatus
-from bemkit.table import Column
 
 STATUS_WORDS: Mapping[NodeStatus, str] = MappingProxyType(
     {
@@ -24,21 +23,6 @@ STATUS_WORDS: Mapping[NodeStatus, str] = MappingProxyType(
         NodeStatus.SLIP_BACKWARD: "slip",
     }
 )
-CONTACT_COLUMNS = (
-    Column("x", "m", "first coordinate", ".6g"),
-    Column("y", "m", "second coordinate", ".6g"),
-    Column("s", "m", "arc length from the start of the part", ".6g"),
-    Column("u_n", "m", "displacement towards the obstacle or the partner", ".6g"),
-    Column("u_t", "m", "displacement along the tangent", ".6g"),
-    Column("sigma_n", "Pa", "normal traction, negative where pressed", ".6g"),
-    Column("sigma_t", "Pa", "tangential traction", ".6g"),
-    Column("gap", "m", "initial distance", ".6g"),
-    Column("clearance", "m", "distance left, gap - u_n", ".6g"),
-    Column("status", "", "separated, slip or stick; in files 0, 1 stick, 2 slip along the tangent, 3 slip against it"),
-    Column("weight", "m", "length of boundary of the node", ".6g"),
-    Column("part", "", "contact part or contact of each node"),
-)
-"""Columns of the contact table in results, tables and files."""
 
 _STRAIGHT = 1e-9
 """Distance of nodes from a horizontal line that is round-off, relative to the length of the contact."""
@@ -216,7 +200,7 @@ class ContactTable:
 
     def columns(self) -> dict[str, FloatArray | IntArray]:
         """Return the numerical columns by name."""
-        return {head.name: getattr(self, head.name) for head in CONTACT_COLUMNS if head.name != "part"}
+        return {entry.name: getattr(self, entry.name) for entry in fields(self) if entry.name != "part"}
 
     def status_words(self) -> list[str]:
         """Return ``"separated"``, ``"slip"`` or ``"stick"`` for each node."""

@@ -5,12 +5,27 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
-from bemkit.results.contact_table import CONTACT_COLUMNS
 from bemkit.scene.unit_names import QUANTITIES, UnitNames, unit_of
+from bemkit.table import Column
 
 if TYPE_CHECKING:
     import h5py
 
+CONTACT_COLUMNS = (
+    Column("x", "m", "first coordinate", ".6g"),
+    Column("y", "m", "second coordinate", ".6g"),
+    Column("s", "m", "arc length from the start of the part", ".6g"),
+    Column("u_n", "m", "displacement towards the obstacle or the partner", ".6g"),
+    Column("u_t", "m", "displacement along the tangent", ".6g"),
+    Column("sigma_n", "Pa", "normal traction, negative where pressed", ".6g"),
+    Column("sigma_t", "Pa", "tangential traction", ".6g"),
+    Column("gap", "m", "initial distance", ".6g"),
+    Column("clearance", "m", "distance left, gap - u_n", ".6g"),
+    Column("status", "", "separated, slip or stick; in files 0, 1 stick, 2 slip along the tangent, 3 slip against it"),
+    Column("weight", "m", "length of boundary of the node", ".6g"),
+    Column("part", "", "contact part or contact of each node"),
+)
+"""Columns of the contact table in results, tables and files."""
 _BOUNDARY = {
     "points": ("length", "nodes of the displacements"),
     "centres": ("length", "centres of the elements"),

@@ -14,7 +14,7 @@ from bemkit.contact.certificate import Certificate
 from bemkit.errors import InputError
 from bemkit.geometry.local_values import values_on_elements
 from bemkit.geometry.vectors import components_before
-from bemkit.results.contact_table import CONTACT_COLUMNS
+from bemkit.results.file_meanings import CONTACT_COLUMNS
 from bemkit.results.pressure_distribution import PressureShare, pressure_shares
 from bemkit.results.solution import Solution
 from bemkit.results.solved_body import SolvedBody

@@ -16,7 +16,7 @@ from bemkit.errors import InputError
 from bemkit.model.model import Model, build_model
 from bemkit.model.placed import Meshes
 from bemkit.model.prepared import Prepared, prepare_steps
-from bemkit.model.solved_contact import with_energies_checked
+from bemkit.model.solved_contact import with_energies_checked, with_sliding_checked
 from bemkit.operators.linear.threads import blas_threads_for
 from bemkit.plan import Plan, announce_plan, check_elements, check_memory, plan_steps
 from bemkit.results.solved_steps import following
@@ -69,8 +69,6 @@ def checked(model: Model, result: ContactSolution) -> ContactSolution:
         from bemkit.model.turning import with_turning_checked
 
         result = with_turning_checked(model, result)
-    from bemkit.model.finite_sliding import with_sliding_checked
-
     return with_sliding_checked(model, result)
 
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from bemkit.arrays import FloatArray, IntArray
 from bemkit.contact.laws import FrictionLaw
-from bemkit.contact.obstacle import SIMPLE_OBSTACLES
+from bemkit.contact.obstacle import SIMPLE_OBSTACLES, Obstacle
 from bemkit.contact.problem import LawError
 from bemkit.errors import InputError, Mistakes
 from bemkit.formulas import choices
@@ -152,10 +152,14 @@ class BodyScene:
         return tuple(part for part in self.parts if isinstance(part.condition, Contact))
 
     @property
+    def obstacles(self) -> tuple[Obstacle, ...]:
+        """The obstacles of these parts."""
+        return tuple(part.condition.obstacle for part in self.parts if isinstance(part.condition, Contact))
+
+    @property
     def may_touch_profiles(self) -> bool:
         """Whether an obstacle may be a measured profile; only such scenes load the module of profiles."""
-        obstacles = [part.condition.obstacle for part in self.parts if isinstance(part.condition, Contact)]
-        return any(not isinstance(obstacle, SIMPLE_OBSTACLES) for obstacle in obstacles)
+        return not all(isinstance(obstacle, SIMPLE_OBSTACLES) for obstacle in self.obstacles)
 
     @property
     def cannot_turn(self) -> bool:

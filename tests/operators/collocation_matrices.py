@@ -8,7 +8,7 @@ from bemkit.arrays import ComplexArray, FloatArray
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.operators.collocation.curved_elements import CollocationPoints
 from bemkit.operators.collocation.gradient_reconstruction import GradientReconstruction
-from bemkit.operators.integrals.element_geometry import ElementGeometry
+from bemkit.operators.element_geometry import ElementGeometry
 from bemkit.operators.material import Material
 
 

@@ -31,7 +31,7 @@ from bemkit.geometry import (
 )
 from bemkit.geometry.neighbours import corner_nodes
 from bemkit.geometry.placement import Placement
-from bemkit.operators.integrals.element_geometry import ElementGeometry
+from bemkit.operators.element_geometry import ElementGeometry
 from bemkit.operators.integrals.inner import inner_integrals, inner_on_element
 from bemkit.operators.integrals.pairs import Degrees, PairIntegrals
 from bemkit.operators.integrals.sweep import PairSweep

@@ -17,7 +17,7 @@ from bemkit.geometry import BoundaryMesh, Disk, ExteriorOf, ParametricCurve, Pol
 from bemkit.geometry.neighbours import corner_nodes
 from bemkit.geometry.outline import Outline, Side
 from bemkit.geometry.spaces import BoundarySpace, ConstantSpace, LinearSpace, QuadraticSpace, dof_points
-from bemkit.operators.integrals.element_geometry import ElementGeometry
+from bemkit.operators.element_geometry import ElementGeometry
 from bemkit.operators.material import Material, Plane
 from bemkit.operators.somigliana.fields import InteriorFields
 from bemkit.operators.somigliana.locate import PointNotInsideError

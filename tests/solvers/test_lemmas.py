@@ -10,19 +10,18 @@ import pytest
 from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 
-from bemkit.contact import projection
 from bemkit.contact.laws import Coulomb, Tresca
 from bemkit.contact.problem import ContactProblem, ContactState
 from bemkit.model.model import build_model
 from bemkit.model.prepared import prepare
 from bemkit.solvers import active_sets
-from bemkit.solvers.active_sets import ProjectionEquations
+from bemkit.solvers.active_sets import ProjectionEquations, clip_to_bound
 from bemkit.solvers.alm import AugmentedLagrangian
 from bemkit.solvers.base import solve
 from bemkit.solvers.ssn import SemismoothNewton
-from tests.contact.test_projection import N, bounds, numbers, pairs, positive, vector
 from tests.handmade import block_problem, random_body
 from tests.scenes import small_paper_scene
+from tests.solvers.test_projection import N, bounds, numbers, pairs, positive, vector
 
 BODY = random_body(np.random.default_rng(0), N)
 LAWS = st.one_of(st.builds(Coulomb, st.floats(0.0, 3.0)), st.builds(Tresca, st.floats(0.0, 50.0)))
@@ -97,7 +96,7 @@ def vector_solution(z, bound):
     return z + traction, traction
 
 
-def check_vectors(z, bound, step, clip=projection.clip_to_bound):
+def check_vectors(z, bound, step, clip=clip_to_bound):
     """(16), and (36) at each node, for tangential vectors."""
     slip, traction = vector_solution(z, bound)
     assert np.abs(traction + clip(slip - traction, bound)).max() <= ROUND_OFF
@@ -117,7 +116,7 @@ def test_lemmas_2_and_4_for_vectors(z, bound, step):
 def test_lemma_2_backward_for_vectors(z, bound, error):
     """With z kept, another traction leaves its difference."""
     slip, traction = vector_solution(z, bound)
-    value = traction + error + projection.clip_to_bound((slip + error) - (traction + error), bound)
+    value = traction + error + clip_to_bound((slip + error) - (traction + error), bound)
     assert np.allclose(value, error, atol=ROUND_OFF)
 
 
@@ -179,7 +178,7 @@ def test_the_lemmas_for_vectors_catch_each_wrong_projection(name):
 def test_lemma_4_fails_with_two_bounds(bound, other):
     """Equal arguments outside both balls: the left side is zero, the right side is the squared difference of bounds."""
     z = np.array([[2.0 * (bound + other) + 1.0, 0.0]])
-    difference = projection.clip_to_bound(z, other) - projection.clip_to_bound(z, bound)
+    difference = clip_to_bound(z, other) - clip_to_bound(z, bound)
     left, right = (difference * (z - z)).sum(), (difference * difference).sum()
     assert left == 0.0
     assert right == pytest.approx((bound - other) ** 2)

@@ -2,9 +2,14 @@
 
 import pytest
 
-from bemkit.contact import projection
 from bemkit.contact.laws import Coulomb
 from bemkit.solvers import active_sets
+from bemkit.solvers.active_sets import (
+    clip_to_bound,
+    clip_to_bound_derivative,
+    positive_part,
+    positive_part_derivative,
+)
 from bemkit.solvers.alm import AugmentedLagrangian
 from bemkit.solvers.base import solve
 from bemkit.solvers.fixed_point import FixedPoint
@@ -16,10 +21,10 @@ DRIVERS = [NEWTON, AugmentedLagrangian(max_steps=20), FixedPoint(NEWTON, max_ste
 PROBLEM = block_problem(Coulomb(0.5), n=6)
 
 WRONG = {
-    "positive_part": lambda a: -projection.positive_part(a),
-    "positive_part_derivative": lambda a: 1.0 - projection.positive_part_derivative(a),
-    "clip_to_bound": lambda x, bound: -projection.clip_to_bound(x, bound),
-    "clip_to_bound_derivative": lambda x, bound: tuple(-part for part in projection.clip_to_bound_derivative(x, bound)),
+    "positive_part": lambda a: -positive_part(a),
+    "positive_part_derivative": lambda a: 1.0 - positive_part_derivative(a),
+    "clip_to_bound": lambda x, bound: -clip_to_bound(x, bound),
+    "clip_to_bound_derivative": lambda x, bound: tuple(-part for part in clip_to_bound_derivative(x, bound)),
 }
 
 

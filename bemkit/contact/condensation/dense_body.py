@@ -1,18 +1,23 @@
 """A body given by its dense stiffness matrix."""
 
+from __future__ import annotations
+
 import math
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from bemkit.arrays import AnyArray, BoolArray, FloatArray, IntArray, read_only, spread_fractions
 from bemkit.contact.body import ClosedVolume, ContactState, FreeMotion, LinearBody, SingularResponse
-from bemkit.contact.condensation.held_friction import HeldFriction
 from bemkit.contact.conditions import LinearConditions, orthonormal
 from bemkit.contact.equilibrium import Imbalance, Unbalanced
 from bemkit.errors import InputError
 from bemkit.operators.steklov_poincare.nodal_conditions import SLIDES
+
+if TYPE_CHECKING:
+    from bemkit.contact.condensation.held_friction import HeldFriction
 
 _SMALLEST_RCOND = 1e-13
 """Below this reciprocal condition number of a row-scaled system its matrix counts as singular. The condensed stiffness
@@ -135,6 +140,8 @@ class DenseBody(LinearBody):
                 normal = int(np.searchsorted(self.unknown_dofs, 2 * node))
                 if not np.delete(row, normal).any():
                     slope[node] = row[normal]
+        from bemkit.contact.condensation.held_friction import HeldFriction
+
         return HeldFriction(self.tangent_follows, slope)
 
     @cached_property
@@ -164,7 +171,12 @@ class DenseBody(LinearBody):
         Prescribed displacements, zero tractions and slip tractions are met exactly, not just to round-off, so that
         ties such as ``|sigma_t| = s |sigma_n|`` are decided alike in all units.
         """
-        given, conditions = conditions, self.held_friction.substituted(conditions)
+        if self.following_tangents is None:
+            return self._response(conditions)
+        state = self._response(self.held_friction.substituted(conditions))
+        return self.held_friction.restored(conditions, state)
+
+    def _response(self, conditions: LinearConditions) -> ContactState:
         own = [0, 1]
         acts_on_displacement = np.any(conditions.on_displacement != 0.0, axis=2)
         acts_on_traction = np.any(conditions.on_traction != 0.0, axis=2)
@@ -183,8 +195,7 @@ class DenseBody(LinearBody):
         traction = np.zeros_like(displacement)
         traction.flat[self.unknown_dofs] = (self.stiffness @ unknowns - self.load)[: self.n_unknowns]
         traction /= self.weights[:, None]
-        state = ContactState(displacement, conditions.with_given_tractions(traction))
-        return self.held_friction.restored(given, state)
+        return ContactState(displacement, conditions.with_given_tractions(traction))
 
     def rigid_motions(self) -> FloatArray:
         """Return the motions given to the constructor."""

@@ -21,8 +21,8 @@ from bemkit.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from bemkit.geometry.quadrature import gauss_legendre
 from bemkit.operators import kernels
 from bemkit.operators.collocation.layers import Constants
+from bemkit.operators.element_geometry import ElementGeometry
 from bemkit.operators.integrals import curved_geometry
-from bemkit.operators.integrals.element_geometry import ElementGeometry
 from bemkit.operators.integrals.inner import inner_integrals, inner_on_element, store
 from bemkit.operators.integrals.pairs import Degrees, Inner
 from bemkit.operators.material import Material

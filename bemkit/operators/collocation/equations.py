@@ -23,12 +23,13 @@ from bemkit.operators.boundary_equations import Border
 from bemkit.operators.collocation.gradient_reconstruction import GradientReconstruction
 from bemkit.operators.collocation.layers import Constants, Layer, Unknowns, combined
 from bemkit.operators.collocation.reciprocity import Reciprocity
-from bemkit.operators.integrals.element_geometry import ElementGeometry
+from bemkit.operators.element_geometry import ElementGeometry
 from bemkit.operators.material import Material
 from bemkit.operators.rigid_modes import traction_free_modes
 
 if TYPE_CHECKING:
     from bemkit.operators.collocation.curved_elements import CurvedElements
+    from bemkit.operators.collocation.images import FoldedEquations
 
 _ELEMENTS = 512
 """Elements whose sums are evaluated at a time, to stay in the cache."""
@@ -239,6 +240,67 @@ class CollocationEquations:
             )
         sources, index = np.unique(self.acted_on[elements], return_inverse=True)
         return sources, Unknowns(index.reshape(self.acted_on[elements].shape), self.reconstruction[elements], columns)
+
+
+def collocation_equations(
+    mesh: BoundaryMesh, material: Material, order: IntArray, *, takes_slopes: bool, layer: Layer | None = None
+) -> CollocationEquations | FoldedEquations:
+    """Return the equations of collocation of a body, with or without lines of symmetry.
+
+    Parameters
+    ----------
+    mesh : BoundaryMesh
+    material : Material
+    order : (n_elements,) array
+        The element at each position of a tree.
+    takes_slopes : bool
+    layer : Layer, optional
+        Evaluates the layers of straight elements; by default the compiled layer if there are many elements.
+    """
+    border = collocation_border(mesh, material, order, takes_slopes=takes_slopes)
+    if mesh.symmetry is None:
+        return CollocationEquations.of(mesh, material, order, border, takes_slopes=takes_slopes, layer=layer)
+    from bemkit.operators.collocation.images import FoldedEquations
+
+    images = mesh.symmetry.images
+    with_images = (np.arange(len(images))[:, None] * mesh.n_elements + order).ravel()
+    whole = CollocationEquations.of(
+        mesh.whole, material, with_images, border, takes_slopes=takes_slopes, layer=layer, log_length=mesh.diameter
+    )
+    return FoldedEquations(whole, border, images)
+
+
+def displacement_rows(
+    equations: CollocationEquations | FoldedEquations, nodes: IntArray, value_of_one: float
+) -> FloatArray:
+    """Return all displacement columns (2 n_rows, 2 n) at some nodes, with exact values for translations.
+
+    The midpoint of an element of length h has a relative round-off of eps / h, which the tractions there divide by h
+    again. So the diagonal block of a node is chosen such that a translation has its exact value.
+
+    Parameters
+    ----------
+    equations : CollocationEquations or FoldedEquations
+    nodes : (n_rows,) array
+        Ascending.
+    value_of_one : float
+        Value of a unit translation: 0 for a body, 1 for an exterior.
+    """
+    n, rows = equations.points.size, (2 * nodes[:, None] + np.arange(2)).ravel()
+    columns = (4 * np.arange(n)[:, None] + np.array([2, 3])).ravel()
+    # transposed, as blocks are stored: (2 n, 2 n_rows)
+    if isinstance(equations, CollocationEquations):
+        parts = [equations.block(rows, columns).T]
+        by_column = parts[0]
+    else:
+        parts = [block.T for block in equations.image_blocks(rows, columns)]
+        by_column = np.sum(
+            [part * signs[columns % 2, None] for part, signs in zip(parts, equations.images, strict=True)], axis=0
+        )
+    sums = np.sum([part.reshape(n, 2, -1).sum(axis=0) for part in parts], axis=0).reshape(2, -1, 2)
+    blocks = by_column.reshape(n, 2, nodes.size, 2)
+    blocks[nodes, :, np.arange(nodes.size)] += value_of_one * np.eye(2) - sums.transpose(1, 0, 2)
+    return np.asarray(by_column.T)
 
 
 def distinct(values: IntArray) -> tuple[IntArray, IntArray]:

@@ -20,7 +20,7 @@ import numpy as np
 from bemkit.arrays import BoolArray, ComplexArray, IntArray, Run, consecutive_runs
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.neighbours import corner_nodes
-from bemkit.operators.integrals.element_geometry import ElementGeometry
+from bemkit.operators.element_geometry import ElementGeometry
 
 CORNER_ANGLE = 0.3
 """Smallest angle [rad] of a corner, across which no slope is taken; polygons of smooth curves have smaller angles."""

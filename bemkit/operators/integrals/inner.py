@@ -18,8 +18,8 @@ import numpy as np
 from bemkit.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from bemkit.geometry.quadrature import gauss_legendre
 from bemkit.operators import kernels
+from bemkit.operators.element_geometry import ElementGeometry
 from bemkit.operators.integrals import curved_geometry
-from bemkit.operators.integrals.element_geometry import ElementGeometry
 from bemkit.operators.integrals.pairs import Degrees, Inner
 
 N_SMOOTH = 16

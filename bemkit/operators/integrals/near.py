@@ -14,7 +14,7 @@ import numpy as np
 from bemkit.arrays import FloatArray, IntArray, consecutive_runs
 from bemkit.geometry.quadrature import gauss_legendre
 from bemkit.operators import kernels
-from bemkit.operators.integrals.element_geometry import ElementGeometry
+from bemkit.operators.element_geometry import ElementGeometry
 from bemkit.operators.integrals.inner import N_SMOOTH, bending, far_inner, inner_integrals, local_coordinates
 from bemkit.operators.integrals.outer_rules import (
     GAUSS_LEVELS,

@@ -12,7 +12,7 @@ import numpy.typing as npt
 from bemkit.arrays import BoolArray, FloatArray, IntArray, read_only
 from bemkit.geometry.quadrature import gauss_graded, gauss_legendre
 from bemkit.operators import kernels
-from bemkit.operators.integrals.element_geometry import ElementGeometry, squared_distance
+from bemkit.operators.element_geometry import ElementGeometry, squared_distance
 from bemkit.operators.integrals.splitting import SEPARATION, split_until
 
 # n Gauss points integrate an analytic function, whose nearest singularity is z half lengths from the centre, with an

@@ -25,7 +25,7 @@ from bemkit.arrays import BoolArray, IntArray
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.quadrature import gauss_legendre
 from bemkit.operators import kernels
-from bemkit.operators.integrals.element_geometry import ElementGeometry, squared_distance
+from bemkit.operators.element_geometry import ElementGeometry, squared_distance
 from bemkit.operators.integrals.inner import far_inner
 from bemkit.operators.integrals.near import integrate_listed
 from bemkit.operators.integrals.outer_rules import GAUSS_LEVELS, LevelArray, gauss_levels

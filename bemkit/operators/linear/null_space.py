@@ -7,12 +7,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bemkit.arrays import FloatArray, IntArray
+from bemkit.operators.rigid_modes import NULL_TOLERANCE
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
 
-NULL_TOLERANCE = 1e-9
-"""Largest singular value of the null space. Round-off of normals gives 1e-16, one held node among a million 1e-3."""
 _NORMAL_EQUATIONS_TOLERANCE = 1e-7
 """The same tolerance for normal equations, which have half of the digits."""
 _SHIFT = 1e-12

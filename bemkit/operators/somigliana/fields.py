@@ -25,8 +25,8 @@ from bemkit.geometry.curves import scaled_curve
 from bemkit.geometry.local_values import values_on_elements
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.spaces import BoundarySpace, local_coefficients
+from bemkit.operators.element_geometry import ElementGeometry
 from bemkit.operators.hierarchy.tree import Pairs
-from bemkit.operators.integrals.element_geometry import ElementGeometry
 from bemkit.operators.kernels import legendre_of_monomials, legendre_values
 from bemkit.operators.linear.threads import for_each_chunk
 from bemkit.operators.material import Material

@@ -26,7 +26,7 @@ from bemkit.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.quadrature import gauss_legendre
 from bemkit.operators import kernels
-from bemkit.operators.integrals.element_geometry import ElementGeometry
+from bemkit.operators.element_geometry import ElementGeometry
 from bemkit.operators.integrals.splitting import SEPARATION, split_until
 
 Integrands = Callable[[ComplexArray, ComplexArray], list[ComplexArray]]

@@ -9,7 +9,7 @@ import numpy as np
 from bemkit.arrays import FloatArray, IntArray
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.spaces import BoundarySpace, ConstantSpace
-from bemkit.operators.collocation.images import collocation_equations, displacement_rows
+from bemkit.operators.collocation.equations import collocation_equations, displacement_rows
 from bemkit.operators.collocation.layers import straight_layer
 from bemkit.operators.counts import Entries, OperationCounts
 from bemkit.operators.linear.dense import DenseLU, SingularMatrixError

@@ -8,7 +8,7 @@ import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray, IntArray
 from bemkit.geometry.mesh import BoundaryMesh
-from bemkit.operators.collocation.images import collocation_equations
+from bemkit.operators.collocation.equations import collocation_equations
 from bemkit.operators.hierarchy.factor import Factor
 from bemkit.operators.hierarchy.system import BodyFactor, HierarchicalSystem, LocalConditions, NodeConditions
 from bemkit.operators.hierarchy.tree import ClusterTree

@@ -1,4 +1,4 @@
-"""Predicted costs of boundary equations compressed over a tree, and the choice between dense and compressed equations.
+"""Predicted costs of boundary equations compressed over a tree, and whether they are less than those of dense ones.
 
 Times and memory are those of a square with 1e3 to 1e6 elements, measured by `benchmarks/large.py`; they hardly depend
 on the shape.
@@ -12,13 +12,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bemkit.operators.linear.solvers import (
-    Automatic,
     ChosenLinearSolver,
     DenseCholesky,
     Hierarchical,
     LinearSolver,
-    LinearSolverChoice,
-    MatrixFree,
 )
 from bemkit.operators.steklov_poincare.cost import (
     CONTACT_STEPS,
@@ -30,15 +27,8 @@ from bemkit.operators.steklov_poincare.cost import (
     seconds_of,
     slopes_item,
 )
-from bemkit.operators.steklov_poincare.nodal_conditions import SLIDES
 
 _DIRECT: LinearSolver = DenseCholesky()
-_FEWEST_ELEMENTS = 200
-"""Smallest number of elements of compressed equations."""
-_MOST_LOOPS = 41
-"""An outer curve and 40 holes: each closed curve adds an equation that passes through the whole tree."""
-_LEAST_COMPRESSIBILITY = 1e-8
-"""Smallest 1/2 - nu of a body with holes; below, the clusters of the tree are nearly singular."""
 _SHARE = 0.5
 """Largest predicted time, relative to that of dense equations, of compressed ones that are chosen automatically."""
 _FLOPS_OF_LARGE = 0.2
@@ -81,76 +71,12 @@ LARGEST_BLOCK = 1000
 """Typical order of the largest dense block of a tree."""
 
 
-def why_dense(case: BodyCase) -> str:
-    """Return why the equations of a body cannot be compressed; empty if they can."""
-    mesh = case.mesh
-    if mesh.n_elements < _FEWEST_ELEMENTS:
-        return f"{mesh.n_elements} elements are few"
-    if len(mesh.loops) > _MOST_LOOPS:
-        return f"the boundary has {len(mesh.loops)} closed curves"
-    if _is_incompressible_with_holes(case):
-        return "the material is incompressible, and the body has holes"
-    if _is_enclosed(case):
-        return "contact and supports take all of the boundary of the incompressible body"
-    return ""
+def compressed_if_cheaper(case: BodyCase, memory: float) -> ChosenLinearSolver:
+    """Return the compressed equations of collocation if they gain time or fit into memory, else the dense ones.
 
-
-def _is_incompressible_with_holes(case: BodyCase) -> bool:
-    """Whether the pressure in each hole is nearly undetermined, which makes clusters around holes nearly singular."""
-    return len(case.mesh.loops) > 1 and case.material.effective_poisson_ratio > 0.5 - _LEAST_COMPRESSIBILITY
-
-
-def _is_enclosed(case: BodyCase) -> bool:
-    """Whether the pressure of an incompressible body is unknown until contact is: clusters do not determine it."""
-    normals = case.conditions.in_frames(case.mesh.normals)
-    changes = case.conditions.is_free & (np.abs(normals) > SLIDES)
-    return case.material.is_incompressible and not case.mesh.is_exterior and not changes.any()
-
-
-def choose_collocation_solver(
-    requested: LinearSolverChoice, case: BodyCase, memory: float, hindrance: str = ""
-) -> ChosenLinearSolver:
-    """Choose between the dense and the compressed equations of collocation.
-
-    Parameters
-    ----------
-    requested : LinearSolver, Hierarchical or Automatic
-    case : BodyCase
-        Its linear solver is ignored.
-    memory : float [bytes]
-        Memory of the computer.
-    hindrance : str, optional
-        Further reason why the equations cannot be compressed.
-
-    Returns
-    -------
-    ChosenLinearSolver
-        Compressed equations if they are requested, predicted to be at least twice as fast, or the only ones that fit
-        into memory.
+    They are chosen if they are predicted to be at least twice as fast, or the only ones that fit into memory [bytes].
     """
-    if isinstance(requested, MatrixFree):
-        from bemkit.operators.matrix_free.cost import why_stored
-
-        if not (stored := hindrance or why_stored(case)):
-            return ChosenLinearSolver(_DIRECT, "asked for", requested)
-        other = choose_collocation_solver(Automatic(), case, memory, hindrance)
-        return replace(other, reason=f"not matrix-free, because {stored}; {other.reason}")
-    if not isinstance(requested, Automatic | Hierarchical):
-        return ChosenLinearSolver(requested, "asked for")
-    if hindrance := hindrance or why_dense(case):
-        return ChosenLinearSolver(_DIRECT, f"the equations are not compressed, because {hindrance}")
-    dense = collocation_cost(case, takes_slopes=True)
-    gain = _gain(requested, case, dense, memory)
-    return gain if isinstance(gain, ChosenLinearSolver) else ChosenLinearSolver(_DIRECT, gain)
-
-
-def _gain(
-    requested: Automatic | Hierarchical, case: BodyCase, dense: BodyCost, memory: float
-) -> ChosenLinearSolver | str:
-    """Return the compressed equations if they gain time or fit into memory, or else the reason against them."""
-    if isinstance(requested, Hierarchical):
-        return ChosenLinearSolver(_DIRECT, "asked for", requested)
-    options = Hierarchical()
+    options, dense = Hierarchical(), collocation_cost(case, takes_slopes=True)
     compressed = _cost(case, options)
     of_dense = _FLOPS_OF_LARGE * (dense.flops + CONTACT_STEPS * 2.0 / 3.0 * case.n_retained**3)
     share = compressed.seconds / seconds_of(dense.evaluations, of_dense)
@@ -159,7 +85,7 @@ def _gain(
     if compressed.memory < memory < dense.memory:
         reason = f"dense ones need about {dense.memory / 1e9:.3g} GB, there are {memory / 1e9:.3g} GB"
         return ChosenLinearSolver(_DIRECT, reason, options)
-    return f"compressed over a tree they would take {share:.2g} times as long"
+    return ChosenLinearSolver(_DIRECT, f"compressed over a tree they would take {share:.2g} times as long")
 
 
 def hierarchical_cost(case: BodyCase, options: Hierarchical, *, takes_slopes: bool) -> BodyCost:

@@ -12,10 +12,9 @@ from bemkit.geometry import BoundaryMesh, PlateWithHole, Rectangle, discretise
 from bemkit.geometry.symmetry import Symmetry
 from bemkit.operators.collocation import compiled
 from bemkit.operators.collocation.curved_elements import CurvedElements
-from bemkit.operators.collocation.equations import NOWHERE, point_forces
-from bemkit.operators.collocation.images import collocation_equations
+from bemkit.operators.collocation.equations import NOWHERE, collocation_equations, point_forces
 from bemkit.operators.collocation.layers import Constants, Layer, Unknowns, straight_layer
-from bemkit.operators.integrals.element_geometry import ElementGeometry
+from bemkit.operators.element_geometry import ElementGeometry
 from bemkit.operators.material import Material
 from tests.operators.collocation_matrices import collocation_matrices
 

@@ -9,7 +9,7 @@ import pytest
 
 from bemkit.arrays import BoolArray, FloatArray
 from bemkit.geometry import BoundaryMesh, ExteriorOf, PlateWithHole, Polygon, Rectangle, discretise
-from bemkit.operators.collocation.images import collocation_equations
+from bemkit.operators.collocation.equations import collocation_equations
 from bemkit.operators.hierarchy.factor import Factor, SingularClusterError
 from bemkit.operators.hierarchy.system import HierarchicalSystem, LocalConditions, NodeConditions, UndeterminedError
 from bemkit.operators.hierarchy.tree import ClusterTree

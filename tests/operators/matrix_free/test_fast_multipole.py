@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from bemkit.geometry import BoundaryMesh
-from bemkit.operators.collocation.equations import CollocationEquations
-from bemkit.operators.collocation.images import collocation_equations
+from bemkit.operators.collocation.equations import CollocationEquations, collocation_equations
 from bemkit.operators.hierarchy.tree import ClusterTree
 from bemkit.operators.material import Material
 from bemkit.operators.matrix_free.fast_multipole import LEAF_SIZE, FastMultipole

@@ -11,8 +11,7 @@ import bemkit as bk
 from bemkit.arrays import FloatArray
 from bemkit.geometry import BoundaryMesh
 from bemkit.model.prepared import prepare
-from bemkit.operators.collocation.equations import CollocationEquations
-from bemkit.operators.collocation.images import collocation_equations
+from bemkit.operators.collocation.equations import CollocationEquations, collocation_equations
 from bemkit.operators.collocation.layers import Constants
 from bemkit.operators.hierarchy.system import HierarchicalSystem, NodeConditions
 from bemkit.operators.linear.dense import SingularMatrixError

@@ -4,7 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from bemkit.contact.projection import (
+from bemkit.solvers.active_sets import (
     clip_to_bound,
     clip_to_bound_derivative,
     positive_part,
