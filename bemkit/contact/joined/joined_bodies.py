@@ -26,7 +26,8 @@ MOST_CONTRAST = 1e6
 """Largest ratio of moduli for which it is formed: of stiffer bodies the sparse form keeps strain and motion apart."""
 
 _ROUND_OFF = 1e-12
-"""Forces of missed relative displacements at which a response is refined, relative to all forces."""
+"""Forces of missed relative displacements at which a response is refined, relative to all forces; without forces, what
+is missed of displacements by round-off."""
 
 _WITHOUT_LOAD = (
     *(
@@ -180,7 +181,8 @@ class JoinedBodies(CoupledMembers, LinearBody):
         terms = self._terms(displacement)
         largest, total = self._force_scales(state, terms)
         if not (largest.max() > 0.0 and np.isfinite(largest).all()):
-            return Imbalance(0.0, 0.0) if not missed.any() else Imbalance(float("inf"), 0.0)
+            round_off = _ROUND_OFF * float(np.abs(state.displacement).max())
+            return Imbalance(0.0 if np.abs(missed).max() <= round_off else float("inf"), 0.0)
         largest = np.maximum(largest, LIGHTEST * largest.max())
         total = np.maximum(total, LIGHTEST * total.max())
 

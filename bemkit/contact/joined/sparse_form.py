@@ -247,6 +247,8 @@ def _blocks(blocks: FloatArray) -> sparse.csr_array:
 
 def _solved(matrix: sparse.csr_array, right_side: FloatArray, n_motions: int) -> FloatArray:
     """Return the solution, with every row scaled to a largest entry of one and its residual checked."""
+    if not right_side.size:  # all forces are given, and supports hold all members
+        return right_side
     terms = abs(matrix)
     sizes = terms.max(axis=1).toarray().ravel()
     if not sizes.all():

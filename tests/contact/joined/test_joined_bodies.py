@@ -236,3 +236,18 @@ def test_conditions_that_say_nothing_are_singular():
     conditions = stick(np.zeros(15), np.zeros(15)).replaced(first, nothing)
     with pytest.raises(SingularResponse, match="neither displacement nor traction"):
         body.respond(conditions)
+
+
+@FORMS
+def test_a_body_at_rest_that_an_obstacle_approaches_is_in_balance(is_dense):
+    """Nothing acts, so that there is no force to which round-off of the relative displacements could be compared."""
+    random = np.random.default_rng(5)
+    root = random.normal(size=(8, 8))
+    member = Member(root @ root.T + np.eye(8), np.zeros(8), np.zeros((0, 8)), 1.0)
+    coupling = sparse.csr_array(random.normal(size=(8, 8)))
+    body = JoinedBodies((member,), coupling, random.normal(size=8), np.ones(4), is_dense=is_dense)
+    state = body.respond(separated(4))
+    assert np.abs(state.displacement.ravel() - body.prescribed).max() < 1e-12
+    nudged = replace(state, displacement=state.displacement * (1.0 + 1e-15))  # round-off of another processor
+    assert body.imbalance(nudged).worst == 0.0
+    assert body.imbalance(replace(state, displacement=state.displacement + 1e-9)).worst == np.inf
