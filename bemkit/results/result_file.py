@@ -35,6 +35,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
@@ -63,6 +64,7 @@ from bemkit.results.step_group import (
     write_outcome,
     write_step,
 )
+from bemkit.scene.body import Body
 from bemkit.scene.load_history import load_steps
 from bemkit.scene.scene import Scene
 from bemkit.scene.serialisation import structure
@@ -268,7 +270,7 @@ def _read_history(reader: Reader, asked: Scene, listed: Scene, layout: StepLayou
             problem = problem.with_contacts(listed.contacts)
         end = read_step(reader, group, f"{group}/outcome", problem, layout)
         steps.append(read_load_step(reader, group, end))
-        whole = following(whole, end, asked, number, n_steps)
+        whole = end if n_steps == 1 else following(whole, end, asked, number, n_steps)
     loading = LoadHistory(asked, n_steps, tuple(steps))
     assert whole is not None  # there is a step
     if not reader.has("outcome"):
@@ -318,10 +320,12 @@ _COUNTED = ("points", "centres", "traction_dofs", "reaction")
 
 def _curves(problem: Scene) -> list[Callable[[], tuple[Curve, ...]]]:
     """Return for each body the function that gives its curves, which the file names by their numbers."""
-    return [
-        lambda body=body: body.placement.mesh(problem.scene_of(body).build_mesh()).curves  # type: ignore[misc]
-        for body in problem.placed_bodies
-    ]
+    return [partial(_curves_of, problem, body) for body in problem.placed_bodies]
+
+
+def _curves_of(problem: Scene, body: Body) -> tuple[Curve, ...]:
+    scene = problem.scene_of(body)
+    return body.placement.mesh(scene.divided([part.name for part in scene.contact_parts])).curves
 
 
 def _write_mesh(group: h5py.Group, mesh: BoundaryMesh) -> None:

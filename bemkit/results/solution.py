@@ -6,7 +6,7 @@ anticlockwise boundary, traction = stress @ n; a pressed contact has sigma_n <= 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
@@ -292,3 +292,30 @@ class Solution(SolvedScene, Explorable):
             "memory": dict(self.memory),
             "steps": [step.as_dict() for step in (() if self.loading is None else self.loading.steps)],
         }
+
+
+def continued(records: Sequence[StepRecord], further: Iterable[StepRecord], words: str = "") -> tuple[StepRecord, ...]:
+    """Return the records of a solve after those of the solves before it.
+
+    Parameters
+    ----------
+    records : sequence of StepRecord
+        Of the solves before.
+    further : iterable of StepRecord
+        Of the next one: its steps and linear solves are counted from the end of those before.
+    words : str
+        Begin the messages of the further records.
+    """
+    first, solves = (records[-1].step + 1, records[-1].linear_solves) if records else (0, 0)
+    return (
+        *records,
+        *(
+            replace(
+                record,
+                step=first + record.step,
+                linear_solves=solves + record.linear_solves,
+                message="; ".join(filter(None, (words, record.message))),
+            )
+            for record in further
+        ),
+    )

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from bemkit.notebook import ShownInNotebooks
 from bemkit.result_warning import ResultWarning, without_duplicates
-from bemkit.results.solution import Solution
+from bemkit.results.solution import Solution, continued
 from bemkit.solvers.base import StepRecord
 
 if TYPE_CHECKING:
@@ -66,10 +66,8 @@ def following(so_far: Solution | None, solution: Solution, stated: Scene, number
     stated : Scene
         With all steps.
     number, n_steps : int
-        Of the step, counted from 1, and of all.
+        Of the step, counted from 1, and of all; at least two.
     """
-    if n_steps == 1:
-        return solution
     name = f"load step {number} of {n_steps}"
     before = () if so_far is None else (so_far,)
     total = with_totals(solution, [*before, solution], [*("" for _ in before), name])
@@ -85,30 +83,3 @@ def _of_step(warning: ResultWarning, number: int, n_steps: int) -> ResultWarning
     if warning.step is not None:
         return warning
     return replace(warning, step=number, text=f"Load step {number} of {n_steps}: {warning.text}")
-
-
-def continued(records: Sequence[StepRecord], further: Iterable[StepRecord], words: str = "") -> tuple[StepRecord, ...]:
-    """Return the records of a solve after those of the solves before it.
-
-    Parameters
-    ----------
-    records : sequence of StepRecord
-        Of the solves before.
-    further : iterable of StepRecord
-        Of the next one: its steps and linear solves are counted from the end of those before.
-    words : str
-        Begin the messages of the further records.
-    """
-    first, solves = (records[-1].step + 1, records[-1].linear_solves) if records else (0, 0)
-    return (
-        *records,
-        *(
-            replace(
-                record,
-                step=first + record.step,
-                linear_solves=solves + record.linear_solves,
-                message="; ".join(filter(None, (words, record.message))),
-            )
-            for record in further
-        ),
-    )

@@ -13,7 +13,7 @@ from bemkit.contact.limit_load import largest_factor, least_force
 from bemkit.errors import InputError
 from bemkit.formulas import choices
 from bemkit.geometry.vectors import turned_left
-from bemkit.model.placed import Meshes, place
+from bemkit.model.placed import place
 from bemkit.model.rigid_blocks import (
     Block,
     Joint,
@@ -33,7 +33,7 @@ _MOVES = 1e-9
 """Motion that is round-off, relative to the largest."""
 
 
-def largest_load_factor(scene: Scene, *, meshes: Meshes = None) -> float:
+def largest_load_factor(scene: Scene) -> float:
     """Return the largest load factor under which contact tractions can balance the loads of a scene.
 
     Parameters
@@ -41,8 +41,6 @@ def largest_load_factor(scene: Scene, *, meshes: Meshes = None) -> float:
     scene : Scene
         Its loads and body forces are those of the factor one; body forces that are constant have none. Its own load
         factors play no part.
-    meshes : mapping of str to BoundaryMesh, optional
-        As for `bemkit.run`.
 
     Returns
     -------
@@ -61,21 +59,20 @@ def largest_load_factor(scene: Scene, *, meshes: Meshes = None) -> float:
     joints have forces at the ends of elements. Of Coulomb friction this is a bound from above, see
     `bemkit.contact.limit_load.largest_factor`; a mesh holds less by the share of a joint that its last nodes take.
     """
-    case = _limit_analysis(scene, meshes)
+    case = _limit_analysis(scene)
     factor = largest_factor(case.motions, case.constant, case.growing, case.friction)
     if factor is None:
         raise UnsolvableSceneError(_UNSOLVABLE)
     return factor
 
 
-def coulomb_load_factor(scene: Scene, *, meshes: Meshes = None, most_programmes: int = MOST_PROGRAMMES) -> CoulombLimit:
+def coulomb_load_factor(scene: Scene, *, most_programmes: int = MOST_PROGRAMMES) -> CoulombLimit:
     """Return load factors at which a scene with Coulomb friction, which does not dilate, collapses.
 
     Parameters
     ----------
     scene : Scene
-    meshes : mapping of str to BoundaryMesh, optional
-        Both as for `largest_load_factor`.
+        As for `largest_load_factor`.
     most_programmes : int
         Linear programmes after which the search for a state of collapse ends.
 
@@ -91,7 +88,7 @@ def coulomb_load_factor(scene: Scene, *, meshes: Meshes = None, most_programmes:
     InputError
         If friction has a cap, or no state of collapse was found.
     """
-    case = _limit_analysis(scene, meshes)
+    case = _limit_analysis(scene)
     found = coulomb_limit(
         case.motions, case.constant, case.growing, *case.only_friction, most_programmes=most_programmes
     )
@@ -100,9 +97,7 @@ def coulomb_load_factor(scene: Scene, *, meshes: Meshes = None, most_programmes:
     return found
 
 
-def thrust(
-    scene: Scene, contact: str, direction: tuple[float, float] = (1.0, 0.0), *, meshes: Meshes = None
-) -> tuple[JointForces, JointForces]:
+def thrust(scene: Scene, contact: str, direction: tuple[float, float] = (1.0, 0.0)) -> tuple[JointForces, JointForces]:
     """Return the smallest and the largest thrust at a contact, of all forces that balance the loads of a scene.
 
     If the support of the contact yields against the direction, the thrust along it falls to the smallest; if it yields
@@ -116,8 +111,6 @@ def thrust(
         Its name in results, such as ``"first.springing"`` or ``"left.top / right.bottom"``.
     direction : (float, float)
         Of the force on the first body of the name; of any length.
-    meshes : mapping of str to BoundaryMesh, optional
-        As for `bemkit.run`.
 
     Raises
     ------
@@ -126,7 +119,7 @@ def thrust(
     UnsolvableSceneError
         If no contact tractions balance the loads.
     """
-    case = _limit_analysis(scene, meshes)
+    case = _limit_analysis(scene)
     names = tuple(dict.fromkeys(joint.name for joint in case.joints))
     if contact not in names:
         raise InputError(f"no contact {contact!r}: the contacts are {choices(contact, names)}")
@@ -199,10 +192,10 @@ class _LimitCase:
         )
 
 
-def _limit_analysis(scene: Scene, meshes: Meshes) -> _LimitCase:
+def _limit_analysis(scene: Scene) -> _LimitCase:
     """Return the limit analysis of a scene, whose load factors play no part."""
     scene = load_steps(replace(scene, load_factors=(1.0,)))[-1]
-    bodies, unloaded = place(scene, meshes), with_scaled_loads(scene, 0.0)
+    bodies, unloaded = place(scene), with_scaled_loads(scene, 0.0)
     joints = tuple(joints_of(scene, bodies))
     if not joints:
         raise InputError("no two bodies are in contact: list contacts")

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Any
 
 from bemkit.contact.solvability import find_unsolvable_load
-from bemkit.model.placed import Meshes
 from bemkit.operators.linear.threads import blas_threads_for
 from bemkit.runs.run import LoadHistoryError, UnsolvableSceneError, on_its_meshes
 from bemkit.runs.solution_of import solution_of
@@ -16,7 +15,7 @@ from bemkit.solvers.multistart import probe
 from bemkit.stopwatch import Stage
 
 
-def distinct_solutions(scene: Scene, *, n_starts: int = 8, mesh: Meshes = None) -> tuple[Any, ...]:
+def distinct_solutions(scene: Scene, *, n_starts: int = 8) -> tuple[Any, ...]:
     """Solve a scene from several starts and return the distinct solutions.
 
     With Coulomb friction a scene may have more than one solution; which of them `run` returns depends on its start.
@@ -27,8 +26,6 @@ def distinct_solutions(scene: Scene, *, n_starts: int = 8, mesh: Meshes = None) 
         With a single load. With an accuracy, on the meshes that it needs.
     n_starts : int
         Starts: all nodes sticking, open, slipping forward, slipping backward, then random choices (always the same).
-    mesh : BoundaryMesh or mapping of str to BoundaryMesh, optional
-        As for `run`.
 
     Returns
     -------
@@ -48,8 +45,7 @@ def distinct_solutions(scene: Scene, *, n_starts: int = 8, mesh: Meshes = None) 
         raise LoadHistoryError(
             f"a load history of {scene.n_steps} steps cannot be searched for distinct solutions: give one load"
         )
-    if mesh is None:
-        scene, mesh = on_its_meshes(scene)
+    scene, mesh = on_its_meshes(scene)
     (prepared,), plan, clock = planned(load_steps(scene), mesh)
     with blas_threads_for(prepared.largest_matrix):
         model, clock = built(prepared, clock)

@@ -14,7 +14,7 @@ from bemkit.arrays import FloatArray
 from bemkit.contact.body import ContactState, SlipHistory
 from bemkit.contact.problem import ContactProblem
 from bemkit.model.model import Model
-from bemkit.results.solved_steps import continued
+from bemkit.results.solution import continued
 from bemkit.solvers.active_sets import NodeStatus
 from bemkit.solvers.base import ContactSolution, ContactSolver, Status, StepRecord, solve
 from bemkit.solvers.fallbacks import Fallbacks

@@ -11,7 +11,6 @@ from bemkit.errors import InputError
 from bemkit.interrupts import interruptible
 from bemkit.model.placed import Meshes
 from bemkit.plan.plan import few_on, make_plan
-from bemkit.results.solved_steps import SolvedSteps, with_times
 from bemkit.runs.steps import UnsolvableSceneError as UnsolvableSceneError
 from bemkit.runs.steps import guess_from, run_on_mesh, solved_history
 from bemkit.scene.scene import Scene, check_scene
@@ -19,6 +18,8 @@ from bemkit.solvers.base import StepRecord
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
+
+    from bemkit.results.solved_steps import SolvedSteps
 
 _COARSEST, _RATIO = 1024, 16
 """Elements of the coarsest mesh of a large body, and the ratio of their numbers from one mesh to the next."""
@@ -117,6 +118,7 @@ def run(
     if mesh is None and start is None:
         nested = cascade_of(scene) if coarsest is None else (coarsest, 2)
     if nested is not None:
+        from bemkit.results.solved_steps import with_times
         from bemkit.runs.nested import run_nested
 
         meshes = run_nested(scene, coarsest=nested[0], ratio=nested[1], callback=callback, executor=executor)
@@ -144,6 +146,8 @@ def _in_turn(
         raise InputError("file is given with a sequence of scenes: a file holds one scene; give it as steps")
     if coarsest is not None:
         raise InputError("coarsest is given with a sequence of scenes: nested meshes take a single load")
+    from bemkit.results.solved_steps import SolvedSteps
+
     guess = guess_from(scenes[0], start)
     return SolvedSteps(solved_history(scenes, mesh, callback, guess=guess, executor=executor)[1])
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from threading import Lock
 from typing import Any
 
@@ -42,7 +43,7 @@ class SharedBody:
 
     def __reduce__(self) -> tuple[object, ...]:
         """Pickle without matrices."""
-        return _shared_body, (self._base, self._starts_cold)
+        return partial(SharedBody, starts_cold=self._starts_cold), ([self._base],)
 
     def run(self, scene: Scene) -> Any:
         """Solve one of the scenes.
@@ -57,7 +58,7 @@ class SharedBody:
                 self._make()
             if self._bodies is None:
                 return run(scene)  # each scene says itself what is wrong
-            if not self._starts_cold and self._bodies.has_start:
+            if not self._starts_cold and self._bodies.last is not None:
                 solution = self._bodies.run(scene, is_cold=False)
                 if solution.is_converged:
                     return solution
@@ -75,10 +76,6 @@ class SharedBody:
             self._is_refused = True
 
 
-def _shared_body(base: Scene, starts_cold: bool) -> SharedBody:
-    return SharedBody([base], starts_cold=starts_cold)
-
-
 def _n_with_friction(scene: Scene) -> int:
     laws = [scene.law] if scene.bodies else scene.only.laws.values()
     return sum(not law.is_frictionless for law in laws)
@@ -90,14 +87,9 @@ class _Bodies:
     def __init__(self, base: Scene) -> None:
         steps, self._plan, _ = planned(load_steps(base))
         self._found = tuple(pair for pair in steps[0].scene.contacts if pair not in base.contacts)
-        self._last: Any = None
+        self.last: Any = None
         with blas_threads_for(steps[0].largest_matrix):
             self._model = build_model(steps[0])
-
-    @property
-    def has_start(self) -> bool:
-        """Whether there is a solution that others can start from."""
-        return self._last is not None
 
     def run(self, scene: Scene, *, is_cold: bool) -> Any:
         """Solve a scene, from rest or from the solution of the last."""
@@ -110,8 +102,8 @@ class _Bodies:
             model = self._model.under(steps[0])
             clock = clock.closed(Stage.CONDENSE)
             history: History = History.of(scene, scenes)
-            guess = None if is_cold or self._last is None else state_on(model, self._last)
+            guess = None if is_cold or self.last is None else state_on(model, self.last)
             solution = joined(history, solve_steps(model, steps, self._plan, history, clock=clock, guess=guess))
         if solution.is_converged and len(steps) == 1 and solution.contact.n_contact:
-            self._last = solution
+            self.last = solution
         return solution

@@ -19,7 +19,6 @@ from bemkit.model.prepared import Prepared, prepare_steps
 from bemkit.model.solved_contact import with_energies_checked, with_sliding_checked
 from bemkit.operators.linear.threads import blas_threads_for
 from bemkit.plan import Plan, announce_plan, check_elements, check_memory, plan_steps
-from bemkit.results.solved_steps import following
 from bemkit.runs.load_path import Callback, IncrementEnd, Path, ReachedStep, advance
 from bemkit.runs.solution_of import solution_of, with_missed_contact_named
 from bemkit.scene.scene import Scene
@@ -270,6 +269,10 @@ def solve_steps(
 
 def joined(history: History, solutions: Sequence[Solution]) -> Solution:
     """Return the last of the steps, with the records, solves, times, memory and warnings of all."""
+    if len(history.times) == 1 and solutions:
+        return solutions[-1]
+    from bemkit.results.solved_steps import following
+
     whole = history.done
     n_done = 0 if whole is None or whole.loading is None else len(whole.loading.steps)
     for number, solution in enumerate(solutions, start=n_done + 1):

@@ -259,21 +259,6 @@ class BodyScene:
             symmetry=self.symmetry,
         )
 
-    def build_mesh(self) -> BoundaryMesh:
-        """Divide the boundary into elements, with one mesh part for each part of the scene.
-
-        Raises
-        ------
-        GeometryError
-            If parts overlap or are empty, or there are too few elements, or the scene lacks its symmetry.
-        """
-        mesh = self.divided([part.name for part in self.contact_parts])
-        if self.symmetry is not None:
-            from bemkit.scene.symmetry import check_symmetry
-
-            check_symmetry(self, mesh)
-        return mesh
-
 
 def _check_sides(part: Part, names: tuple[str, ...]) -> None:
     for side in part.sides:

@@ -66,12 +66,8 @@ class PrescribedDisplacement:
 
     def at(self, points: FloatArray) -> FloatArray:
         """Evaluate the displacement at (n, 2) points [m] as an (n, 2) array [m]; free components are zero."""
-        components = [np.zeros(len(points)) if value is None else evaluate_field(value, points) for value in self._xy]
-        return np.stack(components, axis=1)
-
-    @property
-    def _xy(self) -> tuple[ScalarField | None, ScalarField | None]:
-        return self.x, self.y
+        values = [0.0 if value is None else value for value in (self.x, self.y)]
+        return np.stack([evaluate_field(value, points) for value in values], axis=1)
 
 
 class Load:

@@ -266,13 +266,7 @@ class Scene(ShownInNotebooks):
 
     @property
     def only(self) -> BodyScene:
-        """The statement of the only body.
-
-        Raises
-        ------
-        InputError
-            If there are several.
-        """
+        """The statement of the only body; InputError if there are several."""
         if len(self.placed_bodies) > 1:
             raise InputError(f"there are {len(self.placed_bodies)} bodies: only scenes of one body can do this")
         return self.scene_of(self.placed_bodies[0])
@@ -283,8 +277,14 @@ class Scene(ShownInNotebooks):
         return tuple(part for body in self.placed_bodies for part in self.scene_of(body).contact_parts)
 
     def build_mesh(self) -> BoundaryMesh:
-        """Divide the boundary of the only body into elements; see `BodyScene.build_mesh`."""
-        return self.only.build_mesh()
+        """Divide the boundary of the only body into elements; GeometryError if it lacks the symmetry it states."""
+        scene = self.only
+        mesh = scene.divided([part.name for part in scene.contact_parts])
+        if scene.symmetry is not None:
+            from bemkit.scene.symmetry import check_symmetry
+
+            check_symmetry(scene, mesh)
+        return mesh
 
     @property
     def elastic_contacts(self) -> tuple[ContactPair, ...]:

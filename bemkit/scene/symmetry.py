@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 
@@ -18,11 +17,9 @@ from bemkit.contact.obstacle import measure_contact
 from bemkit.errors import GeometryError, InputError, format_point
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.meshing.division import divide
-from bemkit.geometry.outline import Selection
-from bemkit.geometry.shapes import Shape
 from bemkit.geometry.symmetry import Symmetry
-from bemkit.operators.material import Material
-from bemkit.scene.body_forces import BodyForce, Heating
+from bemkit.scene.body_forces import Heating
+from bemkit.scene.body_scene import BodyScene
 from bemkit.scene.conditions import Clamped, Contact, Load, Part, PrescribedDisplacement, Roller
 
 _PER_PIECE = 4
@@ -35,48 +32,16 @@ _PRESSURES = (1e-6, 1e-4, 1e-2, 1.0)
 """Pressures, in units of E', at which friction bounds are compared."""
 
 
-class SymmetricScene(Protocol):
-    """The members of a scene that are compared; `bemkit.scene.scene.Scene` is one."""
-
-    @property
-    def shape(self) -> Shape:
-        """The whole body."""
-
-    @property
-    def material(self) -> Material:
-        """The material; its modulus is the unit of pressures."""
-
-    @property
-    def parts(self) -> tuple[Part, ...]:
-        """The boundary parts with their conditions."""
-
-    @property
-    def selections(self) -> Mapping[str, Selection]:
-        """The pieces of the outline that the parts cover, by name."""
-
-    @property
-    def laws(self) -> Mapping[str, FrictionLaw]:
-        """The friction law of each contact part, by name."""
-
-    @property
-    def body_forces(self) -> tuple[BodyForce, ...]:
-        """Gravity, rotation, heating."""
-
-    @property
-    def symmetry(self) -> Symmetry | None:
-        """The lines that the scene names."""
-
-
 class AsymmetricSceneError(GeometryError):
     """A scene that is not symmetric about a line it names."""
 
 
-def check_symmetry(scene: SymmetricScene, mesh: BoundaryMesh) -> None:
+def check_symmetry(scene: BodyScene, mesh: BoundaryMesh) -> None:
     """Raise unless a scene is symmetric about the lines it names, and so is its mesh.
 
     Parameters
     ----------
-    scene : SymmetricScene
+    scene : BodyScene
     mesh : BoundaryMesh
         Of one side of the lines; conditions are compared on all its elements.
 
@@ -122,7 +87,7 @@ def check_law_symmetry(name: str, law: FrictionLaw, points: FloatArray, symmetry
             )
 
 
-def find_symmetry(scene: SymmetricScene) -> Symmetry | None:
+def find_symmetry(scene: BodyScene) -> Symmetry | None:
     """Find the lines through the middle of a body, along x and y, about which a scene is symmetric.
 
     Returns
@@ -178,11 +143,11 @@ def _part_names(mesh: BoundaryMesh) -> list[str]:
 class _Whole:
     """A scene with a coarse mesh of its whole body."""
 
-    scene: SymmetricScene
+    scene: BodyScene
     mesh: BoundaryMesh
 
     @classmethod
-    def of(cls, scene: SymmetricScene) -> _Whole:
+    def of(cls, scene: BodyScene) -> _Whole:
         division = divide(scene.shape.outline(), scene.selections)
         positions = np.linspace(0.0, 1.0, _PER_PIECE + 1)
         return cls(scene, division.mesh([piece.at(positions) for piece in division.pieces]))
@@ -258,7 +223,7 @@ def _first_difference(
     return None
 
 
-def _inside(scene: SymmetricScene, points: FloatArray) -> dict[str, FloatArray]:
+def _inside(scene: BodyScene, points: FloatArray) -> dict[str, FloatArray]:
     """Return body force (n, 2) and thermal strain (n, 1), which is harmonic: its boundary values determine it."""
     force, strain = np.zeros_like(points), np.zeros((len(points), 1))
     for body_force in scene.body_forces:
@@ -269,7 +234,7 @@ def _inside(scene: SymmetricScene, points: FloatArray) -> dict[str, FloatArray]:
     return {"body force": force, "thermal strain": strain}
 
 
-def _acting(scene: SymmetricScene, part: Part | None, samples: _Samples) -> tuple[str, dict[str, FloatArray]]:
+def _acting(scene: BodyScene, part: Part | None, samples: _Samples) -> tuple[str, dict[str, FloatArray]]:
     """Return the kind of condition in a part and its values (n, 1), or (n, 2) for vectors, by name."""
     points, normals = samples.points, samples.normals
     match None if part is None else part.condition:

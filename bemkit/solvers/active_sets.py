@@ -113,6 +113,11 @@ class ProjectionEquations:
     multiplier: FloatArray | None = None
     given_bound: FloatArray | None = None
 
+    @classmethod
+    def scaled(cls, problem: ContactProblem) -> "ProjectionEquations":
+        """Return the equations with the stiffness scale of the body as both ratios."""
+        return cls(problem, problem.body.stiffness_scale, problem.body.stiffness_scale)
+
     def evaluate(self, state: ContactState, touches: BoolArray | None = None) -> Residual:
         """Return sets and residual at `state`.
 
@@ -183,8 +188,7 @@ def contact_sets(problem: ContactProblem, state: ContactState) -> ActiveSets:
     A closed frictionless node counts as slipping. A node without pressure counts as closed if cohesion holds it; see
     `coheres`.
     """
-    rho = problem.body.stiffness_scale
-    residual = ProjectionEquations(problem, rho, rho).evaluate(state, coheres(problem, state))
+    residual = ProjectionEquations.scaled(problem).evaluate(state, coheres(problem, state))
     direction = np.where(residual.is_free & (residual.sets.direction == 0), 1, residual.sets.direction)
     return ActiveSets(residual.sets.is_closed, direction)
 

@@ -149,5 +149,4 @@ def _begins(driver: ContactSolver) -> str:
 
 def _is_satisfied(problem: ContactProblem, state: ContactState) -> bool:
     """Whether contact and friction are fulfilled to round-off, so that no other solver can improve the state."""
-    rho = problem.body.stiffness_scale
-    return merit(problem, ProjectionEquations(problem, rho, rho).evaluate(state)) <= negligible(problem.body)
+    return merit(problem, ProjectionEquations.scaled(problem).evaluate(state)) <= negligible(problem.body)

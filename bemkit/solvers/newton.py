@@ -167,8 +167,7 @@ def consistent_state(problem: ContactProblem, guess: ContactState) -> tuple[Cont
         raise InputError(f"start has {len(guess.displacement)} nodes; the problem has {problem.n_contact}")
     if not guess.is_finite:
         raise InputError("start contains entries that are not finite; give finite displacements and tractions")
-    rho = problem.body.stiffness_scale
-    equations = ProjectionEquations(problem, rho, rho)
+    equations = ProjectionEquations.scaled(problem)
     residual = equations.evaluate(guess, coheres(problem, guess))
     response = respond(equations, residual, residual.sets)
     return response.state, response.linear_solves

@@ -68,8 +68,7 @@ class OuterIterate(Iterate):
 
 
 def _residual(problem: ContactProblem, state: ContactState) -> float:
-    rho = problem.body.stiffness_scale
-    return merit(problem, ProjectionEquations(problem, rho, rho).evaluate(state))
+    return merit(problem, ProjectionEquations.scaled(problem).evaluate(state))
 
 
 def _is_same(state: ContactState, other: ContactState, accuracy: float) -> bool:

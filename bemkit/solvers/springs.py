@@ -82,7 +82,7 @@ class Springs:
     def init(self, problem: ContactProblem, start: ContactState) -> SpringIterate:
         """Begin with all nodes held; end if few motions are free."""
         anchor, n_motions = problem.sticking_state, problem.body.rigid_motions().shape[0]
-        residual = self._equations(problem).evaluate(anchor)
+        residual = ProjectionEquations.scaled(problem).evaluate(anchor)
         begun = SpringIterate(state=start, spring=self.first, anchor=anchor, residual=residual, sets=residual.sets)
         if n_motions >= self.least_motions:
             return begun
@@ -95,7 +95,7 @@ class Springs:
             raise TypeError(f"iterate is a {type(iterate).__name__}; give a result of init or step of this solver")
         if iterate.released is not None:
             return self._released(iterate, self.then.step(problem, iterate.released))
-        equations, stiffness = self._equations(problem), iterate.spring * problem.body.stiffness_scale
+        equations, stiffness = ProjectionEquations.scaled(problem), iterate.spring * problem.body.stiffness_scale
         linear = equations.linearised(iterate.residual, iterate.sets)
         state = problem.respond_with_room(linear.regularised(iterate.anchor.displacement, stiffness))
         residual = equations.evaluate(state)
@@ -122,7 +122,3 @@ class Springs:
         return replace(
             iterate, state=then.state, linear_solves=solves, ended=then.ended, message=then.message, released=then
         )
-
-    def _equations(self, problem: ContactProblem) -> ProjectionEquations:
-        rho = problem.body.stiffness_scale
-        return ProjectionEquations(problem, rho, rho)

@@ -43,16 +43,6 @@ _MOST_ROUNDS = 12
 _TINY = float(np.finfo(float).tiny)
 
 
-def sparse_solver_name() -> str:
-    """Return the name of the solver that factors sparse contact systems, and of a faster one that is not installed."""
-    return _pardiso()
-
-
-def uses_pardiso() -> bool:
-    """Whether PARDISO is installed and works."""
-    return _pardiso() == "PARDISO"
-
-
 @contextmanager
 def factored(matrix: sparse.csr_array) -> Iterator[Solve]:
     """Factor a matrix with pivots on its diagonal; yields the function that solves with it.
@@ -67,7 +57,7 @@ def factored(matrix: sparse.csr_array) -> Iterator[Solve]:
     SingularMatrixError
         If a pivot vanishes.
     """
-    if uses_pardiso():
+    if sparse_solver_name() == "PARDISO":
         with _factored_by_pardiso(matrix) as solve:
             yield solve
         return
@@ -109,7 +99,8 @@ def _solver_without_matrix() -> Any:
 
 
 @cache
-def _pardiso() -> str:
+def sparse_solver_name() -> str:
+    """Return the name of the solver that factors sparse contact systems, and of a faster one that is not installed."""
     if importlib.util.find_spec("pypardiso") is None:
         return _MISSING
     try:
