@@ -15,9 +15,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.polynomial import legendre
 
-from bemkit.arrays import FloatArray, IntArray
+from bemkit.arrays import BoolArray, FloatArray, IntArray
 from bemkit.geometry.local_values import element_degrees, values_on_elements
 from bemkit.geometry.mesh import BoundaryMesh
+from bemkit.geometry.neighbours import break_nodes
 from bemkit.geometry.quadrature import gauss_legendre
 from bemkit.geometry.spaces import BoundarySpace, dof_points, local_coefficients
 from bemkit.operators.rigid_modes import without_motion
@@ -28,6 +29,8 @@ _N_MISSING = 64
 """Number of missing coefficients that are summed: at the largest ratio the rest is a thousandth."""
 FASTEST = 0.05
 """Lower limit of the factor by which one more degree reduces the error."""
+POWER = 0.3
+"""Power of the distance from a corner or end of a part in tractions there: about the least of those with a bound."""
 _MORE_POINTS = 2
 
 
@@ -102,7 +105,8 @@ def coefficient_errors(
     strained = without_motion(mesh, dof_points(displacement_space), displacement)
     slopes = plane_modulus * _slope_coefficients(displacement_space, values_on_elements(displacement_space, strained))
     tractions = np.einsum("lk,elc->ekc", local_coefficients(traction_space), traction)
-    of_slopes, of_tractions = (_missing(fields, degree) for fields in (slopes, tractions))
+    at_break = np.asarray(break_nodes(mesh)[mesh.elements].any(axis=1))
+    of_slopes, of_tractions = _missing(slopes, degree, at_break), _missing(tractions, degree, at_break)
     energies = 0.25 * of_slopes.energy, of_tractions.energy
     total = energies[0] + energies[1]
     squared_decay = energies[0] * of_slopes.decay**2 + energies[1] * of_tractions.decay**2
@@ -135,7 +139,7 @@ class _Missing(NamedTuple):
     decay: FloatArray
 
 
-def _missing(coefficients: FloatArray, degrees: IntArray) -> _Missing:
+def _missing(coefficients: FloatArray, degrees: IntArray, at_break: BoolArray) -> _Missing:
     """Continue the Legendre coefficients (n, largest degree, 2) of elements.
 
     A geometric sequence is fitted to the second half of the coefficients. Each is taken as large as any after it, since
@@ -153,5 +157,13 @@ def _missing(coefficients: FloatArray, degrees: IntArray) -> _Missing:
         following = np.arange(_N_MISSING)
         missing = (bounds[:, -1] * ratio)[:, None] * np.minimum(ratio, SLOWEST)[:, None] ** following
         odd = 2.0 * (n_known + following) + 1.0
-        energy[chosen], mean_square[chosen], decay[chosen] = missing**2 @ odd**-2.0, missing**2 @ (1.0 / odd), ratio
+        algebraic = bounds[:, -1, None] * _algebraic(n_known)
+        singular = np.where(at_break[chosen, None], np.maximum(missing, algebraic), missing)
+        energy[chosen], mean_square[chosen], decay[chosen] = missing**2 @ odd**-2.0, singular**2 @ (1.0 / odd), ratio
     return _Missing(energy, mean_square, decay)
+
+
+def _algebraic(n_known: int) -> FloatArray:
+    """Return the missing coefficients of d**POWER, d the distance from the end of an element, over the last known."""
+    k = n_known - 1.0 + np.arange(_N_MISSING)
+    return np.asarray(np.cumprod((2.0 * k + 3.0) / (2.0 * k + 1.0) * (k - POWER) / (k + POWER + 2.0)))

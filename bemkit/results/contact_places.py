@@ -30,6 +30,10 @@ have estimates."""
 NEIGHBOUR_SHARE = 0.15
 """Share of the error of an excluded element, by its degree, that the tractions of its neighbour have, too."""
 
+FAR_END_SHARE = (0.0, 0.1)
+"""Shares of the squared error at the far end of an excluded element that are outside, for degrees 1 and 2: its second
+difference takes nodes nearer to the singular point."""
+
 
 @dataclass(frozen=True, eq=False)
 class ContactPlaces:
@@ -176,29 +180,33 @@ class ContactPlaces:
 
         solution, degree = self.solution, self.lowest_degree
         if degree <= 2:
-            # the second difference at the far end of a linear element takes the node at the singular point
+            # the second difference at the far end of an element takes nodes nearer to the singular point
             points = np.column_stack([solution.contact.x, solution.contact.y])
-            is_excluded = self._is_near(points, with_ends=degree == 1)
-            return nodal_error(solution.contact, degree, solution.n_sides, is_excluded)
-        elements = self._counted
-        if not any(chosen.size for chosen in elements.values()):
+            is_near, with_ends = (self._is_near(points, with_ends=with_ends) for with_ends in (False, True))
+            share = np.where(is_near, 0.0, np.where(with_ends, FAR_END_SHARE[degree - 1], 1.0))
+            return nodal_error(solution.contact, degree, solution.n_sides, share)
+        if not any(chosen.size for chosen in self._counted.values()):
             return None
         squared, _ = self._transition_errors
-        for name, body in solution.bodies.items():
-            if body.coefficient_errors is not None:
-                squared += float(body.coefficient_errors.traction[elements[name]].sum())
-                squared += self._squared_spreading_error(name)
+        for contact in solution.contact.parts:
+            name, part = solution.contact_sides[contact][0]
+            squared += solution.n_sides(contact) * self._squared_error_on(name, part)
         return squared
 
-    def _squared_spreading_error(self, name: str) -> float:
-        """Return the squared error [Pa^2 m] that spreads from excluded elements of a body to their neighbours."""
-        body, counted = self.solution.bodies[name], self._counted[name]
+    def _squared_error_on(self, name: str, part: str) -> float:
+        """Return the squared error [Pa^2 m] on the counted elements of a part, by its coefficients and its neighbours.
+
+        The neighbour of an excluded element has a share of its error.
+        """
+        body = self.solution.bodies[name]
         assert body.coefficient_errors is not None
+        errors, elements = body.coefficient_errors.traction, body.mesh.part(part)
+        counted = np.intersect1d(elements, self._counted[name])
         pairs = np.concatenate([body.mesh.node_elements, body.mesh.node_elements[:, ::-1]])
-        excluded = np.setdiff1d(self._touching(name), counted)
+        excluded = np.setdiff1d(elements, counted)
         source = pairs[np.isin(pairs[:, 0], excluded) & np.isin(pairs[:, 1], counted), 0]
         degrees = element_degrees(body.scene.discretisation.displacement_space(body.mesh))[source]
-        return float((NEIGHBOUR_SHARE / degrees) ** 2 @ body.coefficient_errors.traction[source])
+        return float(errors[counted].sum() + (NEIGHBOUR_SHARE / degrees) ** 2 @ errors[source])
 
     def squared_energy_error(self) -> float:
         """Return the squared error in the energy norm [J/m] where zones end inside elements of degree 3 and more."""
@@ -219,19 +227,28 @@ class ContactPlaces:
     def _transition_errors(self) -> tuple[float, float]:
         """Squared errors of tractions in L2 [Pa^2 m], and in the energy norm [J/m], by `transition_error`.
 
-        The error has about the wave number 2 / d at the distance d of the transition from the end of its element.
+        The error has about the wave number 2 / l at the length l on which it changes its sign.
         """
-        from bemkit.results.error_indicators import transition_error
+        from bemkit.results.transition_error import transition_error
 
         solution, traction, energy = self.solution, 0.0, 0.0
         table, transitions = unrolled(solution.contact, solution.transitions)
+        tractions = sticking = [table.sigma_n, table.sigma_t]
+        if solution.friction_bound is not None:  # how far friction is below its bound
+            sticking = [solution.friction_bound[solution.contact.unrolled[1]] - np.abs(table.sigma_t)]
         for transition in transitions:
-            for side in self.sides(transition.part):
+            is_of_friction = "separated" not in (transition.from_status, transition.to_status)
+            fields = sticking if is_of_friction else tractions
+            for k, side in enumerate(self.sides(transition.part)):
                 end = side.near(np.array([transition.x, transition.y]))
                 if end.element in self._counted[side.body]:
-                    squared = transition_error(table, transition, transitions, end)
-                    plane_modulus = solution.bodies[side.body].scene.material.plane_modulus
-                    traction, energy = traction + squared, energy + 0.5 * squared * end.distance / plane_modulus
+                    body = solution.bodies[side.body]
+                    degree = element_degrees(body.scene.discretisation.displacement_space(body.mesh))[end.element]
+                    squared, length = transition_error(table, fields, transition, transitions, end, int(degree))
+                    plane_modulus = body.scene.material.plane_modulus
+                    energy += 0.5 * squared * length / plane_modulus
+                    if k == 0:  # the side with the nodes, for both
+                        traction += solution.n_sides(transition.part) * squared
         return traction, energy
 
 

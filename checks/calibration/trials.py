@@ -34,6 +34,8 @@ MOST_ELEMENTS = 500
 FEWEST = 5
 """Contact nodes that carry pressure, from which a mesh counts as fine enough, unless bemkit warns that curves turn too
 much on an element for any estimate."""
+ROUND_OFF = 1e-10
+"""Relative error of tractions that a polynomial represents exactly."""
 SHARPER = 5.0
 """Factor by which the fine solution must be more accurate than the error that it measures."""
 
@@ -136,6 +138,8 @@ def _row(index: int, degree: str, scene: Scene, fine: Solution) -> Row:
     limits = fine.estimated_error, fine.estimated_traction_error
     if any(value is None for value in (*estimates, *limits)):
         return Row(index, degree, reason="no estimate")
+    if tractions < ROUND_OFF:
+        return Row(index, degree, reason="exact")
     if energy < SHARPER * limits[0] or tractions < SHARPER * limits[1]:
         return Row(index, degree, reason="fine solution too coarse")
     return Row(index, degree, estimates[0] / energy, estimates[1] / tractions)

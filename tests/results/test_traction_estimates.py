@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import bemkit as bk
+from bemkit.results.contact_places import FAR_END_SHARE
 from bemkit.results.contact_table import ContactTable
 from bemkit.results.error_indicators import nodal_error
 from bemkit.results.solution import Solution
@@ -163,9 +164,10 @@ def test_singular_corners_are_excluded() -> None:
     table, (corner,) = solution.contact, solution.singular_corners
     assert [warning.kind for warning in solution.warnings] == ["singular contact traction"]
     length = solution.mesh.lengths[list(corner.elements)].sum()
-    at_corner = np.hypot(table.x - corner.x, table.y - corner.y) < 0.999 * length
-    assert at_corner.sum() == 2
-    counted = nodal_error(table, 2, solution.n_sides, at_corner)
+    distance = np.hypot(table.x - corner.x, table.y - corner.y) / length
+    share = np.select([distance < 0.999, distance < 1.001], [0.0, FAR_END_SHARE[1]], 1.0)
+    assert np.bincount(np.digitize(share, [0.05, 0.5])).tolist() == [2, 1, table.n_contact - 3]
+    counted = nodal_error(table, 2, solution.n_sides, share)
     assert counted is not None
     assert solution.places.squared_traction_error() == counted
-    assert counted < (nodal_error(table, 2, solution.n_sides, np.zeros(table.n_contact, bool)) or 0.0)
+    assert counted < (nodal_error(table, 2, solution.n_sides, np.ones(table.n_contact)) or 0.0)

@@ -153,11 +153,13 @@ def test_a_mesh_that_another_one_will_follow_is_as_coarse_as_that_one_allows(nam
 def test_the_first_mesh_in_layers_is_the_last_where_it_may_be() -> None:
     """For 1e-3 on the paper's examples: a degree more than for 4e-3, and a layer more where loads jump."""
     for name, n_jumps in (("paper-1", 2), ("paper-2", 0)):
-        (_, coarse), (_, fine) = (risen(name, accuracy) for accuracy in (4e-3, 1e-3))
+        (_, coarse), (_, fine, *_) = (risen(name, accuracy) for accuracy in (4e-3, 1e-3))
         assert (degree_of(coarse), degree_of(fine)) == (4, 5)
         assert fine.mesh.n_elements == coarse.mesh.n_elements + 2 * n_jumps
         assert fine.is_converged
-        assert traction_error(fine) <= 2e-3  # twice what is estimated, at most
+        assert traction_error(fine) <= 1e-3
+        # on Example 2 the estimate is 1.2e-3, so that another mesh follows
+        assert 1.0 < fine.estimated_traction_error / traction_error(fine) < 1.5
     assert [degree_of(solution) for solution in risen("paper-1", 3e-4)] == [2, 4, 5]  # too little for the first
     scene = bk.load_scene("paper-1")
     held = tuple(
