@@ -28,7 +28,6 @@ from bemkit.operators.pair_form import Tag
 from bemkit.operators.steklov_poincare import SteklovPoincare, TractionField
 from bemkit.operators.steklov_poincare.cost import BodyCase, physical_memory
 from bemkit.operators.steklov_poincare.nodal_conditions import (
-    SLIDES,
     ConflictingSupportsError,
     GivenData,
     NodalConditions,
@@ -319,7 +318,7 @@ def _why_dense(case: BodyCase) -> str:
         return f"the boundary has {len(mesh.loops)} closed curves"
     if _is_incompressible_with_holes(case):
         return "the material is incompressible, and the body has holes"
-    if _is_enclosed(case):
+    if case.is_enclosed:  # clusters do not determine the pressure
         return "contact and supports take all of the boundary of the incompressible body"
     return ""
 
@@ -327,10 +326,3 @@ def _why_dense(case: BodyCase) -> str:
 def _is_incompressible_with_holes(case: BodyCase) -> bool:
     """Whether the pressure in each hole is nearly undetermined, which makes clusters around holes nearly singular."""
     return len(case.mesh.loops) > 1 and case.material.effective_poisson_ratio > 0.5 - _LEAST_COMPRESSIBILITY
-
-
-def _is_enclosed(case: BodyCase) -> bool:
-    """Whether the pressure of an incompressible body is unknown until contact is: clusters do not determine it."""
-    normals = case.conditions.in_frames(case.mesh.normals)
-    changes = case.conditions.is_free & (np.abs(normals) > SLIDES)
-    return case.material.is_incompressible and not case.mesh.is_exterior and not changes.any()

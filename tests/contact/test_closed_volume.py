@@ -82,6 +82,7 @@ def test_a_half_cylinder_is_the_limit_of_compressible_ones(discretisation: objec
     solution = bk.run(half_disc(friction=friction, discretisation=discretisation))
     check_solution(solution)
     assert solution.certificate.worst < 1e-12
+    assert solution.work == solution.plan.work
     for distance in (1e-3, 1e-5):
         other = bk.run(half_disc(0.5 - distance, friction=friction, discretisation=discretisation))
         # the force is smooth in nu, with a relative derivative of 2.4

@@ -18,7 +18,7 @@ from bemkit.operators.linear.solvers import ChosenLinearSolver, DenseCholesky
 from bemkit.operators.linear.threads import n_threads
 from bemkit.operators.material import Material
 from bemkit.operators.rigid_modes import admissible_modes
-from bemkit.operators.steklov_poincare.nodal_conditions import GivenData, NodalConditions
+from bemkit.operators.steklov_poincare.nodal_conditions import SLIDES, GivenData, NodalConditions
 
 _BYTES = 8
 CONTACT_STEPS = 8
@@ -95,6 +95,17 @@ class BodyCase:
     def n_retained(self) -> int:
         """Number of components that contact determines."""
         return int(np.count_nonzero(self.conditions.is_retained))
+
+    @property
+    def is_enclosed(self) -> bool:
+        """Whether only contact determines the pressure in an incompressible body of constant elements.
+
+        See `bemkit.operators.steklov_poincare.volume_constraint.Volume.retained_pressure`.
+        """
+        if self.mesh.is_exterior or not self.material.is_incompressible:
+            return False
+        is_changing = np.abs(self.conditions.in_frames(self.mesh.normals)) > SLIDES
+        return not bool(np.any(is_changing & self.conditions.is_free))
 
     @property
     def n_curved(self) -> int:
@@ -225,7 +236,7 @@ def collocation_cost(case: BodyCase, *, takes_slopes: bool) -> BodyCost:
         single_layer=Entries.full(u, n_single) + Entries(u * n_loaded),
         double_layer=Entries.full(u, n_double) + Entries(u * n_moved),
         factorisations=(Factorisation(FactorKind.LU, order),),
-        right_hand_sides=r + len(sweeps),
+        right_hand_sides=r + int(case.is_enclosed) + len(sweeps),
     )
     # the system, its right-hand sides, and the copies of LU
     system = (u + len(admissible_modes(mesh))) ** 2
