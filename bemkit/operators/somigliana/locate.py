@@ -80,6 +80,10 @@ class Locator:
         self.clusters = Clusters.around(tree, ends)
         self._boxes = [_boxes(self.clusters, ends, level) for level in range(tree.n_levels + 1)]
         self._largest_bulge = float(self._bulge.max())
+        first, last = self._start[self._first], self._end[self._first + n_chords - 1]
+        self._middle = 0.5 * (first + last)
+        arms = np.abs(self._end - self._middle[self._owner]) + self._bulge
+        self._radius: FloatArray = np.maximum(np.maximum.reduceat(arms, self._first), np.abs(first - self._middle))
 
     def _on_elements(self, xi: FloatArray) -> ComplexArray:
         start, end = (
@@ -130,6 +134,11 @@ class Locator:
             return np.asarray(np.hypot(np.maximum(along, 0.0), np.maximum(across, 0.0)) > bound[point])
 
         _, (point, element) = self.clusters.divided(x.size, is_far)
+        # elements whose disc is farther than the start of another one drop out
+        farthest = _smallest(np.abs(x[point] - self._start[self._first[element]]), point, x.size)
+        to_disc = np.abs(x[point] - self._middle[element]) - self._radius[element]
+        near = np.flatnonzero(to_disc <= farthest[point] * (1.0 + 1e-9))
+        point, element = point[near], element[near]
         # nearest points of all chords; chords that cannot be nearest drop out
         counts = np.diff(np.append(self._first, self._owner.size))[element]
         point, chord = np.repeat(point, counts), consecutive(self._first[element], counts)
@@ -166,12 +175,15 @@ class Locator:
         """
         _, ends = self.curved.points(element, np.tile([-1.0, 1.0], (element.size, 1)))
         bend = 0.5 * (ends[:, 1] - ends[:, 0])
+        xi, moves = xi.copy(), np.arange(xi.size)
         for _ in range(N_REFINEMENTS):
-            y, slope = self.curved.points(element, xi[:, None])
-            way, square = x - y[:, 0], np.abs(slope[:, 0]) ** 2
-            step = (way * slope[:, 0].conj()).real / np.maximum(square - (way * bend.conj()).real, 0.5 * square)
-            before, xi = xi, np.clip(xi + step, -1.0, 1.0)
-            if np.abs(xi - before).max() <= _ROUND_OFF:
+            y, slope = self.curved.points(element[moves], xi[moves, None])
+            way, square = x[moves] - y[:, 0], np.abs(slope[:, 0]) ** 2
+            step = (way * slope[:, 0].conj()).real / np.maximum(square - (way * bend[moves].conj()).real, 0.5 * square)
+            before = xi[moves]
+            xi[moves] = np.clip(before + step, -1.0, 1.0)
+            moves = moves[np.abs(xi[moves] - before) > _ROUND_OFF]
+            if not moves.size:
                 break
         y, slope = self.curved.points(element, xi[:, None])
         return xi, x - y[:, 0], slope[:, 0]
