@@ -204,8 +204,9 @@ def _roots_near(function: Callable[[ComplexArray], ComplexArray], starts: Comple
     step = np.zeros_like(points)
     with np.errstate(all="ignore"):  # what leaves the region finds nothing
         for _ in range(_MOST_STEPS):
-            after, before = function(points + _DIFFERENCE), function(points - _DIFFERENCE)
-            step = function(points) * (2.0 * _DIFFERENCE) / (after - before)
+            around = np.concatenate([points, points + _DIFFERENCE, points - _DIFFERENCE])
+            values, after, before = np.split(function(around), 3)
+            step = values * (2.0 * _DIFFERENCE) / (after - before)
             step *= np.minimum(1.0, _LONGEST_STEP / np.maximum(np.abs(step), _IS_ROOT))
             points = points - step
     return points[np.abs(step) < _IS_ROOT]
