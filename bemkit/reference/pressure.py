@@ -78,7 +78,7 @@ def solve_pressure(
     n = n_terms
     x = half_width * np.cos((np.arange(n + 1) + 0.5) * np.pi / (2 * n + 2))
     places, weights = _rule(kernel, half_width, x)
-    even_chebyshev = np.cos(2.0 * np.arange(n) * np.arccos(places)[..., None])
+    even_chebyshev = np.polynomial.chebyshev.chebvander(2.0 * places**2 - 1.0, n - 1)
     system = np.column_stack([np.einsum("pq,pqn->pn", weights, even_chebyshev), unknown(x)])
     solution = np.asarray(np.linalg.solve(system, given(x)), dtype=np.float64)
     return EvenPressure(half_width, solution[:n]), float(solution[n])
