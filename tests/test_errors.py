@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import ast
 import builtins
 import importlib
 import pickle
 import pkgutil
+import re
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -21,6 +21,7 @@ MISTAKES_OF_THE_CALLER = {"TypeError", "AttributeError", "AssertionError"}
 """Built-in errors that tell a programmer of a wrong call; no input of the command line leads to them."""
 
 
+RAISED = re.compile(r"^ *raise (?!type\()(\w+)\(", re.MULTILINE)
 COMPILED = "bemkit.operators.collocation.compiled_"
 
 
@@ -48,9 +49,7 @@ def test_no_module_raises_a_bare_built_in_error() -> None:
     for name in all_modules():
         file = importlib.import_module(name).__file__
         assert file is not None
-        for node in ast.walk(ast.parse(Path(file).read_text("utf-8"))):
-            if isinstance(node, ast.Raise) and isinstance(node.exc, ast.Call) and isinstance(node.exc.func, ast.Name):
-                raised.add((name, node.exc.func.id))
+        raised |= {(name, word) for word in RAISED.findall(Path(file).read_text("utf-8"))}
     built_in = {(name, word) for name, word in raised if hasattr(builtins, word)}
     assert {pair for pair in built_in if pair[1] not in MISTAKES_OF_THE_CALLER} == set()
 

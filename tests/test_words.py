@@ -28,9 +28,13 @@ _PROSE = {tokenize.COMMENT, tokenize.STRING} | {
 def prose_of(path: Path) -> str:
     """Return the words of a file that people read: of code its comments and texts, of others all but code."""
     text = path.read_text("utf-8")
-    if path.suffix in (".py", ".pyi"):
+    if path.suffix in (".py", ".pyi") and found_in(words_of(text)):  # reading tokens takes long
         tokens = tokenize.generate_tokens(io.StringIO(text).readline)
         text = "\n".join(token.string for token in tokens if token.type in _PROSE)
+    return words_of(text)
+
+
+def words_of(text: str) -> str:
     return re.sub(r"[\s#]+", " ", text)
 
 

@@ -28,7 +28,7 @@ def test_these_are_all_kinds_and_the_help_lists_them() -> None:
 ONE_PICTURE = "rough-surface --what contacts"
 
 
-@pytest.mark.parametrize("words", slow_except([*KINDS, ONE_PICTURE], "block", ONE_PICTURE))
+@pytest.mark.parametrize("words", slow_except([*KINDS, ONE_PICTURE], ONE_PICTURE))
 @pytest.mark.usefixtures("here")
 def test_two_commands_from_nothing_to_a_picture(words: str, capsys) -> None:
     kind, *what = words.split()

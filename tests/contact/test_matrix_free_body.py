@@ -41,7 +41,7 @@ SCENES = {
 }
 
 
-@pytest.mark.parametrize("name", slow_except(SCENES, "loose block", "tilted block", "incompressible", "weight"))
+@pytest.mark.parametrize("name", slow_except(SCENES, "loose block", "incompressible", "weight"))
 def test_solutions_are_those_of_dense_equations(name: str) -> None:
     own, dense = (bk.run(with_solver(SCENES[name], 200, each)) for each in (MatrixFree(1e-10), DenseCholesky()))
     assert is_iterated(own)  # fewer elements are dense

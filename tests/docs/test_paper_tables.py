@@ -36,6 +36,7 @@ def test_the_mesh_is_the_papers() -> None:
         assert mesh.n_elements == 320
 
 
+@pytest.mark.slow
 def test_example_1_is_constant_where_the_print_is(tables: tuple[PaperTable, PaperTable]) -> None:
     table = tables[0]
     assert np.all(np.abs(table.outer_steps[1:, 1:] - 13) <= 3)
@@ -46,6 +47,7 @@ def test_example_1_is_constant_where_the_print_is(tables: tuple[PaperTable, Pape
     assert np.ptp(table.outer_steps[1:, 0]) == 0
 
 
+@pytest.mark.slow
 def test_example_2_has_the_pattern_of_the_print(tables: tuple[PaperTable, PaperTable]) -> None:
     steps = tables[1].outer_steps
     # in the print 39, 38, 38 ...; then 29, 12, 12 ...; then 29, 10, 8 ... three times
@@ -60,6 +62,7 @@ def test_example_2_has_the_pattern_of_the_print(tables: tuple[PaperTable, PaperT
     assert steps[1, 2] > steps[2, 2]  # rho_1 = 1e3 is not yet large
 
 
+@pytest.mark.slow
 def test_newton_beats_every_cell(tables: tuple[PaperTable, PaperTable]) -> None:
     for table in tables:
         assert table.newton_solves <= 10
@@ -71,6 +74,7 @@ def test_the_printed_numbers_are_those_of_the_paper() -> None:
     assert np.sum(PRINTED[1]) == 39 + 4 * 38 + 4 * 29 + 4 * 12 + 3 * (10 + 3 * 8)
 
 
+@pytest.mark.slow
 def test_the_text_shows_each_cell(tables: tuple[PaperTable, PaperTable]) -> None:
     for table in tables:
         text = text_of(table)
@@ -86,6 +90,7 @@ def test_a_run_that_does_not_stop_is_an_error() -> None:
         paper_tables(options=AugmentedLagrangian(max_steps=3))
 
 
+@pytest.mark.slow
 def test_every_pair_is_a_task_and_finds_its_place(tables: tuple[PaperTable, PaperTable]) -> None:
     seen: list[Task[PaperCell]] = []
 

@@ -27,12 +27,14 @@ def cases() -> Mapping[str, Case]:
     return {name: make() for name, make in CASES.items()}
 
 
+@pytest.mark.slow
 def test_all_rows_are_listed_with_their_sources(cases: Mapping[str, Case]) -> None:
     listed = [(row[0], row[1], row[2]) for row in ROWS]
     rows = [(name, quantity.name, case.source) for name, case in cases.items() for quantity in case.quantities]
     assert listed == rows
 
 
+@pytest.mark.slow
 def test_all_rows_were_met_within_the_bounds_of_today(cases: Mapping[str, Case]) -> None:
     bounds = {(name, each.name): each.bounds for name, case in cases.items() for each in case.quantities}
     for name, quantity, _, _, errors, _, bound, met in ROWS:
@@ -41,6 +43,7 @@ def test_all_rows_were_met_within_the_bounds_of_today(cases: Mapping[str, Case])
         assert float(bound) == bounds[name, quantity][-1]
 
 
+@pytest.mark.slow
 def test_what_each_case_holds_for_is_said(cases: Mapping[str, Case]) -> None:
     said = VALIDITIES
     assert [row[0] for row in said] == list(CASES)
@@ -53,6 +56,7 @@ def test_the_summary_names_every_case_once() -> None:
     assert f"All {len(ROWS)} rows of {len(CASES)} cases" in results
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", list(CASES))
 def test_every_case_says_where_its_answer_comes_from(name: str, cases: Mapping[str, Case]) -> None:
     case = cases[name]

@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
@@ -15,6 +15,7 @@ from bemkit.geometry.pieces import (
 points = arrays(float, (150, 2), elements=st.integers(-20, 20).map(float))
 
 
+@settings(max_examples=settings.default.max_examples // 3)
 @given(points, points)
 def test_overlapping_boxes_finds_what_comparing_all_pairs_finds(a, b) -> None:
     low, high = np.minimum(a, b), np.maximum(a, b)
@@ -53,6 +54,7 @@ def test_segment_distances(c, d, distance: float, scale: float) -> None:
         assert segment_distances(*pair)[0] == pytest.approx(distance * scale, abs=4e-16 * scale)
 
 
+@settings(max_examples=settings.default.max_examples // 3)
 @given(points, points, points, st.floats(0.0, 1.0))
 def test_no_point_of_a_segment_is_nearer_than_the_distance(p, a, b, fraction: float) -> None:
     b = np.where((a == b).all(axis=1)[:, None], b + 1.0, b)

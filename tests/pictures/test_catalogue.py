@@ -69,7 +69,7 @@ def test_what_suits_a_result_is_drawn_where_nothing_is_named(solution: Solution)
 
 
 def test_pictures_of_several_contacts_are_numbered(solution: Solution) -> None:
-    arch = bk.run(bk.load_scene("masonry-arch"))
+    arch = bk.run(with_overrides(bk.load_scene("masonry-arch"), elements=12))
     drawn = figures(arch, ["friction-cone"])
     assert list(drawn) == [f"friction-cone-{number}" for number in range(1, len(arch.contact.parts) + 1)]
 

@@ -228,6 +228,7 @@ const mouse = (target, kind, x, y) =>
 """
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(CHROMIUM is None, reason="Chromium is not installed")
 def test_a_browser_shows_values_under_the_pointer_and_moves_the_steps(
     tmp_path: Path, text: str, solution: bk.Solution

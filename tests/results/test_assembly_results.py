@@ -24,6 +24,7 @@ from bemkit.sealed_file import seal
 pytest.importorskip("matplotlib")
 
 CYLINDERS = replace(bk.load_scene("two-cylinders"), mesh=bk.MeshOptions(elements=48))
+ARCH = with_overrides(bk.load_scene("masonry-arch"), elements=16)
 SMALL = ("--elements", "48")
 
 
@@ -35,7 +36,7 @@ def solution() -> Solution:
 @pytest.fixture(scope="module")
 def arch() -> Solution:
     """Copies that are turned, and obstacles."""
-    return bk.run(bk.load_scene("masonry-arch"))
+    return bk.run(ARCH)
 
 
 def call(*arguments: str) -> int:
@@ -131,7 +132,7 @@ def test_fields_inside_are_those_of_a_body(solution: Solution) -> None:
 
 
 def test_the_plan_foresees_the_counts_and_says_what_is_left_out(arch: Solution) -> None:
-    plan = make_plan(bk.load_scene("masonry-arch"))
+    plan = make_plan(ARCH)
     assert plan.work == arch.work == arch.plan.work
     items = {item.name: item for item in plan.items}
     assert items["copies"].is_needed
@@ -161,6 +162,6 @@ def test_the_command_line_takes_assemblies(capsys: pytest.CaptureFixture[str]) -
 
 
 def test_words_of_the_command_line_reach_bodies_with_options_of_their_own() -> None:
-    changed = with_overrides(bk.load_scene("masonry-arch"), elements=16, degree=2)
-    assert {changed.scene_of(body).mesh.elements for body in changed.placed_bodies} == {16}
+    changed = with_overrides(ARCH, elements=12, degree=2)
+    assert {changed.scene_of(body).mesh.elements for body in changed.placed_bodies} == {12}
     assert changed.scene_of(changed.placed_bodies[0]).discretisation == bk.Galerkin(2)

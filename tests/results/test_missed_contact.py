@@ -80,7 +80,7 @@ def test_a_body_that_stays_apart_is_converged(word: str) -> None:
 
 @pytest.mark.parametrize("degrees", [0.0, pytest.param(20.0, marks=pytest.mark.slow)])
 def test_rising_degrees_find_contact_between_nodes(degrees: float) -> None:
-    exact = bk.run(roll(1e-6, degrees, bk.Galerkin(2), bk.MeshOptions(accuracy=1e-3)))
+    exact = bk.run(roll(1e-6, degrees, bk.Galerkin(2), bk.MeshOptions(accuracy=4e-3)))
     rising = bk.MeshOptions(accuracy=1e-2, rising_degrees=True)
     solution = bk.run(roll(1e-6, degrees, bk.Galerkin(2), rising))
     assert solution.is_converged

@@ -119,7 +119,7 @@ def pressures(solution: bk.Solution, s: FloatArray) -> FloatArray:
     return sampled_fields(solution, [SamplePoints("floor", s, np.ones_like(s))]).sigma_n
 
 
-@pytest.mark.parametrize("coefficient", slow_except([0.3, 2.0], 2.0))
+@pytest.mark.parametrize("coefficient", slow_except([0.3, 2.0], 0.3))
 def test_pressures_grow_as_the_exponents_say(coefficient: float) -> None:
     """Over two decades, to a thousandth: further in are the last elements, further out other terms matter."""
     solution = solved(1e-6, coefficient)

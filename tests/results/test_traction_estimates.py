@@ -15,7 +15,7 @@ from bemkit.results.error_indicators import nodal_error
 from bemkit.results.solution import Solution
 from bemkit.solvers.active_sets import NodeStatus
 from checks.calibration.true_errors import true_errors
-from tests.slow import slow_except
+from tests.slow import slow_except, slow_only
 
 LAYERS = bk.MeshOptions(accuracy=1e-3, rising_degrees=True)
 
@@ -32,7 +32,7 @@ def reference() -> Solution:
 
 
 @pytest.mark.parametrize("n_elements", slow_except((80, 120, 160, 240), 120))
-@pytest.mark.parametrize("degree", [1, 2])
+@pytest.mark.parametrize("degree", slow_only([1, 2], 2))
 def test_the_estimates_are_near_the_errors(degree: int, n_elements: int, reference: Solution) -> None:
     solution = solved("pin-in-plate", degree, bk.MeshOptions(elements=n_elements))
     energy, tractions = true_errors(solution, reference)

@@ -49,7 +49,7 @@ def check_balance(loading: LoadHistory, tolerance: float) -> None:
 
 @pytest.mark.parametrize(
     ("discretisation", "friction"),
-    [(bk.Galerkin(1), 0.3), (bk.Galerkin(3), 0.2)],  # so little that no edge lifts
+    slow_except([(bk.Galerkin(1), 0.3), (bk.Galerkin(3), 0.2)], (bk.Galerkin(1), 0.3)),  # so little that no edge lifts
     ids=["linear", "degree 3"],
 )
 def test_over_a_closed_cycle_friction_takes_what_the_push_gives(
@@ -284,7 +284,7 @@ def test_histories_with_an_accuracy(accuracy: float) -> None:
     assert solution.loading.is_complete
     assert solution.estimated_error is not None
     assert solution.estimated_error <= accuracy
-    fine = replace(LOOP, steps=steps, mesh=bk.MeshOptions(elements=400), discretisation=bk.Galerkin(2))
+    fine = replace(LOOP, steps=steps, mesh=bk.MeshOptions(elements=int(2.0 / accuracy)), discretisation=bk.Galerkin(2))
     for one, other in zip(solution.loading.steps, solved(fine).steps, strict=True):
         assert one.elastic_energy == pytest.approx(other.elastic_energy, rel=accuracy)  # the square of it, in theory
 
@@ -337,7 +337,8 @@ def test_laws_that_depend_on_slip_share_what_does_not_depend_on_the_law(monkeypa
         return respond(self, conditions)
 
     monkeypatch.setattr(DenseBody, "respond", counted)
-    loading = solved(replace(LOOP, law=SlipWeakening(0.6, 0.3, 0.05), steps=LOOP.steps[:3]))
+    press, shear = LOOP.steps
+    loading = solved(replace(LOOP, law=SlipWeakening(0.6, 0.3, 0.05), steps=(press, replace(shear, increments=10))))
     n_solves = sum(step.linear_solves for step in loading.steps)
     assert n_solves > 2 * len(loading.steps)
     assert n_responses <= 1.3 * n_solves

@@ -79,7 +79,7 @@ positive = st.floats(1e-3, 1e3)
 lengths = st.floats(-1e3, 1e3)
 points = st.tuples(lengths, lengths)
 fields = st.one_of(lengths, st.sampled_from([Expression("x**2 * (1 - y)"), Expression("where(x > 0.5, 1, -y)")]))
-texts = st.text(st.characters(codec="utf-8", exclude_categories=["C", "Z"]), min_size=1, max_size=20)
+texts = st.text(st.characters(exclude_categories=["C", "Z"]), min_size=1, max_size=20)
 
 shapes = st.one_of(
     st.builds(Rectangle, positive, positive, points),
@@ -135,7 +135,7 @@ def scenes(draw: st.DrawFn) -> Scene:
         parts.append(Part(name, draw(conditions), draw(st.sampled_from([(), sides[1:]])), where))
     return Scene(
         title=draw(texts),
-        description=draw(st.text(st.characters(codec="utf-8", exclude_categories=["Cs"]), max_size=40)),
+        description=draw(st.text(st.characters(exclude_categories=["Cs"]), max_size=40)),
         shape=shape,
         material=Material(draw(positive), draw(st.floats(-0.9, 0.5)), draw(st.sampled_from(Plane))),
         parts=tuple(parts),

@@ -99,7 +99,7 @@ def test_weight_changes_with_the_rows(bodies_made: list[str]) -> None:
 @pytest.mark.parametrize(
     ("vary", "n_bodies"),
     [
-        ({FRICTION: [0.0, 0.3], "bodies.upper.parts.pushed.condition.y": [-0.0022, -0.004]}, 1),
+        ({FRICTION: [0.3], "bodies.upper.parts.pushed.condition.y": [-0.0022, -0.004]}, 1),
         ({"contacts[0].gap": [0.0, -0.001]}, 1),
         ({"bodies.lower.material.youngs_modulus": [0.91, 9.1]}, 0),
     ],
@@ -178,7 +178,7 @@ def test_rows_are_on_disk_and_more_can_be_added(tmp_path: Path) -> None:
 
 
 def test_executors_give_the_same_rows() -> None:
-    values = {FRICTION: [0.1, 0.3, 0.5, 0.7], "material.poisson_ratio": [0.0, 0.3]}
+    values = {FRICTION: [0.1, 0.3], "material.poisson_ratio": [0.0, 0.3]}
     with ThreadPoolExecutor(2) as executor:
         spread = bk.sweep(SCENE, values, executor=executor)
     for name in RESULTS:

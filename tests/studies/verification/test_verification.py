@@ -22,7 +22,7 @@ from bemkit.studies.verification.case import Case, Quantity
 from bemkit.studies.verification.cases import CASES
 from bemkit.studies.verification.records import FILE
 from bemkit.studies.verification.verification import Comparison, verify
-from tests.slow import slow_only
+from tests.slow import slow_except, slow_only
 
 FAST = ("rotating-disc", "uniform-slip", "gravity-column", "pair-patch", "gravity-columns", "kirsch-hole")
 
@@ -36,12 +36,17 @@ def test_fast_cases_are_met() -> None:
     assert len(kirsch.errors) == 2
 
 
-@pytest.mark.parametrize("name", ["receding-pair", "cattaneo-mindlin"])
+@pytest.mark.parametrize("name", slow_only(["receding-pair", "cattaneo-mindlin"], "cattaneo-mindlin"))
 def test_meshes_of_several_bodies_follow_the_solution(name: str) -> None:
     assert not verify([name], quick=True).missed
 
 
-@pytest.mark.parametrize("name", ["westergaard", "disc-between-plates", "paper-1", "paper-2", "complete-contact-90"])
+@pytest.mark.parametrize(
+    "name",
+    slow_except(
+        ["westergaard", "disc-between-plates", "paper-1", "paper-2", "complete-contact-90"], "westergaard", "paper-1"
+    ),
+)
 def test_rising_degrees_reach_the_accuracies_asked_for(name: str) -> None:
     assert not verify([name], quick=True).missed
 
