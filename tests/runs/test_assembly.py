@@ -482,3 +482,26 @@ def test_stiff_bodies_between_soft_ones_touch_each_other() -> None:
     for part in ("a.top / b.bottom", "c.top / d.bottom"):
         one, other = (each.contact.sigma_n[each.contact.rows(part)] for each in (stiff, stiffer))
         np.testing.assert_allclose(one, other, rtol=1e-5, atol=1e-5 * np.abs(one).max())
+
+
+def test_round_off_of_a_long_way_is_refined_on_graded_meshes() -> None:
+    """A plate moves fifty times as far to its pin as both deform; its support carries more than the contact."""
+    elastic = bk.Material(1.0, 0.3)
+    hold = bk.Part("hold", bk.PrescribedDisplacement(0.0, 0.0), ("arc-1",), lambda x, y: x > 0.9)
+    pull = bk.Part("pull", bk.PrescribedDisplacement(0.0051, 0.0), ("left",))
+    scene = bk.Scene(
+        title="Pin",
+        discretisation=bk.Galerkin(2),
+        bodies=(
+            bk.Body(name="pin", shape=bk.Disk(0.995), material=elastic, parts=(hold,)),
+            bk.Body(
+                name="plate",
+                shape=bk.PlateWithHole(4.0, 5.0, 1.0, corner=(-2.0, -2.5)),
+                material=elastic,
+                parts=(pull,),
+            ),
+        ),
+        contacts=(bk.ContactPair(("pin.arc-2, arc-3", "plate.hole-2, hole-3")),),
+        mesh=bk.MeshOptions(elements=60, grading=bk.Geometric(0.3, 4)),
+    )
+    assert bk.run(scene).certificate.force_imbalance < 1e-11  # a hundredth of the tolerance of solves

@@ -25,9 +25,10 @@ MOST_DENSE = 2500
 MOST_CONTRAST = 1e6
 """Largest ratio of moduli for which it is formed: of stiffer bodies the sparse form keeps strain and motion apart."""
 
-_ROUND_OFF = 1e-12
-"""Forces of missed relative displacements at which a response is refined, relative to all forces; without forces, what
-is missed of displacements by round-off."""
+_ROUND_OFF = 1e-11
+"""Imbalance of forces, a hundredth of the tolerance of solves, from which a response is refined."""
+_MISSED = 1e-12
+"""Round-off that displacements miss without any force, relative to the largest displacement."""
 
 _WITHOUT_LOAD = (
     *(
@@ -135,8 +136,8 @@ class JoinedBodies(CoupledMembers, LinearBody):
         forces.
         """
         _, missed = self.recover(state)
-        acting = max(np.abs(self.load).max(initial=0.0), (self.weights[:, None] * np.abs(state.traction)).max())
-        if not np.abs(missed * self.moduli).max() > _ROUND_OFF * acting:
+        largest = self._over_members(np.maximum, self._force_sizes(state))
+        if not np.any(np.abs(missed) * self._stiffness_scale > _ROUND_OFF * self._scale_at_nodes(largest)):
             return state
         nothing = [np.zeros_like(member.load) for member in self.members]
         homogeneous = replace(conditions, value=np.zeros_like(conditions.value))
@@ -181,14 +182,12 @@ class JoinedBodies(CoupledMembers, LinearBody):
         terms = self._terms(displacement)
         largest, total = self._force_scales(state, terms)
         if not (largest.max() > 0.0 and np.isfinite(largest).all()):
-            round_off = _ROUND_OFF * float(np.abs(state.displacement).max())
+            round_off = _MISSED * float(np.abs(state.displacement).max())
             return Imbalance(0.0 if np.abs(missed).max() <= round_off else float("inf"), 0.0)
-        largest = np.maximum(largest, LIGHTEST * largest.max())
         total = np.maximum(total, LIGHTEST * total.max())
 
         # the unexplained relative displacement of a node, as the force that it would take
-        force_by_displacement = self.moduli * np.repeat(self.weights / np.median(self.weights), 2)
-        force_by_displacement /= self.least_of_partners(largest)
+        force_by_displacement = self._stiffness_scale / self._scale_at_nodes(largest)
         missing = np.abs(missed) * force_by_displacement
         work = self._work_on_rigid_motions(state, total)
         # round-off of both: of relative displacements, and of the sums of forces
@@ -196,6 +195,15 @@ class JoinedBodies(CoupledMembers, LinearBody):
         of_rows = self._displacement_round_off(state, displacement) * force_by_displacement
         round_off = max(of_rows.max(), of_sums.max())
         return Imbalance(float(missing.max()), float(np.max(work, initial=0.0)), float(round_off))
+
+    @property
+    def _stiffness_scale(self) -> FloatArray:
+        """(2 n_contact,) array [Pa]: force that a relative displacement takes."""
+        return np.asarray(self.moduli * np.repeat(self.weights / np.median(self.weights), 2))
+
+    def _scale_at_nodes(self, largest: FloatArray) -> FloatArray:
+        """Return the scale (2 n_contact,) of forces at contact nodes, from the largest force on each member."""
+        return self.least_of_partners(np.maximum(largest, LIGHTEST * largest.max()))
 
     def _work_on_rigid_motions(self, state: ContactState, total: FloatArray) -> FloatArray:
         """Return the work of all forces on each rigid motion of largest entry one, relative to the forces `total`."""
@@ -231,12 +239,16 @@ class JoinedBodies(CoupledMembers, LinearBody):
         Forces count before they cancel: contact may press a rigid body from all sides, without a resultant. Where
         nothing is loaded and all forces are round-off, so that members have only moved, the terms take their place.
         """
-        nodal = np.abs(self.weights[:, None] * state.traction).ravel()
-        sizes = abs(self.gap_operator).T @ nodal + np.abs(self.load)
+        sizes = self._force_sizes(state)
         noise = NOISE_FACTOR * float(np.finfo(float).eps) * terms.sum()
         if not np.abs(self.load).sum() > 0.0 and sizes.sum() <= noise:
             sizes = terms
         return self._over_members(np.maximum, sizes), self._over_members(np.add, sizes)
+
+    def _force_sizes(self, state: ContactState) -> FloatArray:
+        """Return the sizes (n,) [N/m] of the forces of contact and load on all members, before they cancel."""
+        nodal = np.abs(self.weights[:, None] * state.traction).ravel()
+        return np.asarray(abs(self.gap_operator).T @ nodal + np.abs(self.load))
 
     def member_displacements(self, state: ContactState) -> tuple[FloatArray, ...]:
         """Return the displacements (n,) [m] of each member that go with a state."""
