@@ -16,7 +16,6 @@ from bemkit.atomic_files import OutputFileError, check_target, replacing, write_
 from bemkit.errors import InputError
 from bemkit.results.solution import Solution
 from bemkit.results.tables import to_csv, to_json
-from bemkit.results.vtk import bodies_of, write_vtk
 
 MOST_ACROSS = 1000
 """Points across a body at most, a million in all."""
@@ -119,6 +118,8 @@ def boundary_arrays(solution: Solution) -> dict[str, FloatArray | IntArray]:
     table = solution.contact
     arrays: dict[str, Any] = {f"contact/{name}": column for name, column in table.columns().items()}
     arrays["contact/part"] = np.array(table.part, dtype=str)
+    from bemkit.results.vtk import bodies_of
+
     for prefix, body in bodies_of(solution).items():
         fields = body.boundary
         arrays |= {f"{prefix}nodes": body.mesh.nodes, f"{prefix}elements": body.mesh.elements}
@@ -130,6 +131,12 @@ def boundary_arrays(solution: Solution) -> dict[str, FloatArray | IntArray]:
 def _write_npz(path: Path, solution: Solution) -> None:
     with replacing(path.resolve()) as temporary, temporary.open("wb") as stream:
         np.savez_compressed(stream, **boundary_arrays(solution))  # type: ignore[arg-type]  # names of arrays
+
+
+def _write_vtu(path: Path, solution: Solution, inside: int = 0) -> None:
+    from bemkit.results.vtk import write_vtk
+
+    write_vtk(path, solution, inside)
 
 
 def _check_hdf5(path: Path) -> Path:
@@ -156,7 +163,7 @@ FORMATS: Mapping[str, Format] = MappingProxyType(
         ".json": _text(to_json),
         ".csv": _text(lambda each: to_csv(each, "contact")),
         ".npz": Format(check_target, _write_npz),
-        ".vtu": Format(check_target, write_vtk, write_vtk),
+        ".vtu": Format(check_target, _write_vtu, _write_vtu),
     }
 )
 """By ending."""
