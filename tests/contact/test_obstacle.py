@@ -21,7 +21,7 @@ from bemkit.contact.obstacle import (
 from bemkit.contact.polygon import RigidPolygon
 from bemkit.errors import InputError
 from bemkit.formulas import Expression
-from bemkit.testing.independent_check.nodes import distance_to
+from bemkit.testing.independent_check.obstacles import distance_to
 
 coordinates = st.floats(-10.0, 10.0)
 points = st.tuples(coordinates, coordinates)

@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 import bemkit as bk
-from bemkit.testing.independent_check import violations_of_body
+from bemkit.testing.independent_check import violations_of
 from tests.slow import slow_except
 
 ELEMENTS = [bk.ConstantCollocation(), bk.Galerkin(1), bk.Galerkin(2)]
@@ -39,7 +39,7 @@ def bonded_punch(discretisation, friction_coefficient):
 def solved(scene):
     solution = bk.run(scene)
     assert solution.is_converged
-    assert violations_of_body(solution).is_good
+    assert violations_of(solution).is_good
     return solution
 
 

@@ -17,7 +17,7 @@ from bemkit.scene.symmetry import AsymmetricSceneError
 from bemkit.studies.stability.axes import find_axes
 from bemkit.studies.stability.records import Verdict
 from bemkit.studies.stability.sweep import sweep
-from bemkit.testing.independent_check import violations_of_bodies
+from bemkit.testing.independent_check import violations_of
 
 STEEL, SOFT = bk.Material(1.0, 0.3), bk.Material(0.5, 0.2)
 ABOUT_X = bk.Symmetry(x=0.0)
@@ -94,7 +94,7 @@ def test_half_of_the_bodies_answer_as_the_whole_ones() -> None:
     inside = np.array([[-0.3, -0.2], [0.3, -0.2]])
     fields = [bk.interior_fields(each.bodies["lower"]).stress(inside) for each in (half, whole)]
     np.testing.assert_allclose(fields[0], fields[1], atol=1e-10)
-    check = violations_of_bodies(half)
+    check = violations_of(half)
     assert check.is_good, check
 
 

@@ -17,7 +17,7 @@ from bemkit.results.load_history import LoadHistory, StepWork
 from bemkit.runs.step_errors import StepErrors
 from bemkit.scene.load_history import load_steps
 from bemkit.solvers.base import Status
-from bemkit.testing.independent_check import violations_of_body
+from bemkit.testing.independent_check import violations_of
 from tests.failing_solver import Failing
 from tests.runs.test_rigid_bodies import driven
 from tests.slow import slow_except
@@ -260,7 +260,7 @@ def test_a_bound_in_the_result_is_that_of_the_slip() -> None:
     np.testing.assert_allclose(solution.friction_bound, np.abs(solution.contact.sigma_t), rtol=1e-8)
     assert solution.between_nodes is not None
     assert solution.between_nodes.cone_excess < 1e-3  # of products of interpolants; 0.03 with the bound of slow slip
-    check = violations_of_body(solution)
+    check = violations_of(solution)
     assert check.is_good, check.faults
 
 

@@ -17,7 +17,7 @@ from bemkit.model.model import build_model
 from bemkit.model.prepared import prepare
 from bemkit.solvers.base import ContactSolver
 from bemkit.solvers.newton import carried_on
-from bemkit.testing.independent_check import violations_of_body
+from bemkit.testing.independent_check import violations_of
 from tests.slow import slow_except
 
 DRIVERS = [bk.SemismoothNewton(), bk.AugmentedLagrangian(), bk.FixedPoint(), bk.LemkePivoting()]
@@ -55,7 +55,7 @@ def test_a_body_that_gives_way_to_its_obstacle_is_solved_without_contact_forces(
     assert solution.is_converged
     assert not solution.contact.sigma_n.any()
     assert solution.contact.clearance.min() >= -1e-9 * distance
-    assert violations_of_body(solution).is_good
+    assert violations_of(solution).is_good
 
 
 def assert_right_or_unsolved(scene: bk.Scene, distance: float, push: float) -> bool:
@@ -70,7 +70,7 @@ def assert_right_or_unsolved(scene: bk.Scene, distance: float, push: float) -> b
     pushed = push * float(solution.mesh.lengths[solution.mesh.part("push")].sum()) if push else 0.0
     # a certificate lets 1e-6 of the forces pass, and without any some hundred eps of those that would strain the disc
     assert along_x == pytest.approx(-pushed, rel=1e-5, abs=1e-13 * distance)
-    assert violations_of_body(solution).is_good
+    assert violations_of(solution).is_good
     return True
 
 

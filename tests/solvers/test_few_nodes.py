@@ -8,7 +8,7 @@ from bemkit.contact.certificate import certify
 from bemkit.contact.laws import Coulomb
 from bemkit.contact.problem import ContactProblem, ContactState, DenseBody
 from bemkit.solvers.active_sets import NodeStatus, contact_sets
-from bemkit.testing.independent_check import violations_of_body
+from bemkit.testing.independent_check import violations_of
 from tests.slow import slow_only
 
 FEET = {
@@ -46,7 +46,7 @@ def test_no_node_hovers_and_no_slipping_node_is_called_stick(feet, solver):
         friction_coefficient, gap, height = values
         solution = bk.run(block(discretisation, solver, feet, friction_coefficient, gap, height))
         assert solution.is_converged
-        assert violations_of_body(solution).is_good
+        assert violations_of(solution).is_good
         assert solution.force_normal == pytest.approx(1.0, rel=1e-9)  # the certificate asks for that much
         table = solution.contact
         carries = np.abs(table.sigma_n) > 1e-6

@@ -8,11 +8,8 @@ supports, contact and friction, whether forces and energy balance, and whether t
 elastic body.
 """
 
-from bemkit.testing.independent_check.bodies_check import BodiesCheck as BodiesCheck
-from bemkit.testing.independent_check.bodies_check import violations_of as violations_of
-from bemkit.testing.independent_check.bodies_check import violations_of_bodies as violations_of_bodies
-from bemkit.testing.independent_check.boundary import CONTACT_LIMIT as CONTACT_LIMIT
-from bemkit.testing.independent_check.check import IndependentCheck as IndependentCheck
-from bemkit.testing.independent_check.check import violations_of_body as violations_of_body
+from bemkit.testing.independent_check.bodies import COARSE_LIMIT as COARSE_LIMIT
+from bemkit.testing.independent_check.check import violations_of as violations_of
 from bemkit.testing.independent_check.load_history import energy_fault as energy_fault
-from bemkit.testing.independent_check.verdict import COARSE_LIMIT as COARSE_LIMIT
+from bemkit.testing.independent_check.scales import CONTACT_LIMIT as CONTACT_LIMIT
+from bemkit.testing.independent_check.verdict import Violations as Violations

@@ -27,8 +27,7 @@ import numpy as np
 from bemkit.arrays import FloatArray, IntArray
 from bemkit.operators.material import Plane
 from bemkit.scene.plane_motion import FarField
-from bemkit.testing.independent_check.boundary import trusted_stress
-from bemkit.testing.independent_check.nodes import Fields
+from bemkit.testing.independent_check.bodies import MeasuredBody
 
 _MOST_PAIRS = 250_000
 """Largest number of pairs of elements: of more than 500 elements some displacements are skipped, but no traction."""
@@ -47,7 +46,7 @@ class Surface:
 
     Parameters
     ----------
-    fields : Fields
+    measured : MeasuredBody
     along, inward : (2,) arrays [-]
         Directions along s and into the half-plane.
     place, lengths : (n_elements,) arrays [m]
@@ -56,7 +55,7 @@ class Surface:
         Of the tractions on each element, in x and y.
     """
 
-    fields: Fields
+    measured: MeasuredBody
     along: FloatArray
     inward: FloatArray
     place: FloatArray
@@ -64,25 +63,25 @@ class Surface:
     force: FloatArray
 
     @classmethod
-    def of(cls, fields: Fields) -> Surface:
-        """Measure the surface of a solution."""
-        solution, boundary = fields.solution, fields.boundary
+    def of(cls, measured: MeasuredBody) -> Surface:
+        """Measure the surface of a body."""
+        body, boundary = measured.solved, measured.boundary
         outward = boundary.normals.mean(axis=(0, 1))
         outward /= np.hypot(*outward)
         along, lengths = np.array([outward[1], -outward[0]]), boundary.lengths
-        middles = np.einsum("eqc,eq->ec", boundary.points - solution.mesh.centre, boundary.shares) / lengths[:, None]
-        force = solution.boundary.traction * lengths[:, None]
-        return cls(fields, along, -outward, middles @ along, lengths, force)
+        middles = np.einsum("eqc,eq->ec", boundary.points - body.mesh.centre, boundary.shares) / lengths[:, None]
+        force = body.boundary.traction * lengths[:, None]
+        return cls(measured, along, -outward, middles @ along, lengths, force)
 
     @property
     def far(self) -> FarField:
         """Its motion far away; at rest by default."""
-        return self.fields.solution.scene.far or FarField()
+        return self.measured.solved.scene.far or FarField()
 
     @property
     def is_periodic(self) -> bool:
         """Whether the surface is periodic."""
-        surface = self.fields.solution.mesh.surface
+        surface = self.measured.solved.mesh.surface
         return surface is not None and surface.is_periodic
 
     @cached_property
@@ -93,7 +92,7 @@ class Surface:
     @cached_property
     def motions(self) -> FloatArray:
         """(n_elements, 2, 3) array: displacements by unit motions along x and y and a unit turn about the centre."""
-        offset = self.fields.solution.boundary.points - np.array(self.far.centre)
+        offset = self.measured.solved.boundary.points - np.array(self.far.centre)
         motions = np.zeros((*offset.shape, 3))
         motions[:, 0, 0] = motions[:, 1, 1] = 1.0
         motions[:, :, 2] = np.column_stack([-offset[:, 1], offset[:, 0]])
@@ -108,7 +107,7 @@ class Surface:
     @cached_property
     def by_tractions(self) -> FloatArray:
         """(n_seen, 2) array [m]: mean displacements in x and y that the tractions cause."""
-        material = self.fields.solution.scene.material
+        material = self.measured.solved.scene.material
         e, nu = material.youngs_modulus, material.poisson_ratio
         is_strain = material.plane is Plane.STRAIN
         by_logarithm = 2.0 / np.pi * ((1.0 - nu**2) if is_strain else 1.0) / e
@@ -181,7 +180,7 @@ class Surface:
     @property
     def by_strain(self) -> FloatArray:
         """(n_elements, 2) array [m]: displacements by the strain far away, along the surface from the centre."""
-        offset = (self.fields.solution.boundary.points - np.array(self.far.centre)) @ self.along
+        offset = (self.measured.solved.boundary.points - np.array(self.far.centre)) @ self.along
         return np.asarray(self.far.strain * np.outer(offset, self.along))
 
     @cached_property
@@ -195,7 +194,7 @@ class Surface:
         rows = np.flatnonzero(self.far.is_load_controlled)
         of_turn = np.array([1.0, 1.0, 1.0 / self.extent])
         motions = self.motions[self.seen]
-        left = self.fields.solution.boundary.displacement[self.seen] - self.by_tractions - motions @ self.far.motion
+        left = self.measured.solved.boundary.displacement[self.seen] - self.by_tractions - motions @ self.far.motion
         left -= self.by_strain[self.seen]
         matrix = (motions * of_turn)[:, :, rows].reshape(left.size, rows.size)
         amounts, result = np.linalg.lstsq(matrix, left.ravel(), rcond=None)[0], np.zeros(3)
@@ -205,17 +204,17 @@ class Surface:
     @cached_property
     def strained(self) -> FloatArray:
         """(n_elements, 2) array [m]: displacements without the motion of the whole body."""
-        return np.asarray(self.fields.solution.boundary.displacement - self.motions @ self.motion - self.by_strain)
+        return np.asarray(self.measured.solved.boundary.displacement - self.motions @ self.motion - self.by_strain)
 
     @cached_property
     def trusted_force(self) -> float:
         """Force [N/m] of tractions that may be round-off."""
-        return trusted_stress(self.fields.solution) * self.extent
+        return self.measured.scales.trusted * self.extent
 
     def elasticity_mismatch(self) -> float:
         """Return the difference [-] of displacements from those by tractions and the motion far away."""
-        modulus = self.fields.solution.scene.material.plane_modulus
-        moved = float(np.abs(self.fields.solution.boundary.displacement).max())
+        modulus = self.measured.solved.scene.material.plane_modulus
+        moved = float(np.abs(self.measured.solved.boundary.displacement).max())
         unit = max(float(np.abs(self.force).sum()) / modulus, _IN_MOTION * moved)
         return float(np.abs(self._fitted[1]).max()) / unit if unit > 0.0 else 0.0
 
@@ -232,19 +231,11 @@ class Surface:
 
     def energy_mismatch(self) -> float:
         """Return the difference of the elastic energy from half the work of tractions without the motion far away."""
+        moved = float(np.abs(self.measured.solved.boundary.displacement).max())
+        size = float(np.sum(np.hypot(*self.force.T) * np.hypot(*self.strained.T)))
+        size += _IN_MOTION * moved * float(np.abs(self.force).sum()) + moved * self.trusted_force
         work = 0.5 * float(np.sum(self.force * self.strained))
-        size = self._energy_size()
-        return abs(self.fields.solution.energy - work) / size if size > 0.0 else 0.0
-
-    def negative_energy(self) -> float:
-        """Return by how much the elastic energy is negative [-]."""
-        size = self._energy_size()
-        return max(-self.fields.solution.energy, 0.0) / size if size > 0.0 else 0.0
-
-    def _energy_size(self) -> float:
-        moved = float(np.abs(self.fields.solution.boundary.displacement).max())
-        strained = float(np.sum(np.hypot(*self.force.T) * np.hypot(*self.strained.T)))
-        return strained + _IN_MOTION * moved * float(np.abs(self.force).sum()) + moved * self.trusted_force
+        return abs(self.measured.energy - work) / size if size > 0.0 else 0.0
 
 
 def _gauss() -> tuple[FloatArray, FloatArray]:

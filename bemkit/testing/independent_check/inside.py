@@ -9,22 +9,22 @@ from __future__ import annotations
 import numpy as np
 
 from bemkit.arrays import FloatArray
+from bemkit.results.solved_body import SolvedBody
 from bemkit.scene.body_forces import Gravity, Heating, Rotation
 from bemkit.testing.independent_check.boundary import Boundary
-from bemkit.testing.independent_check.views import BodyView
 
 
-def inner_work(solution: BodyView, boundary: Boundary) -> FloatArray:
+def inner_work(body: SolvedBody, boundary: Boundary) -> FloatArray:
     """Return the work (3,) of forces inside on the translations and on the rotation about the centre by 1 / diameter.
 
     Heat does none.
     """
-    centre, diameter = solution.mesh.centre, solution.mesh.diameter
+    centre, diameter = body.mesh.centre, body.mesh.diameter
     arms, measure = boundary.points - centre, boundary.shares[..., None] * boundary.normals
     area = 0.5 * float(np.sum(arms * measure))
     moments = 0.5 * np.sum(arms**2 * measure, axis=(0, 1))
     work = np.zeros(3)
-    for force in solution.scene.body_forces:
+    for force in body.scene.body_forces:
         match force:
             case Gravity(density, acceleration):
                 density_of_force = density * np.array(acceleration, dtype=float)
@@ -38,21 +38,21 @@ def inner_work(solution: BodyView, boundary: Boundary) -> FloatArray:
     return work
 
 
-def without_particular(solution: BodyView, boundary: Boundary) -> tuple[FloatArray, FloatArray]:
+def without_particular(body: SolvedBody, boundary: Boundary) -> tuple[FloatArray, FloatArray]:
     """Return nodal displacements (n_nodes, 2) and tractions at quadrature points (n_elements, n_places, 2) without it.
 
     What is left belongs to a body in which nothing acts, for which Betti's theorem needs only the boundary.
     """
-    fields, particular = solution.boundary, solution.particular
+    fields, particular = body.boundary, body.particular
     if particular is None:
         return fields.displacement, boundary.traction
     left = fields.displacement - particular.displacement(fields.points)
-    return left, boundary.traction - particular_tractions(solution, boundary)
+    return left, boundary.traction - particular_tractions(body, boundary)
 
 
-def particular_tractions(solution: BodyView, boundary: Boundary) -> FloatArray:
+def particular_tractions(body: SolvedBody, boundary: Boundary) -> FloatArray:
     """Return the tractions (n_elements, n_places, 2) of the particular solution at quadrature points."""
-    if solution.particular is None:
+    if body.particular is None:
         return np.zeros_like(boundary.points)
-    stress = solution.particular.stress(boundary.points.reshape(-1, 2)).reshape(*boundary.points.shape, 2)
+    stress = body.particular.stress(boundary.points.reshape(-1, 2)).reshape(*boundary.points.shape, 2)
     return np.asarray(np.einsum("eqij,eqj->eqi", stress, boundary.normals))

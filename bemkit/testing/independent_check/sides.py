@@ -14,7 +14,7 @@ from scipy.spatial import cKDTree
 from bemkit.arrays import FloatArray, IntArray
 from bemkit.geometry.local_values import values_on_elements
 from bemkit.scene.contacts import ContactPair
-from bemkit.testing.independent_check.bodies import BodyMeasurements
+from bemkit.testing.independent_check.bodies import MeasuredBody
 
 _PARALLEL = 1e-9
 _SLIVER = 1e-9
@@ -31,15 +31,20 @@ _BESIDE = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class Side:
-    """Elements of one body in a contact."""
+    """A part of one body in a contact."""
 
-    body: BodyMeasurements
-    elements: IntArray
+    body: MeasuredBody
+    part: str
+
+    @property
+    def elements(self) -> IntArray:
+        """Its elements (k,)."""
+        return self.body.solved.mesh.part(self.part)
 
     @property
     def is_flat(self) -> bool:
         """Whether the elements lie on one line."""
-        mesh, normals = self.body.result.mesh, self._normals
+        mesh, normals = self.body.solved.mesh, self._normals
         return bool(mesh.is_straight[self.elements].all()) and float(np.abs(normals - normals[0]).max()) < _PARALLEL
 
     @property
@@ -54,14 +59,14 @@ class Side:
     @property
     def turn(self) -> float:
         """Largest angle [rad] by which an element turns."""
-        first, last = np.moveaxis(self.body.result.mesh.normals_at(self.elements, np.array([-1.0, 1.0])), 1, 0)
+        first, last = np.moveaxis(self.body.solved.mesh.normals_at(self.elements, np.array([-1.0, 1.0])), 1, 0)
         return float(np.arccos(np.clip(np.sum(first * last, axis=1), -1.0, 1.0)).max())
 
     def displacement(self, row: IntArray, xi: FloatArray) -> FloatArray:
         """Return displacements (n, 2) at xi (n,) of the elements at the positions `row` (n,)."""
-        result = self.body.result
-        space = result.scene.discretisation.displacement_space(result.mesh)
-        nodal = values_on_elements(space, result.boundary.displacement, self.elements[row])
+        solved = self.body.solved
+        space = solved.scene.discretisation.displacement_space(solved.mesh)
+        nodal = values_on_elements(space, solved.boundary.displacement, self.elements[row])
         return np.asarray(np.einsum("ln,nlc->nc", space.basis(xi), nodal))
 
 
@@ -100,7 +105,7 @@ def measure_flat(one: Side, two: Side, pair: ContactPair) -> Relative | None:
     # coordinates along and across the first side
     normal = one.normal / np.hypot(*one.normal)
     tangent = np.array([-normal[1], normal[0]])
-    meshes = one.body.result.mesh, two.body.result.mesh
+    meshes = one.body.solved.mesh, two.body.solved.mesh
     origin = meshes[0].start[one.elements[0]]
     ends = [
         (mesh.start[side.elements] - origin, mesh.end[side.elements] - origin)
@@ -154,7 +159,7 @@ def sampled_overlap(one: Side, two: Side, pair: ContactPair, reach: float) -> fl
     reach : float [m]
         Points farther apart than this do not face each other.
     """
-    mesh, boundary = two.body.result.mesh, one.body.boundary
+    mesh, boundary = two.body.solved.mesh, one.body.boundary
     # many samples of the second side, and the quadrature points of the first
     xi = np.linspace(-1.0, 1.0, _N_SAMPLES)
     rows = np.repeat(np.arange(two.elements.size), _N_SAMPLES)
@@ -164,7 +169,7 @@ def sampled_overlap(one: Side, two: Side, pair: ContactPair, reach: float) -> fl
     distance, nearest = (np.ravel(found) for found in cKDTree(samples).query(every, k=_N_NEAREST))
     points = np.repeat(every, _N_NEAREST, axis=0)
     normals = np.repeat(boundary.normals[one.elements].reshape(-1, 2), _N_NEAREST, axis=0)
-    displacement = boundary.interpolated(one.body.result.boundary.displacement)[one.elements]
+    displacement = boundary.interpolated(one.body.solved.boundary.displacement)[one.elements]
     motion = np.repeat(displacement.reshape(-1, 2), _N_NEAREST, axis=0)
     row, place = rows[nearest], np.tile(xi, two.elements.size)[nearest]
     element = two.elements[row]

@@ -14,7 +14,7 @@ from bemkit.pictures import draw_deformation
 from bemkit.pictures.shown import at_mesh_nodes, shown
 from bemkit.scene.toml import scene_from_toml, scene_to_toml
 from bemkit.scene.transform import AffineMap, transformed_scene
-from bemkit.testing.independent_check import violations_of_body
+from bemkit.testing.independent_check import violations_of
 from tests.scenes import DISCRETISATIONS, square, squeezed, whole_mesh
 from tests.slow import slow_except
 
@@ -72,14 +72,14 @@ def test_independent_evidence_says_of_the_half_what_it_says_of_the_whole(
     scene = replace(scene, discretisation=discretisation)
     half = bk.run(scene)
     whole = bk.run(replace(scene, symmetry=None), mesh=whole_mesh(scene, half.mesh))
-    check, expected = violations_of_body(half), violations_of_body(whole)
+    check, expected = violations_of(half), violations_of(whole)
     assert check.is_good
     assert check.worst <= 1e-12
     # the discretisation error, which shear does not enter by symmetry
     assert check.reciprocity == pytest.approx(expected.reciprocity, rel=1e-6, abs=1e-12)
     tilted = replace(half.contact, sigma_n=1.01 * half.contact.sigma_n)
     if len(scene.symmetry.rigid_motions):  # type: ignore[union-attr]
-        assert violations_of_body(replace(half, contact=tilted)).equilibrium > 1e-4  # 1 % of one of many forces
+        assert violations_of(replace(half, contact=tilted)).equilibrium > 1e-4  # 1 % of one of many forces
 
 
 def test_the_plan_counts_what_is_left() -> None:

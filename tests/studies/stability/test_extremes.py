@@ -12,7 +12,7 @@ import bemkit as bk
 from bemkit.runs.run import UnsolvableSceneError
 from bemkit.solvers.base import Status
 from bemkit.studies.stability.axes import find_axes
-from bemkit.testing.independent_check import violations_of_body
+from bemkit.testing.independent_check import violations_of
 from tests.scenes import CONSTANT, FLOOR, LINEAR, block, small_paper_scene
 from tests.slow import slow_except
 
@@ -40,7 +40,7 @@ def test_a_strip_of_1000_to_1_bends_as_beam_theory_says(load: str) -> None:
     )
     solution = bk.run(scene)
     assert solution.is_converged
-    assert violations_of_body(solution).is_good
+    assert violations_of(solution).is_good
     corner = np.argmin(np.hypot(*(solution.boundary.points - [length, 0.0]).T))
     exact = {
         "shear": -1e-9 * length**3 / (3.0 * modulus * inertia),
@@ -75,7 +75,7 @@ def test_one_node_grazes_a_bump_and_carries_everything(discretisation: bk.Galerk
     assert np.count_nonzero(solution.contact.status) == 1
     assert np.count_nonzero(solution.contact.sigma_n) == 1
     assert solution.force_normal == pytest.approx(1e-9, rel=1e-10)
-    assert violations_of_body(solution).is_good
+    assert violations_of(solution).is_good
 
 
 @DISCRETISATIONS
@@ -125,7 +125,7 @@ def test_no_load_gives_no_answer_but_zero(discretisation: bk.Galerkin) -> None:
     assert solution.linear_solves <= 2
     for name in ("u_n", "u_t", "sigma_n", "sigma_t"):
         np.testing.assert_array_equal(getattr(solution.contact, name), 0.0)
-    assert violations_of_body(solution).is_good
+    assert violations_of(solution).is_good
 
 
 @DISCRETISATIONS
@@ -138,7 +138,7 @@ def test_a_contact_part_that_never_touches(discretisation: bk.Galerkin, distance
     assert not solution.contact.status.any()
     assert not solution.contact.sigma_n.any()
     assert solution.transitions == ()
-    assert violations_of_body(solution).is_good
+    assert violations_of(solution).is_good
     other = bk.run(
         block(dataclasses.replace(low, condition=bk.Contact(bk.Gap(7.0))), *parts[1:], discretisation=discretisation)
     )
@@ -174,7 +174,7 @@ def test_a_body_slides_away_when_the_push_exceeds_friction(discretisation: bk.Ga
         solution = bk.run(scene)
         assert solution.is_converged
         assert solution.force_tangential == pytest.approx(-0.15 * share, rel=1e-8)
-        assert violations_of_body(solution).is_good
+        assert violations_of(solution).is_good
     else:
         with pytest.raises(UnsolvableSceneError, match=r"slides.*friction.*hold"):
             bk.run(scene)
@@ -291,7 +291,7 @@ def test_open_nodes_of_a_body_that_may_still_move_have_no_traction_at_all(name: 
     assert is_open.any()
     assert not solution.contact.sigma_n[is_open].any()
     assert not solution.contact.sigma_t[is_open].any()
-    assert violations_of_body(solution).is_good
+    assert violations_of(solution).is_good
 
 
 @pytest.mark.parametrize("discretisation", [LINEAR, CONSTANT, bk.Galerkin(2)])
@@ -307,7 +307,7 @@ def test_rollers_along_a_circle_do_not_hold_a_rotation(discretisation: bk.Galerk
     # friction takes the torque up: 1e-4 * 2 pi against 0.3 of the pressure on a quarter of the outer circle
     held = bk.run(dataclasses.replace(scene, law=bk.Coulomb(3.0)))
     assert held.is_converged
-    assert violations_of_body(held).is_good
+    assert violations_of(held).is_good
 
 
 def test_a_body_on_its_way_to_infinity_is_not_in_equilibrium() -> None:

@@ -17,7 +17,7 @@ from bemkit.studies.stability.axes import Axis, UnknownAxisError, axes_of, find_
 from bemkit.studies.stability.case import Case
 from bemkit.studies.stability.records import StabilityRecord, Verdict
 from bemkit.studies.stability.sweep import StabilityError, difference, solve_and_judge, sweep
-from bemkit.testing.independent_check import violations_of_body
+from bemkit.testing.independent_check import violations_of
 from tests.scenes import CONSTANT, LINEAR, small_paper_scene
 from tests.slow import slow_except, slow_only
 
@@ -198,6 +198,6 @@ def test_differences_on_other_meshes_are_means_and_see_missing_parts() -> None:
 @pytest.mark.parametrize("name", ["paper-1", "paper-2"])
 def test_no_row_of_the_whole_sweep_is_wrong(name: str, discretisation: bk.Galerkin) -> None:
     scene = dataclasses.replace(bk.load_scene(name), discretisation=discretisation)
-    assert violations_of_body(bk.run(scene)).is_good
+    assert violations_of(bk.run(scene)).is_good
     wrong = [row for row in sweep(scene, axes_of(scene)) if row.verdict == "wrong"]
     assert wrong == []

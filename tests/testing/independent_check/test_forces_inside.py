@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 import bemkit as bk
-from bemkit.testing.independent_check import violations_of_body
+from bemkit.testing.independent_check import violations_of
 from bemkit.testing.independent_check.boundary import boundary_of
 from bemkit.testing.independent_check.inside import inner_work
 from checks.random_scenes import random_case
-from tests.solutions import changed
+from tests.testing.independent_check.company import first_body, in_company, with_body
 
 FORCES = (
     bk.Gravity(1.0, (0.1, -1.0)),
@@ -24,7 +24,7 @@ FORCES = (
 
 
 @lru_cache
-def solved(*, is_symmetric: bool = False) -> bk.Solution:
+def solved(*, is_symmetric: bool = False, among: bool = False) -> bk.Solution:
     symmetric = (
         bk.Gravity(1.0, (0.0, -1.0)),
         bk.Rotation(1.0, 0.3, (0.5, 0.2)),
@@ -41,24 +41,27 @@ def solved(*, is_symmetric: bool = False) -> bk.Solution:
         discretisation=bk.Galerkin(2),
         mesh=bk.MeshOptions(60),
     )
-    return bk.run(scene)
+    return bk.run(in_company(scene) if among else scene)
 
 
 @pytest.mark.parametrize("is_symmetric", [False, True])
 def test_right_answers_pass(is_symmetric: bool) -> None:
     solution = solved(is_symmetric=is_symmetric)
     assert solution.is_converged
-    check = violations_of_body(solution)
+    check = violations_of(solution)
     assert check.worst < 1e-11
     assert check.reciprocity < 1e-3
 
 
+@pytest.mark.parametrize("among", [False, True], ids=["one body", "one of several"])
 @pytest.mark.parametrize("number", range(3))
-def test_forces_that_are_left_out_are_noticed(number: int) -> None:
-    solution = solved()
+def test_forces_that_are_left_out_are_noticed(number: int, among: bool) -> None:
+    solution = solved(among=among)
+    assert violations_of(solution).is_good
     others = tuple(force for k, force in enumerate(FORCES) if k != number)
-    forgetful = changed(solution, scene=dataclasses.replace(solution.scene, body_forces=others))
-    check = violations_of_body(forgetful)
+    scene = dataclasses.replace(first_body(solution).scene, body_forces=others)
+    forgetful = with_body(solution, scene=scene)
+    check = violations_of(forgetful)
     assert check.reciprocity > 1e-2
     assert ("equilibrium" in check.faults) == (number < 2)  # heat has no resultant
 
@@ -66,7 +69,7 @@ def test_forces_that_are_left_out_are_noticed(number: int) -> None:
 def test_resultants_are_those_of_the_domain() -> None:
     """A weight at the centroid; centrifugal forces as those of a point there."""
     solution = solved()
-    work = inner_work(solution, boundary_of(solution))
+    work = inner_work(solution.body, boundary_of(solution.body, ()))
     arm = np.array([0.5, 0.75]) - [0.4, 0.2]
     np.testing.assert_allclose(work[:2], 1.5 * (np.array([0.1, -1.0]) + 0.09 * arm), rtol=1e-13)
     assert abs(work[2]) < 1e-15  # about the centroid

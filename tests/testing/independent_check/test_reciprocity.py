@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import bemkit as bk
-from bemkit.testing.independent_check.balance import (
+from bemkit.testing.independent_check.reciprocity import (
     State,
     centre_of_dilatation,
     point_force,

@@ -11,8 +11,9 @@ import pytest
 
 import bemkit as bk
 from bemkit.results.solution import Solution
-from bemkit.testing.independent_check import BodiesCheck, violations_of_bodies
+from bemkit.testing.independent_check import Violations, violations_of
 from checks.trials import Outcome, judge
+from tests.testing.independent_check.company import in_company
 
 MATERIAL = bk.Material(1.0, 0.3)
 SIDE = "upper.bottom / lower.top"
@@ -46,7 +47,7 @@ def solved(degree: int = 2) -> Solution:
 
 
 def test_a_right_solution_passes_to_round_off() -> None:
-    check = violations_of_bodies(solved())
+    check = violations_of(solved())
     assert check.faults == ()
     assert check.worst < 1e-9  # the certificate; gaps, means, reactions and equilibrium are round-off
     assert check.reciprocity < 0.02
@@ -77,17 +78,17 @@ FAULTS: dict[str, tuple[Callable[[], Solution], str]] = {
     "friction beyond the cone": (lambda: changed_table(sigma_t=lambda s: np.where(middle(s), -0.5, s)), "cone_excess"),
     "friction along slip": (lambda: changed_table(sigma_t=lambda s: -s), "slip_opposition"),
     "another gap": (lambda: changed_table(gap=lambda g: g + 1e-3, clearance=lambda c: c + 1e-3), "gaps"),
-    "bodies apart": (lambda: changed_table(u_n=lambda u: u - 1e-3, clearance=lambda c: c + 1e-3), "means"),
+    "bodies apart": (lambda: changed_table(u_n=lambda u: u - 1e-3, clearance=lambda c: c + 1e-3), "table"),
     "bodies in each other": (
         lambda: changed_table(u_n=lambda u: u + 1e-3, clearance=lambda c: c - 1e-3),
         "penetration",
     ),
-    "another slip": (lambda: changed_table(u_t=lambda u: u + 1e-3), "means"),
+    "another slip": (lambda: changed_table(u_t=lambda u: u + 1e-3), "table"),
     "a status": (lambda: changed_table(status=lambda s: np.where(middle(s), 0, s)), "status"),
     "a partner that feels less": (lambda: changed_body("lower", "traction_dofs", lambda t: 0.9 * t), "reactions"),
     "all contact too weak": (lambda: changed_table(sigma_n=lambda s: 0.9 * s), "equilibrium"),
     "a base that gives way": (lambda: changed_body("lower", "displacement", lambda u: u + 1e-3), "supports"),
-    "a body elsewhere": (lambda: changed_body("upper", "displacement", lambda u: u + np.array([0.0, 1e-3])), "means"),
+    "a body elsewhere": (lambda: changed_body("upper", "displacement", lambda u: u + np.array([0.0, 1e-3])), "table"),
     "no number": (lambda: changed_body("upper", "displacement", lambda u: u * np.nan), "numbers"),
 }
 
@@ -96,7 +97,7 @@ FAULTS: dict[str, tuple[Callable[[], Solution], str]] = {
 def test_faults_are_named(fault: str) -> None:
     make, name = FAULTS[fault]
     solution = make()
-    assert name in violations_of_bodies(solution).faults
+    assert name in violations_of(solution).faults
     assert judge([solution])[0] is Outcome.WRONG
 
 
@@ -104,8 +105,8 @@ def test_energy_and_elasticity_are_compared() -> None:
     solution = solved()
     upper = solution.bodies["upper"]
 
-    def with_upper(**changes: object) -> BodiesCheck:
-        return violations_of_bodies(replace(solution, bodies={**solution.bodies, "upper": replace(upper, **changes)}))
+    def with_upper(**changes: object) -> Violations:
+        return violations_of(replace(solution, bodies={**solution.bodies, "upper": replace(upper, **changes)}))
 
     assert "energy" in with_upper(energy=1.01 * upper.energy).faults
     assert "negative_energy" in with_upper(energy=-upper.energy).faults
@@ -113,8 +114,11 @@ def test_energy_and_elasticity_are_compared() -> None:
     assert other.needs_warning == "reciprocity"
 
 
-def test_sides_that_overlap_deeply_between_nodes_need_a_name() -> None:
-    """A disc of thirteen constant elements between plates: the mean distance of an element closes, not its middle."""
+def disc(among: bool) -> bk.Solution:
+    """A disc of thirteen constant elements between plates, or on a rigid floor.
+
+    The mean distance of an element closes, not its middle.
+    """
     plate = bk.Body(
         name="plate",
         shape=bk.Rectangle(2.0, 1.0, (-1.0, -1.0)),
@@ -122,48 +126,54 @@ def test_sides_that_overlap_deeply_between_nodes_need_a_name() -> None:
         parts=(bk.Part("base", bk.Clamped(), ("bottom",)),),
         mesh=bk.MeshOptions(elements=30),
     )
-    halves = (bk.Part("low", bk.Free(), ("arc-3", "arc-4")), bk.Part("top", bk.Traction(y=-1e-5), ("arc-1", "arc-2")))
-    disc = bk.Body(
+    below = bk.Free() if among else bk.Contact(bk.RigidHalfPlane())
+    halves = (bk.Part("low", below, ("arc-3", "arc-4")), bk.Part("top", bk.Traction(y=-1e-5), ("arc-1", "arc-2")))
+    body = bk.Body(
         name="disc", shape=bk.Disk(0.5, (0.0, 0.5)), material=MATERIAL, parts=halves, mesh=bk.MeshOptions(elements=13)
     )
     pair = bk.ContactPair(("disc.low", "plate.top"), multipliers_on="disc.low")
-    solution = bk.run(
+    return bk.run(
         bk.Scene(
             title="Disc",
-            bodies=(plate, disc),
-            contacts=(pair,),
+            bodies=(plate, body) if among else (body,),
+            contacts=(pair,) if among else (),
             law=bk.Tresca(1e-4),
             discretisation=bk.ConstantCollocation(),
         )
     )
-    check = violations_of_bodies(solution)
+
+
+@pytest.mark.parametrize("among", [False, True], ids=["one body", "one of several"])
+def test_sides_that_overlap_deeply_between_nodes_need_a_name(among: bool) -> None:
+    solution = disc(among)
+    check = violations_of(solution)
     assert check.is_good
     assert check.needs_warning == "hidden_overlap"
     assert solution.status is bk.Status.MISSED_CONTACT
     assert judge([solution])[:2] == (Outcome.NAMED, "missed_contact")
     belittled = replace(solution)
-    (said,) = solution.contacts_between_nodes.values()
-    belittled.__dict__["contacts_between_nodes"] = {
-        pair.name: replace(said, penetration_depth=said.penetration_depth / 2)
-    }
-    assert violations_of_bodies(belittled).faults == ("between_nodes",)
+    ((name, said),) = solution.contacts_between_nodes.items()
+    belittled.__dict__["contacts_between_nodes"] = {name: replace(said, penetration_depth=said.penetration_depth / 2)}
+    assert violations_of(belittled).faults == ("between_nodes",)
 
 
-def test_rigid_bodies_move_and_are_loaded_as_they_are_told() -> None:
-    solution = bk.run(bk.load_scene("tilted-punch"))
-    check = violations_of_bodies(solution)
+@pytest.mark.parametrize("among", [False, True], ids=["one body", "one of several"])
+def test_rigid_bodies_move_and_are_loaded_as_they_are_told(among: bool) -> None:
+    scene = bk.load_scene("tilted-punch")
+    solution = bk.run(in_company(scene) if among else scene)
+    check = violations_of(solution)
     assert check.is_good, check
     assert check.rigid < 1e-12  # sums of forces on a hundred nodes
     (punch,) = solution.rigid.values()
     for name in ("x", "force_x", "force_y", "moment"):
         changed = replace(punch, **{name: getattr(punch, name) + 1e-4})  # type: ignore[arg-type]
-        wrong = violations_of_bodies(replace(solution, rigid={"punch": changed}))
+        wrong = violations_of(replace(solution, rigid={"punch": changed}))
         assert "rigid" in wrong.faults, name
     gap = np.where(solution.contact.gap < 0.1, solution.contact.gap + 1e-3, solution.contact.gap)
     moved = replace(solution.contact, gap=gap, clearance=gap - solution.contact.u_n)
-    assert "gaps" in violations_of_bodies(replace(solution, contact=moved)).faults
+    assert "gaps" in violations_of(replace(solution, contact=moved)).faults
     sunk = replace(punch, y=2.0 * punch.y)
-    assert "energy" in violations_of_bodies(replace(solution, rigid={"punch": sunk})).faults
+    assert "energy" in violations_of(replace(solution, rigid={"punch": sunk})).faults
 
 
 def test_a_disc_that_turns_in_its_hole_is_not_in_the_rock() -> None:
@@ -196,7 +206,7 @@ def test_a_disc_that_turns_in_its_hole_is_not_in_the_rock() -> None:
 
     def overlap(displacement: np.ndarray) -> float:
         moved = replace(placed, boundary=replace(placed.boundary, displacement=displacement))
-        return violations_of_bodies(replace(solution, bodies={**solution.bodies, "disc": moved})).hidden_overlap
+        return violations_of(replace(solution, bodies={**solution.bodies, "disc": moved})).hidden_overlap
 
     assert overlap(displacement) < 0.02
     assert overlap(turned) < 0.02  # a thousand times the displacements, all along the wall
@@ -224,5 +234,5 @@ def beside_one_that_carries_nothing(traction: float) -> Solution:
 
 def test_bodies_that_carry_nothing_are_not_judged_by_their_round_off() -> None:
     """A pull of 1e-15 of the load is round-off of the others, beside nothing at all; 1e-6 of it is a fault."""
-    assert violations_of_bodies(beside_one_that_carries_nothing(1e-15)).faults == ()
-    assert "tension" in violations_of_bodies(beside_one_that_carries_nothing(1e-6)).faults
+    assert violations_of(beside_one_that_carries_nothing(1e-15)).faults == ()
+    assert "tension" in violations_of(beside_one_that_carries_nothing(1e-6)).faults

@@ -1,0 +1,151 @@
+"""The contact table against the fields of the bodies: gaps, displacements, tractions, reported forces, rigid bodies."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+
+from bemkit.arrays import BoolArray
+from bemkit.results.solution import Solution
+from bemkit.testing.independent_check.bodies import MeasuredBody
+from bemkit.testing.independent_check.contacts import MeasuredContact
+from bemkit.testing.independent_check.scales import EPSILON, beyond, largest
+from bemkit.testing.independent_check.sides import Relative, Side, measure_flat
+
+
+def flat_sides(contact: MeasuredContact) -> Relative | None:
+    """Measure two flat sides on each other; None of others, and at obstacles."""
+    if contact.partner is None or contact.pair is None:
+        return None
+    return measure_flat(contact.owner, contact.partner, contact.pair)
+
+
+def gap_mismatch(contact: MeasuredContact) -> float:
+    """Return the largest difference [-] of gaps from distances measured again, of obstacles and of flat sides."""
+    table, scales = contact.table, contact.owner.body.scales
+    distance = contact.distance
+    if contact.facing is None:
+        flat = flat_sides(contact)
+        if flat is None or contact.pair is None:
+            return 0.0
+        distance = flat.distance + contact.pair.gap_at(contact.points)
+    # of several obstacles in front of one part only the nearest counts
+    is_alone = contact.facing is not None and contact.owner.body.touched.count(contact.owner.part) == 1
+    if is_alone and np.any((np.isfinite(table.gap) != np.isfinite(distance)) & ~contact.is_grazing):
+        return float("inf")
+    known = np.isfinite(table.gap) & np.isfinite(distance)
+    coordinates = max(scales.coordinates, 64.0 * EPSILON * largest(np.abs(contact.points)))
+    return beyond(np.abs(table.gap[known] - distance[known]), coordinates, contact.length)
+
+
+def displacement_mismatch(contact: MeasuredContact) -> float:
+    """Return the largest difference [-] of the displacements in the table from those of the boundary.
+
+    At obstacles those at the same points, between flat sides means. Clearances are gaps less displacements.
+    """
+    table, scales = contact.table, contact.owner.body.scales
+    known, round_off = np.isfinite(table.gap), scales.coordinates + contact.turned
+    rows = contact.stated_displacement
+    differences = [table.clearance[known] - (table.gap - table.u_n)[known], contact.offset]
+    flat = flat_sides(contact)
+    if contact.facing is not None:
+        differences.append((rows - contact.displacement)[known])
+    elif flat is not None and abs(table.weight.sum() - flat.length) <= 1e-9 * flat.length:
+        # slivers beside nodes that others hold carry no multiplier
+        differences.append((table.weight @ rows - flat.means) / flat.length)
+    return max(beyond(np.abs(each), round_off, contact.length) for each in differences)
+
+
+def resultant_mismatch(solution: Solution, contacts: Iterable[MeasuredContact]) -> float:
+    """Return the largest difference [-] of the reported forces of contacts from sums over the table."""
+    worst, measured = [0.0], {contact.name: contact for contact in contacts}
+    for stated in solution.contacts:
+        contact, depth = measured[stated.name], solution.scene.depth
+        normal, tangential = depth * contact.forces_along.sum(axis=0)
+        size = depth * float(np.abs(contact.forces_along).sum() + contact.stress * contact.table.weight.min())
+        worst += [abs(stated.force_normal + normal) / size, abs(stated.force_tangential - tangential) / size]
+    return float(np.max(worst))
+
+
+def nodal_mismatch(measured: MeasuredBody, contacts: Iterable[MeasuredContact]) -> float:
+    """Return the largest difference [-] of mean tractions of elements at obstacles from those that nodes interpolate.
+
+    A node at a corner between two contact parts belongs to one of them, with the lengths of both: its force makes other
+    tractions on the elements there than the node says, and so on their neighbours, which are excluded.
+    """
+    body, boundary = measured.solved, measured.boundary
+    at_obstacles = [each for each in contacts if each.owner.body is measured and each.facing is not None]
+    nodal, owner = np.zeros_like(body.boundary.points), np.full(len(body.boundary.points), "", dtype=object)
+    for contact in at_obstacles:
+        np.add.at(nodal, contact.nodes, contact.forces / contact.table.weight[:, None])
+        owner[contact.nodes] = contact.owner.part
+    worst, beside = [0.0], _beside_corners(measured)
+    for part in {contact.owner.part for contact in at_obstacles}:
+        elements = body.mesh.part(part)
+        own = elements[np.isin(owner[boundary.nodes[elements]].astype(str), ["", part]).all(axis=1)]
+        own = own[~beside[own]]
+        mean = np.einsum("eqc,eq->ec", boundary.interpolated(nodal)[own], boundary.shares[own])
+        mean /= boundary.lengths[own][:, None]
+        stated = body.boundary.traction[own]
+        # elements as short as the round-off of coordinates have lengths, and tractions, of few digits
+        round_off = 64.0 * EPSILON * np.abs(body.mesh.nodes).max() / boundary.lengths[own]
+        off = np.abs(mean - stated) - round_off[:, None] * np.abs(stated)
+        worst.append(largest(off / measured.scales.stress))
+    return float(np.max(worst))
+
+
+def _beside_corners(measured: MeasuredBody) -> BoolArray:
+    """Return (n_elements,) bool: the elements at nodes of two contact parts, and those next to them."""
+    mesh, nodes = measured.solved.mesh, measured.boundary.nodes
+    parts = [np.unique(nodes[mesh.part(part)]) for part in set(measured.touched)]
+    found, counts = np.unique(np.concatenate([np.zeros(0, np.intp), *parts]), return_counts=True)
+    at_corner = np.isin(nodes, found[counts > 1]).any(axis=1)
+    return np.asarray(np.isin(nodes, nodes[at_corner]).any(axis=1))
+
+
+def reaction_mismatch(contacts: Sequence[MeasuredContact]) -> float:
+    """Return the largest difference [-] of the forces on the elements of a side from those of its contacts.
+
+    Where elastic bodies touch: at each obstacle tractions are compared; see `nodal_mismatch`.
+    """
+    forces: dict[tuple[str, str], tuple[Side, float, np.ndarray]] = {}
+    for contact in contacts:
+        for side, sign in contact.sides if contact.partner is not None else ():
+            key = side.body.solved.name, side.part
+            _, size, force = forces.get(key, (side, 0.0, np.zeros(2)))
+            size += float(np.abs(contact.forces).sum())
+            forces[key] = side, size, force + sign * contact.forces.sum(axis=0)
+    worst = [0.0]
+    for side, size, force in forces.values():
+        boundary, stress = side.body.boundary, side.body.scales.stress
+        on_elements = boundary.forces[side.elements]
+        size += float(np.abs(on_elements).sum()) + stress * float(boundary.lengths.min())
+        if not np.isin(boundary.nodes[side.elements], side.body.supported_nodes).any():
+            worst.append(float(np.abs(on_elements.sum(axis=(0, 1)) - force).max()) / size)
+    return float(np.max(worst))
+
+
+def rigid_mismatch(solution: Solution, bodies: Iterable[MeasuredBody], contacts: Iterable[MeasuredContact]) -> float:
+    """Return the largest difference [-] of the motions and loads of rigid bodies from the prescribed ones.
+
+    The load on each balances its contacts, at the points that the nodes may touch.
+    """
+    worst, diameter = [0.0], max(body.solved.mesh.diameter for body in bodies)
+    for rigid in solution.scene.rigid:
+        total, size, found = np.zeros(3), 0.0, solution.rigid[rigid.name]
+        for contact in contacts:
+            known = np.isfinite(contact.table.gap)
+            if contact.pair is None or contact.pair.rigid_body != rigid.name or not known.any():
+                continue
+            arm, force = (contact.touched - rigid.centre)[known], contact.forces[known]
+            total += [*force.sum(axis=0), float(np.sum(arm[:, 0] * force[:, 1] - arm[:, 1] * force[:, 0]))]
+            size += float(np.abs(force).sum())
+            size += contact.owner.body.scales.stress * float(contact.table.weight[known].min())
+        reach = np.array([1.0, 1.0, diameter])
+        reaction = np.array([found.force_x, found.force_y, found.moment]) / solution.scene.depth
+        driven = np.where(rigid.is_load_controlled, reaction - solution.scene.load_on(rigid), 0.0)
+        worst += [float(np.abs(each / reach).max()) / (size or 1.0) for each in (reaction - total, driven)]
+        motion = np.array([found.x, found.y, found.turn])
+        worst.append(float(np.abs(np.where(rigid.is_load_controlled, 0.0, motion - rigid.motion)).max()))
+    return float(np.max(worst))
