@@ -63,11 +63,7 @@ class AffineMap:
 
     def normals_forward(self, normals: FloatArray) -> FloatArray:
         """Return the unit normals of the transformed boundary that belong to normals of the original."""
-        return self._inverse.normals_back(normals)
-
-    @property
-    def _inverse(self) -> AffineMap:
-        return AffineMap((1.0 / self.factor[0], 1.0 / self.factor[1]))
+        return AffineMap((1.0 / self.factor[0], 1.0 / self.factor[1])).normals_back(normals)
 
     def transformed(self, symmetry: Symmetry) -> Symmetry:
         """Map symmetry lines."""

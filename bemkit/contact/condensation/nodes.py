@@ -21,11 +21,8 @@ Below it the node would slide a thousand times as far as it closes the gap, and 
 class NoContactNodesError(InputError):
     """A contact boundary whose nodes are all held by supports."""
 
-    def __init__(
-        self,
-        message: str = "supports fix every node of the contact boundary: use more elements, or restrict the supports",
-    ) -> None:
-        super().__init__(message)
+    def __init__(self) -> None:
+        super().__init__("supports fix every node of the contact boundary: use more elements, or restrict the supports")
 
 
 @dataclass(frozen=True, eq=False)
