@@ -24,7 +24,8 @@ _BULGE = 2.0
 N_REFINEMENTS = 20
 """Largest number of Newton steps."""
 _ROUND_OFF = 4.0 * np.finfo(float).eps
-"""Largest step of a local coordinate that is round-off."""
+"""Largest step of a local coordinate that is round-off, relative to one and to the largest coordinate in lengths of
+the tangent."""
 
 
 class PointNotInsideError(GeometryError):
@@ -175,6 +176,7 @@ class Locator:
         """
         _, ends = self.curved.points(element, np.tile([-1.0, 1.0], (element.size, 1)))
         bend = 0.5 * (ends[:, 1] - ends[:, 0])
+        largest = float(np.abs(self._mesh.nodes).max())
         xi, moves = xi.copy(), np.arange(xi.size)
         for _ in range(N_REFINEMENTS):
             y, slope = self.curved.points(element[moves], xi[moves, None])
@@ -182,7 +184,7 @@ class Locator:
             step = (way * slope[:, 0].conj()).real / np.maximum(square - (way * bend[moves].conj()).real, 0.5 * square)
             before = xi[moves]
             xi[moves] = np.clip(before + step, -1.0, 1.0)
-            moves = moves[np.abs(xi[moves] - before) > _ROUND_OFF]
+            moves = moves[np.abs(xi[moves] - before) > _ROUND_OFF * (1.0 + largest / np.sqrt(square))]
             if not moves.size:
                 break
         y, slope = self.curved.points(element, xi[:, None])
