@@ -63,8 +63,8 @@ def half_planes_among(seed: int, count: int) -> list[RandomCase]:
 
 
 def test_random_half_planes_end_in_the_right_answer_or_a_named_failure() -> None:
-    cases = half_planes_among(4, 60)
-    assert len(cases) >= 4  # 12 per cent
+    cases = half_planes_among(4, 40)
+    assert len(cases) >= 3  # 12 per cent
     assert {type(case.scenes[0].shape).__name__ for case in cases} == {"ElasticHalfPlane", "PeriodicHalfPlane"}
     for case in cases:
         assert tuple(scene_from_toml(text) for text in case.files().values()) == case.scenes

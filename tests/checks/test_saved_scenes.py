@@ -30,7 +30,7 @@ def outcome_of(name: str) -> tuple[Outcome, str]:
     [
         ("unloaded-without-strain", [Outcome.NAMED]),  # a corner of the obstacle lies between two nodes
         ("tip-of-a-wedge", [Outcome.NAMED]),  # a half-plane slides along the slopes of a wedge
-        ("no-shear", RIGHT),
+        pytest.param("no-shear", RIGHT, marks=SLOW),
         ("carried-along", RIGHT),
         # whether a node touches at all is decided by round-off; its overlap between nodes is warned of or named
         ("contact-between-nodes", [Outcome.WARNED, Outcome.NAMED]),

@@ -72,7 +72,11 @@ def test_a_report_shows_the_versions_in_its_file(without: Callable[..., None]) -
     [
         ("sweep", "paper-1", "--elements", "24", "--vary", "law.friction_coefficient=0.1,0.2"),
         ("verify", "westergaard", "--quick"),
-        ("stability", "paper-1", "--elements", "24", "--axis", "aspect-ratio"),
+        pytest.param(
+            ("stability", "paper-1", "--elements", "24", "--axis", "aspect-ratio"),
+            marks=pytest.mark.slow,
+            id="stability",
+        ),
         ("study", "paper-1", "--sizes", "12", "--discretisations", "linear", "--meshes", "uniform", "--repeat", "1"),
     ],
     ids=lambda command: command[0],

@@ -26,7 +26,7 @@ SLOW = [
         *("tutorials/load-histories.md", "tutorials/a-matrix-free-body.md", "tutorials/rough-surfaces.md"),
         "tutorials/adding-a-driver.md",
         "tutorials/property-tests.md",
-        "several-bodies.md",
+        *("several-bodies.md", "tutorials/a-body-of-ones-own.md", "tutorials/adding-a-discretisation.md"),
     )
 ]
 

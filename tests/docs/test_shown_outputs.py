@@ -43,7 +43,10 @@ def test_the_comparison_can_fail() -> None:
 
 
 # what these run has quick tests of its own
-SLOW = [(page, OUTPUTS_SHOWN[page]) for page in ("paper-tables.md", "tutorials/first-steps.md", "command-line.md")]
+SLOW = [
+    (page, OUTPUTS_SHOWN[page])
+    for page in ("paper-tables.md", "tutorials/first-steps.md", "tutorials/several-bodies.md", "command-line.md")
+]
 
 
 @pytest.mark.parametrize(("page", "fewest"), slow_only(OUTPUTS_SHOWN.items(), *SLOW))

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import bemkit as bk
+from tests.slow import slow_only
 
 STEEL = bk.Material(1e3, 0.3)
 ROCK = bk.Body(
@@ -115,7 +116,7 @@ def disc_in_cavity(n_elements: int, radius: float = 1.001, degree: int = 2) -> b
     )
 
 
-@pytest.mark.parametrize("degree", [1, 2])
+@pytest.mark.parametrize("degree", slow_only([1, 2], 2))
 def test_a_disc_that_may_turn_in_a_cavity_ends_by_name(degree: int) -> None:
     """A mesh that is not symmetric turns the disc; a symmetric one leaves it where it is."""
     assert bk.run(disc_in_cavity(40, degree=degree)).is_converged

@@ -30,6 +30,7 @@ def solution() -> bk.Solution:
         [(85.0, "deformation"), (85.0, "traction"), (170.0, "traction"), (170.0, "von-mises")],
         (85.0, "traction"),
         (170.0, "von-mises"),
+        (85.0, "deformation"),
     ),
 )
 def test_pictures_are_as_wide_as_asked(width: float, name: str, solution: bk.Solution, tmp_path: Path) -> None:

@@ -28,7 +28,7 @@ def solved(name: str, degree: int, mesh: bk.MeshOptions) -> Solution:
 
 @pytest.fixture(scope="module")
 def reference() -> Solution:
-    return solved("pin-in-plate", 2, bk.MeshOptions(accuracy=1e-3, rising_degrees=True))
+    return solved("pin-in-plate", 2, bk.MeshOptions(accuracy=5e-3, rising_degrees=True))  # a tenth of what is judged
 
 
 @pytest.mark.parametrize("n_elements", slow_except((80, 120, 160, 240), 120))

@@ -47,7 +47,7 @@ def check_random_problem(seed):
     assert_same(problem, path.state, referee.state)
 
 
-@settings(max_examples=settings.default.max_examples // 3)
+@settings(max_examples=settings.default.max_examples // 6)
 @given(st.integers(0, 10**9))
 def test_drivers_agree_on_random_problems(seed):
     check_random_problem(seed)

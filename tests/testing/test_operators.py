@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from scipy.sparse.linalg import LinearOperator, aslinearoperator
 
+import bemkit.testing
 from bemkit.arrays import FloatArray, IntArray
 from bemkit.geometry import BoundaryMesh, ExteriorOf, PlateWithHole, Polygon, Rectangle, discretise
 from bemkit.geometry.neighbours import corner_nodes
@@ -193,6 +196,15 @@ def test_a_double_layer_with_a_wrong_sign_is_caught() -> None:
         check_double_layer(operator)
 
 
+def test_checks_assert_nothing_but_types() -> None:
+    """Python without these statements, -O, would let all things pass."""
+    files = list(Path(bemkit.testing.__file__).parent.rglob("*.py"))
+    assert len(files) > 10
+    pattern = re.compile(r"^ *assert (?!isinstance|\S+ is not None$)", re.MULTILINE)
+    assert [path.name for path in files if pattern.search(path.read_text("utf-8"))] == []
+
+
+@pytest.mark.slow
 def test_checks_work_without_assert_statements() -> None:
     program = (
         "import numpy as np; from bemkit.testing import CheckFailed, check_curve\n"

@@ -17,6 +17,7 @@ from bemkit.model.prepared import prepare
 from bemkit.operators.half_plane.large import LargeHalfPlane
 from bemkit.testing import check_body
 from tests.contact.half_plane.test_strip_body import DRIVES, LOAD
+from tests.slow import slow_except
 
 CYLINDER = bk.load_scene("cylinder-on-half-plane")
 
@@ -37,7 +38,7 @@ def bodies(far: bk.FarField | None, grading: float = 1.5) -> tuple[LargeStripBod
     return LargeStripBody(elastic, body.conditions, body.nodes, body.force), body
 
 
-@pytest.mark.parametrize("drive", DRIVES)
+@pytest.mark.parametrize("drive", slow_except(DRIVES, "force and moment", "motion"))
 def test_it_keeps_the_promises_of_a_body(drive: str) -> None:
     body, _ = bodies(DRIVES[drive])
     check_body(body, is_symmetric=True, reloaded=replace(body, force=2.0 * body.force + 0.01))

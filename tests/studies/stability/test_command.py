@@ -29,8 +29,9 @@ def swept(tmp_path_factory: pytest.TempPathFactory) -> bytes:
     return path.read_bytes()
 
 
-def test_everything_is_written_and_the_tables_are_printed(tmp_path: Path) -> None:
+def test_everything_is_written_and_the_tables_are_printed(swept: bytes, tmp_path: Path) -> None:
     files = {name: tmp_path / f"rows.{name}" for name in ("jsonl", "csv", "md")}
+    files["jsonl"].write_bytes(swept)
     result = call(
         *FAST, "-o", files["jsonl"], "--csv", files["csv"], "--markdown", files["md"], "--plot", tmp_path / "plots"
     )
