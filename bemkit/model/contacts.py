@@ -11,13 +11,14 @@ import numpy as np
 from bemkit.arrays import BoolArray, FloatArray, IntArray
 from bemkit.contact.condensation.nodes import approaches
 from bemkit.contact.laws import FrictionLaw, Frictionless, LawOfCoefficients
+from bemkit.contact.obstacle import RigidHalfPlane
 from bemkit.contact.problem import LawError
 from bemkit.errors import InputError
 from bemkit.geometry.spaces import dof_points
 from bemkit.model.contact_data import ContactData, FacingPart, find_contact
 from bemkit.model.placed import PlacedBody, groups
 from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions
-from bemkit.scene.conditions import name_at_obstacle
+from bemkit.scene.conditions import Contact, name_at_obstacle
 from bemkit.scene.scene import Scene
 
 if TYPE_CHECKING:
@@ -138,6 +139,14 @@ class ContactInterface:
         columns = ((self.nodes, other.nodes), (self.weights, other.weights))
         is_alike = self.name == other.name and all(np.array_equal(one, two) for one, two in columns)
         return is_alike and np.allclose(self.frame, other.frame, rtol=0.0, atol=_SAME_DIRECTION)
+
+
+def may_overlap(scene: Scene, bodies: Sequence[PlacedBody]) -> bool:
+    """Whether there are other bodies, or obstacles of finite size, that a body may overlap beside its contacts."""
+    conditions = [part.condition for body in bodies for part in body.scene.parts]
+    obstacles = [condition.obstacle for condition in conditions if isinstance(condition, Contact)]
+    is_finite = any(not isinstance(obstacle, RigidHalfPlane) for obstacle in obstacles)
+    return len(bodies) > 1 or bool(scene.rigid) or is_finite
 
 
 def check_overlap(pair: ContactPair, overlap: float, deepest: FloatArray, size: float) -> None:

@@ -4,24 +4,28 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from bemkit.arrays import FloatArray
 from bemkit.contact.obstacle import RigidCircle
 from bemkit.contact.polygon import RigidPolygon
 from bemkit.geometry.overlap import ROUND_OFF, Polyline, deepest_overlap, near_pairs
 from bemkit.model.contacts import OverlapError
 from bemkit.model.placed import PlacedBody
+from bemkit.scene.conditions import Contact
 from bemkit.scene.scene import Scene
 
 
 def check_apart(scene: Scene, bodies: Sequence[PlacedBody]) -> None:
     """Check that no two bodies overlap by more than the interference of the contacts between them.
 
-    Elastic bodies are compared with each other but for half-planes, and with rigid bodies of finite size.
+    Elastic bodies but for half-planes are compared with each other, with rigid bodies and, beside the parts that touch
+    them, with fixed obstacles, both of finite size.
 
     Raises
     ------
     OverlapError
-        With the names of both bodies, the depth and the place.
+        With the names of both, the depth and the place.
     """
     finite = [body for body in bodies if body.mesh.surface is None]
     outlines = [Polyline.of(body.mesh) for body in finite]
@@ -40,6 +44,30 @@ def check_apart(scene: Scene, bodies: Sequence[PlacedBody]) -> None:
                 k, names = int(gap.argmin()), (body.name, rigid.name)
                 if -gap[k] > ROUND_OFF * body.mesh.diameter + _interference(scene, names):
                     raise _overlap(names, -float(gap[k]), points[k])
+
+    for body, outline in zip(finite, outlines, strict=True):
+        _check_obstacles(body, outline)
+
+
+def _check_obstacles(body: PlacedBody, outline: Polyline) -> None:
+    """Check that fixed obstacles of finite size overlap a body nowhere deeper than on the parts that touch them."""
+    obstacles = {part.name: part.condition.obstacle for part in body.scene.parts if isinstance(part.condition, Contact)}
+    for name, obstacle in obstacles.items():
+        if not isinstance(obstacle, RigidCircle | RigidPolygon):
+            continue
+        points = outline.points.reshape(-1, 2)
+        gap = obstacle.gap(points, points)
+        parts = [part for part, other in obstacles.items() if other == obstacle]
+        touches = np.isin(outline.elements, np.concatenate([body.mesh.part(part) for part in parts]))
+        touches = np.repeat(touches, outline.points.shape[1])
+        beside = np.where(touches, np.inf, gap)
+        depth, stated = -float(beside.min()), -float(gap[touches].min(initial=0.0))
+        if depth > stated + ROUND_OFF * body.mesh.diameter:
+            x, y = points[int(beside.argmin())]
+            raise OverlapError(
+                f"the obstacle of part {name!r} overlaps the body by {depth:.4g} beside this part, at ({x:.6g}, "
+                f"{y:.6g}): move it away, or let the part include all that may touch it"
+            )
 
 
 def _interference(scene: Scene, names: tuple[str, str]) -> float:

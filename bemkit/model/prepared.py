@@ -18,7 +18,7 @@ from bemkit.contact.condensation.nodes import ContactNodes
 from bemkit.contact.laws import FrictionLaw
 from bemkit.geometry.spaces import dof_points
 from bemkit.model.contact_data import ContactData
-from bemkit.model.contacts import ContactInterface, candidates_of, law_of_rows, obstacle_rows, retained_for
+from bemkit.model.contacts import ContactInterface, candidates_of, law_of_rows, may_overlap, obstacle_rows, retained_for
 from bemkit.model.fields import TractionRecovery
 from bemkit.model.given import (
     far_motion_of,
@@ -337,7 +337,7 @@ def prepare_steps(scenes: Sequence[Scene], meshes: Meshes = None) -> tuple[Prepa
         check_step(steps[0], step)
     first = _prepared(steps[0], bodies, find_units(steps, bodies))
     first = replace(first, unresolved=tuple(pair.name for pair, is_resolved in found if not is_resolved))
-    if len(bodies) > 1 or scenes[0].rigid:
+    if may_overlap(scenes[0], bodies):
         from bemkit.model.overlaps import check_apart
 
         check_apart(scenes[0], bodies)

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
 from dataclasses import replace
 
 import pytest
 
 import bemkit as bk
 from bemkit.model.contacts import OverlapError
+from bemkit.model.prepared import prepare
 
 STEEL = bk.Material(1.0, 0.3)
 LOWER = bk.Polygon(
@@ -59,3 +61,20 @@ def test_a_rigid_body_inside_of_a_body_beside_their_contact_is_refused() -> None
         bk.run(scene)
     away = replace(punch, obstacle=bk.RigidPolygon(tuple((x + 2.0, y) for x, y in vertices)))
     assert bk.run(replace(scene, rigid=(away,))).is_converged
+
+
+@pytest.mark.parametrize(("x", "is_refused"), [(2.4, True), (2.6, False)])
+def test_an_obstacle_inside_of_a_body_beside_the_part_that_touches_it_is_refused(x: float, is_refused: bool) -> None:
+    """A circle on the tread of a step, 0.1 inside of its riser or 0.1 off."""
+    vertices = ((0.0, 0.0), (3.0, 0.0), (3.0, 1.0), (2.0, 1.0), (2.0, 2.0), (0.0, 2.0))
+    parts = (
+        bk.Part("base", bk.Clamped(), ("side-1",)),
+        bk.Part("tread", bk.Contact(bk.RigidCircle((x, 1.4999), 0.5)), ("side-3",)),
+    )
+    scene = bk.Scene(
+        title="step", shape=bk.Polygon(vertices), material=STEEL, parts=parts, law=bk.Frictionless(),
+        mesh=bk.MeshOptions(elements=40),
+    )  # fmt: skip
+    message = r"obstacle of part 'tread' overlaps the body by 0\.\d+ beside this part, at \(2, 1\.5"
+    with pytest.raises(OverlapError, match=message) if is_refused else nullcontext():
+        prepare(scene)
