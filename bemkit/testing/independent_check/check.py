@@ -97,11 +97,10 @@ def _overlaps(solution: Solution, contacts: Sequence[MeasuredContact]) -> dict[s
     """Return the violations between nodes and at nodes that supports hold; see `Violations`."""
     hidden, unsaid, held = [(0.0, 1.0)], [0.0], [0.0]
     for contact in contacts:
-        body = contact.owner.body
-        rows = [each.nodes for each in contacts if each.owner.body is body]
+        rows = [each.nodes for each in contacts if each.owner.body is contact.owner.body]
         held.append(held_overlap(contact, np.concatenate(rows)))
-        if contact.facing is not None and body.touched.count(contact.owner.part) > 1:
-            continue  # each point belongs to the nearest obstacle
+        if contact.is_shared:
+            continue
         overlap = hidden_overlap(contact)
         hidden.append((overlap / contact.length, max(side.body.allowed_error for side, _ in contact.sides)))
         unsaid.append(unsaid_overlap(contact, overlap, solution.contacts_between_nodes[contact.name].penetration_depth))

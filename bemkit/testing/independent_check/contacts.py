@@ -21,7 +21,7 @@ from bemkit.scene.contacts import ContactPair
 from bemkit.testing.independent_check.bodies import MeasuredBody, fixed_obstacles_of
 from bemkit.testing.independent_check.boundary import mean_normals
 from bemkit.testing.independent_check.obstacles import distance_to
-from bemkit.testing.independent_check.sides import Side
+from bemkit.testing.independent_check.sides import Relative, Side, measure_flat
 
 GRAZING_COSINE = 2e-3
 """Largest cosine between the body's normal and the direction of contact of a node that may face away: it would slide
@@ -103,6 +103,18 @@ class MeasuredContact:
     def sides(self) -> tuple[tuple[Side, float], ...]:
         """The elastic sides with the signs of the forces on them."""
         return ((self.owner, 1.0),) if self.partner is None else ((self.owner, 1.0), (self.partner, -1.0))
+
+    @cached_property
+    def flat(self) -> Relative | None:
+        """Two flat sides measured on each other; None of others, and at obstacles."""
+        if self.partner is None or self.pair is None:
+            return None
+        return measure_flat(self.owner, self.partner, self.pair)
+
+    @property
+    def is_shared(self) -> bool:
+        """Whether several obstacles face the part, of which the nearest counts at each point."""
+        return self.facing is not None and self.owner.body.touched.count(self.owner.part) > 1
 
     @property
     def points(self) -> FloatArray:

@@ -9,31 +9,19 @@ import numpy as np
 from bemkit.arrays import BoolArray
 from bemkit.results.solution import Solution
 from bemkit.testing.independent_check.bodies import MeasuredBody
-from bemkit.testing.independent_check.contacts import MeasuredContact
+from bemkit.testing.independent_check.contacts import MeasuredContact, gap_of
 from bemkit.testing.independent_check.scales import EPSILON, beyond, largest
-from bemkit.testing.independent_check.sides import Relative, Side, measure_flat
-
-
-def flat_sides(contact: MeasuredContact) -> Relative | None:
-    """Measure two flat sides on each other; None of others, and at obstacles."""
-    if contact.partner is None or contact.pair is None:
-        return None
-    return measure_flat(contact.owner, contact.partner, contact.pair)
+from bemkit.testing.independent_check.sides import Side
 
 
 def gap_mismatch(contact: MeasuredContact) -> float:
     """Return the largest difference [-] of gaps from distances measured again, of obstacles and of flat sides."""
-    table, scales = contact.table, contact.owner.body.scales
-    distance = contact.distance
-    if contact.facing is None:
-        flat = flat_sides(contact)
-        if flat is None or contact.pair is None:
-            return 0.0
-        distance = flat.distance + contact.pair.gap_at(contact.points)
-    # of several obstacles in front of one part only the nearest counts
-    is_alone = contact.facing is not None and contact.owner.body.touched.count(contact.owner.part) == 1
-    if is_alone and np.any((np.isfinite(table.gap) != np.isfinite(distance)) & ~contact.is_grazing):
-        return float("inf")
+    table, scales, distance = contact.table, contact.owner.body.scales, contact.distance
+    if contact.flat is not None:
+        distance = contact.flat.distance + gap_of(contact.pair, contact.points)
+    elif contact.facing is not None and not contact.is_shared:
+        if np.any((np.isfinite(table.gap) != np.isfinite(distance)) & ~contact.is_grazing):
+            return float("inf")
     known = np.isfinite(table.gap) & np.isfinite(distance)
     coordinates = max(scales.coordinates, 64.0 * EPSILON * largest(np.abs(contact.points)))
     return beyond(np.abs(table.gap[known] - distance[known]), coordinates, contact.length)
@@ -48,7 +36,7 @@ def displacement_mismatch(contact: MeasuredContact) -> float:
     known, round_off = np.isfinite(table.gap), scales.coordinates + contact.turned
     rows = contact.stated_displacement
     differences = [table.clearance[known] - (table.gap - table.u_n)[known], contact.offset]
-    flat = flat_sides(contact)
+    flat = contact.flat
     if contact.facing is not None:
         differences.append((rows - contact.displacement)[known])
     elif flat is not None and abs(table.weight.sum() - flat.length) <= 1e-9 * flat.length:
@@ -62,6 +50,8 @@ def resultant_mismatch(solution: Solution, contacts: Iterable[MeasuredContact]) 
     worst, measured = [0.0], {contact.name: contact for contact in contacts}
     for stated in solution.contacts:
         contact, depth = measured[stated.name], solution.scene.depth
+        if not contact.table.n_contact:
+            continue
         normal, tangential = depth * contact.forces_along.sum(axis=0)
         size = depth * float(np.abs(contact.forces_along).sum() + contact.stress * contact.table.weight.min())
         worst += [abs(stated.force_normal + normal) / size, abs(stated.force_tangential - tangential) / size]
@@ -83,8 +73,10 @@ def nodal_mismatch(measured: MeasuredBody, contacts: Iterable[MeasuredContact]) 
     worst, beside = [0.0], _beside_corners(measured)
     for part in {contact.owner.part for contact in at_obstacles}:
         elements = body.mesh.part(part)
-        own = elements[np.isin(owner[boundary.nodes[elements]].astype(str), ["", part]).all(axis=1)]
-        own = own[~beside[own]]
+        owners = owner[boundary.nodes[elements]].astype(str)
+        # supports hold the other nodes, and whole elements that have no node of the table
+        is_own = np.isin(owners, ["", part]).all(axis=1) & (owners == part).any(axis=1)
+        own = elements[is_own & ~beside[elements]]
         mean = np.einsum("eqc,eq->ec", boundary.interpolated(nodal)[own], boundary.shares[own])
         mean /= boundary.lengths[own][:, None]
         stated = body.boundary.traction[own]

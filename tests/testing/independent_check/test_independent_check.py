@@ -280,3 +280,18 @@ def test_nodes_that_supports_push_into_an_obstacle_need_a_warning(among: bool) -
     assert check.is_good
     assert check.held_overlap > 0.01  # a share of what the corner moves by, the rest is the way of the whole block
     assert check.needs_warning == "held_overlap"
+
+
+@IN_BOTH
+def test_elements_whose_nodes_supports_hold_pass(among: bool) -> None:
+    """One element between clamped ones has reactions, and no row in the table; the ceiling gives the table others."""
+    places = {"left": "x <= 0.49", "floor": "x > 0.49 and x < 0.51", "right": "x >= 0.51"}
+    left, floor, right = (
+        bk.Part(name, FLOOR.condition if name == "floor" else bk.Clamped(), ("bottom",), where=bk.Expression(place))
+        for name, place in places.items()
+    )
+    ceiling = bk.Part("ceiling", bk.Contact(bk.RigidHalfPlane((0.0, 1.0), (0.0, -1.0))), ("top",))
+    push = bk.Part("push", bk.Pressure(1e-3), ("left",))
+    solution = run(block(left, floor, right, ceiling, push, discretisation=LINEAR, mesh=bk.MeshOptions(40)), among)
+    assert "floor" not in {name.split(".")[-1] for name in solution.contact.parts}
+    assert violations_of(solution).faults == ()
