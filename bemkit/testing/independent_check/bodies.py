@@ -7,7 +7,6 @@ from functools import cached_property
 
 from bemkit.arrays import IntArray
 from bemkit.contact.obstacle import Obstacle
-from bemkit.results.contact_table import ContactTable
 from bemkit.results.solution import Solution
 from bemkit.results.solved_body import SolvedBody
 from bemkit.scene.conditions import Contact, name_at_obstacle
@@ -73,8 +72,9 @@ def bodies_of(solution: Solution, before: Solution | None) -> dict[str, Measured
     at_obstacles: dict[str, list[str]] = {name: [] for name in solution.bodies}
     touched: dict[str, list[str]] = {name: [] for name in solution.bodies}
     for name, body in solution.bodies.items():
-        touched[name] += fixed_obstacles_of(body)
-        at_obstacles[name] += [name_at_obstacle(name, part) for part in touched[name]]
+        for part in fixed_obstacles_of(body):
+            touched[name].append(part)
+            at_obstacles[name].append(name_at_obstacle(name, part))
     for pair in solution.scene.contacts:
         sides = solution.contact_sides[pair.name]
         for side in sides:
@@ -84,7 +84,7 @@ def bodies_of(solution: Solution, before: Solution | None) -> dict[str, Measured
     measured = {}
     for name, body in solution.bodies.items():
         earlier = None if before is None else before.bodies[name]
-        scales = scales_of(body, earlier, _rows_of(solution.contact, at_obstacles[name]))
+        scales = scales_of(body, earlier, solution.contact.renamed({each: each for each in at_obstacles[name]}))
         measured[name] = MeasuredBody(body, earlier, tuple(touched[name]), boundary_of(body, touched[name]), scales)
     least = LIGHTEST * max(body.scales.strained for body in measured.values())
     return {name: body.measured_by(least) for name, body in measured.items()}
@@ -97,7 +97,3 @@ def fixed_obstacles_of(body: SolvedBody) -> dict[str, Obstacle]:
         for part in body.scene.parts
         if isinstance(part.condition, Contact) and body.mesh.part(part.name).size
     }
-
-
-def _rows_of(table: ContactTable, names: list[str]) -> ContactTable:
-    return table.renamed({name: name for name in names})
