@@ -24,7 +24,7 @@ _SMALLEST_RCOND = 1e-13
 of a floating body leaves 1e-15 of its free motions; solvers that are refused without need only take other steps."""
 
 _NO_ROOM = 1e-3
-"""Change of volume that errors of normals explain, see `DenseBody._room`: squares of angles."""
+"""Change of volume that errors of normals explain, see `DenseBody._enclosed`: squares of angles."""
 
 _LEFT_OVER = 1e-9
 """Stiffness that may be round-off of zero, relative to the largest."""
@@ -72,7 +72,7 @@ class DenseBody(LinearBody):
         Number of further unknowns, which no contact condition concerns and on which no force acts: uniform pressures of
         incompressible bodies; see `bemkit.operators.steklov_poincare.protocol.CondensedMap`.
     largest_modulus : float, optional [Pa]
-        The largest modulus of several bodies, of their shapes or volumes; by default `modulus`.
+        The largest modulus, of shape or volume, of the bodies that make room for others; by default `modulus`.
 
     Raises
     ------
@@ -207,10 +207,14 @@ class DenseBody(LinearBody):
 
     def lacks_room(self, gap: FloatArray) -> bool:
         """Whether an incompressible body has more volume than fits between its supports and closed contacts."""
-        n, room = self.n_unknowns, self._room if self.n_pressures else np.zeros((0, 0))
-        for row, change, needed in zip(room, self.stiffness[n:], self.load[n:], strict=True):
-            moved = np.flatnonzero(row[:n])
-            if np.abs(row[n:]).max() < _NO_ROOM and (self.unknown_dofs[moved] % 2 == 0).all() and row[moved].min() > 0:
+        if not self.n_pressures:
+            return False
+        changes = self._enclosed @ self.stiffness[self.n_unknowns :, : self.n_unknowns]
+        for room, change, needed in zip(
+            self._room, changes, self._enclosed @ self.load[self.n_unknowns :], strict=True
+        ):
+            moved = np.flatnonzero(room)
+            if (self.unknown_dofs[moved] % 2 == 0).all() and room[moved].min() > 0.0:
                 largest = change[moved] * gap[self.unknown_dofs[moved] // 2]
                 if needed > largest.sum() + _LEFT_OVER * (np.abs(largest).sum() + abs(needed)):
                     return True
@@ -320,8 +324,10 @@ class DenseBody(LinearBody):
         # before any matrix, whose rows may hold nothing but what round-off leaves of rigid motions
         if not conditions.hold(self._rigid_basis):
             raise FreeMotion
-        if self.n_pressures and np.linalg.svd(self._room[:, ~is_given], compute_uv=False)[-1] < _NO_ROOM:
-            raise ClosedVolume
+        if self.n_pressures:
+            room = self._room[:, ~is_given[: self.n_unknowns]]
+            if np.linalg.matrix_rank(room, _NO_ROOM) < len(room):
+                raise ClosedVolume
         # one equation, the condition of the same index, for each displacement that is sought
         sought = np.flatnonzero(~is_given)
         n_displacements = sought.size - self.n_pressures
@@ -369,16 +375,26 @@ class DenseBody(LinearBody):
         return 0.5 + spread_fractions(len(self.load))
 
     @cached_property
-    def _room(self) -> FloatArray:
-        """(n_pressures, n) array [-]: change of each volume by unknowns, per length, then by pressures.
+    def _enclosed(self) -> FloatArray:
+        """(n_enclosed, n_pressures) array: combinations of volumes for which no body makes room by yielding.
 
-        Displacements along the boundary, which change the volume by the errors of its normals, count as zero. Pressures
-        change it where other bodies yield; a boundary that yields like the stiffest body has the size one.
+        A boundary that yields like the stiffest of these bodies has the size one, errors of normals that of their
+        squares.
         """
-        n, stiffness = self.n_unknowns, self.stiffness[self.n_unknowns :]
-        per_length = stiffness[:, :n] / self.weights[self.unknown_dofs // 2]
-        per_length = per_length / np.abs(per_length).max(axis=1, keepdims=True)
-        change = np.abs(stiffness[:, :n]).sum(axis=1)
+        change, coupled = np.split(self.stiffness[self.n_unknowns :], [self.n_unknowns], axis=1)
+        sizes = np.abs(change).sum(axis=1)
         modulus = self.largest_modulus or self.modulus or self.stiffness_scale * float(np.median(self.weights))
-        yields = stiffness[:, n:] * modulus / change / change[:, None]
-        return np.hstack([np.where(np.abs(per_length) > SLIDES, per_length, 0.0), yields])
+        combinations, yielding, _ = np.linalg.svd(coupled * modulus / sizes / sizes[:, None])
+        enclosed = (combinations / sizes[:, None]).T[yielding < _NO_ROOM]
+        return np.asarray(enclosed * np.sign((enclosed @ change).sum(axis=1, keepdims=True)))
+
+    @cached_property
+    def _room(self) -> FloatArray:
+        """(n_enclosed, n_unknowns) array [-]: change of these volumes by displacements, per length.
+
+        Displacements along the boundary, which change the volume by the errors of its normals, count as zero.
+        """
+        change = self._enclosed @ self.stiffness[self.n_unknowns :, : self.n_unknowns]
+        per_length = change / self.weights[self.unknown_dofs // 2]
+        per_length /= np.abs(per_length).max(axis=1, keepdims=True, initial=0.0)
+        return np.where(np.abs(per_length) > SLIDES, per_length, 0.0)

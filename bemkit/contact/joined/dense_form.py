@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cached_property
 
 import numpy as np
@@ -10,6 +11,7 @@ from scipy import sparse
 from bemkit.arrays import FloatArray
 from bemkit.contact.condensation.dense_body import DenseBody, FollowingTangents
 from bemkit.contact.joined.coupled_members import CoupledMembers
+from bemkit.contact.joined.member import Member
 from bemkit.operators.linear.dense import DenseLU
 
 _TIED = "the bodies tied to each other at all contact nodes (remove a tie that follows from the others)"
@@ -73,7 +75,7 @@ class RelativeStiffness:
             following_tangents=self._followed(joined, loaded, at_rest),
             modulus=joined.stiffness_scale * float(np.median(joined.weights)),
             n_pressures=joined.pressures.size,
-            largest_modulus=max(max(member.modulus, member.bulk_modulus) for member in joined.members),
+            largest_modulus=_modulus_of_room(joined.members),
         )
 
     def _followed(self, joined: CoupledMembers, loaded: FloatArray, at_rest: FloatArray) -> FollowingTangents | None:
@@ -104,3 +106,9 @@ class RelativeStiffness:
         normal = np.cumsum(self._is_kept)[2 * np.flatnonzero(self._follows)] - 1
         response[own, normal[own]] = self._slope[own]
         return response
+
+
+def _modulus_of_room(members: Sequence[Member]) -> float:
+    """Return the largest modulus of members that make room for others; if there are none, the smallest of all."""
+    yielding = [max(member.modulus, member.bulk_modulus) for member in members if not member.n_pressures]
+    return max(yielding, default=min(member.modulus for member in members))
