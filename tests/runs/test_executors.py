@@ -52,7 +52,7 @@ def assert_same(one: Solution, other: Solution) -> None:
     ("name", "discretisation", "changes"),
     [
         ("pin-in-plate", bk.ConstantCollocation(), {}),
-        ("masonry-arch", bk.Galerkin(1), {}),  # copies, and their weight
+        pytest.param("masonry-arch", bk.Galerkin(1), {}, marks=pytest.mark.slow),  # copies, and their weight
         pytest.param("pin-in-plate", bk.Galerkin(2), {"load_factors": (0.5, 1.0)}, marks=pytest.mark.slow),
         pytest.param(
             "pin-in-plate",

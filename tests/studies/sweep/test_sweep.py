@@ -100,7 +100,7 @@ def test_weight_changes_with_the_rows(bodies_made: list[str]) -> None:
     ("vary", "n_bodies"),
     [
         ({FRICTION: [0.3], "bodies.upper.parts.pushed.condition.y": [-0.0022, -0.004]}, 1),
-        ({"contacts[0].gap": [0.0, -0.001]}, 1),
+        pytest.param({"contacts[0].gap": [0.0, -0.001]}, 1, marks=pytest.mark.slow),
         ({"bodies.lower.material.youngs_modulus": [0.91, 9.1]}, 0),
     ],
     ids=["loads", "gaps", "bodies"],
