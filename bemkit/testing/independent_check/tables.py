@@ -38,7 +38,8 @@ def displacement_mismatch(contact: MeasuredContact) -> float:
     differences = [table.clearance[known] - (table.gap - table.u_n)[known], contact.offset]
     flat = contact.flat
     if contact.facing is not None:
-        differences.append((rows - contact.displacement)[known])
+        # an obstacle that turns moves at the point that a node may touch, which others lack
+        differences.append((rows - contact.displacement)[known | (contact.pair is None)])
     elif flat is not None and abs(table.weight.sum() - flat.length) <= 1e-9 * flat.length:
         # slivers beside nodes that others hold carry no multiplier
         differences.append((table.weight @ rows - flat.means) / flat.length)

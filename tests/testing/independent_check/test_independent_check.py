@@ -94,6 +94,16 @@ def test_a_table_that_is_not_that_of_the_boundary_is_seen(discretisation: bk.Gal
         assert violations_of(reported).table > 1e-6
 
 
+@IN_BOTH
+def test_displacements_of_nodes_that_face_away_are_compared(among: bool) -> None:
+    floor = bk.Part("floor", bk.Contact(bk.RigidHalfPlane()), sides=("bottom", "left"))
+    load = bk.Part("load", bk.Pressure(1e-3), ("top",))
+    solution = run(block(floor, load, mesh=bk.MeshOptions(20)), among)
+    assert violations_of(solution).faults == ()
+    away = int(np.flatnonzero(np.isinf(solution.contact.gap))[0])
+    assert tampered(solution, u_n=changed(solution, "u_n", away, 1.01)).faults == ("table",)
+
+
 @PLACES
 def test_a_turned_direction_of_contact_is_seen(discretisation: bk.Galerkin, among: bool) -> None:
     """As if contact acted along a direction that is 5 degrees off, everything else consistent."""
