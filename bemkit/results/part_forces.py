@@ -222,7 +222,7 @@ def contact_sizes(
         "force_normal": -depth * float(table.weight[nodes] @ table.sigma_n[nodes]),
         "force_tangential": depth * float(table.weight[nodes] @ table.sigma_t[nodes]),
         "contact_length": min(length, _contact_length(*unrolled(table, transitions), part)),
-        "peak_pressure": float(np.max(-table.sigma_n[nodes], initial=0.0)),
+        "peak_pressure": max(0.0, float(np.max(-table.sigma_n[nodes], initial=0.0))),  # not -0
         "largest_slip": float(np.abs(table.u_t[closed]).max(initial=0.0)),
     }
 

@@ -120,8 +120,8 @@ def _length(fact: Mapping[str, Any], units: UnitNames | None) -> str:
 
 
 def _peak(fact: Mapping[str, Any], units: UnitNames | None) -> str:
-    place = _vector(fact["peak_x"], fact["peak_y"], "length", units)
-    return f"{_amount(fact['peak_pressure'], 'stress', units)} at {place}"
+    size = _amount(fact["peak_pressure"], "stress", units)
+    return f"{size} at {_vector(fact['peak_x'], fact['peak_y'], 'length', units)}" if fact["peak_pressure"] else size
 
 
 def _vector(x: float, y: float, quantity: str, units: UnitNames | None) -> str:

@@ -241,3 +241,13 @@ def test_friction_names_its_direction_along_x(name: str, x_sign: float) -> None:
         (part,) = solution.contact.parts
         (force,) = (fact for fact in solution.part_forces if fact.name == part)
         assert x_sign * solution.force_tangential == pytest.approx(force.force_x, rel=1e-9)
+
+
+def test_a_contact_without_force_has_no_place_of_its_peak() -> None:
+    floor = bk.Part("floor", bk.Contact(bk.RigidHalfPlane()), sides=("bottom",))
+    parts = (floor, bk.Part("top", bk.PrescribedDisplacement(0.0, 1e-3), sides=("top",)))
+    scene = bk.Scene(
+        title="lifted", shape=bk.Rectangle(1.0, 1.0), material=bk.Material(1.0, 0.3), parts=parts,
+        mesh=bk.MeshOptions(elements=16),
+    )  # fmt: skip
+    assert dict(summary_rows(bk.run(scene)))["peak pressure"] == "0"
