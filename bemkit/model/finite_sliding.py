@@ -12,7 +12,7 @@ import numpy as np
 from bemkit.arrays import BoolArray, FloatArray
 from bemkit.contact.obstacle import SIMPLE_OBSTACLES, Obstacle, measure_contact
 from bemkit.geometry.spaces import element_nodes
-from bemkit.geometry.vectors import norms
+from bemkit.geometry.vectors import norms, turned_left
 from bemkit.model.contacts import ContactInterface
 from bemkit.model.placed import PlacedBody
 from bemkit.model.prepared import Prepared
@@ -59,6 +59,40 @@ def why_off(
     return (
         f"contact {rows.name!r}: the sides move by {length} along each other, and contact forces displace by {beside}: "
         "draw the bodies where they come to rest, hold what slides, or move it less"
+    )
+
+
+def why_moved_off(
+    prepared: Prepared,
+    rows: ContactInterface,
+    motion: FloatArray,
+    displacement: FloatArray,
+    is_pressed: BoolArray,
+    deformation: float,
+) -> str:
+    """Describe how far a rigid body has moved (3,) from the gaps of its contact; empty if these still hold.
+
+    Polygons are not judged: beside their corners gaps change with any motion.
+    """
+    from bemkit.contact.polygon import RigidPolygon
+
+    body = prepared.scene.rigid[rows.other - len(prepared.bodies)]
+    if not is_in_the_plane(body.obstacle) or isinstance(body.obstacle, RigidPolygon):
+        return ""
+    (x, y, turn), centre = motion, np.array(body.centre)
+    points, frame, relative = rows.points[is_pressed], rows.frame[is_pressed], displacement[is_pressed]
+    gap, _ = measure_contact(body.obstacle, points, frame[:, 0])
+    arm = points + gap[:, None] * frame[:, 0] - centre
+    moved = points + np.einsum("nk,nkc->nc", relative, frame) + [x, y] + turn * turned_left(arm)
+    # the rigid body moves back to its place, and takes the points along
+    back = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
+    followed, _ = measure_contact(body.obstacle, centre + (moved - centre - [x, y]) @ back, frame[:, 0] @ back)
+    if not (np.abs(followed - (gap - relative[:, 0])) > _OFF * deformation).any():
+        return ""
+    length, beside = (amount(each, "length", prepared.scene.units, 3) for each in (float(np.hypot(x, y)), deformation))
+    return (
+        f"contact {rows.name!r}: the rigid body moves by {length}, and contact forces displace by {beside}: draw it "
+        "where it comes to rest, or move it less"
     )
 
 

@@ -274,11 +274,20 @@ def with_sliding_checked(model: Model, result: ContactSolution) -> ContactSoluti
         return result
     for rows, displacement, traction in zip(prepared.rows, displacements, tractions, strict=True):
         is_pressed = traction[:, 0] != 0.0  # not by their friction, which some laws exert across a gap
-        if not is_pressed.any() or norms(displacement[is_pressed]).max() <= _BY_DEFORMATION * deformation:
+        if not is_pressed.any():
             continue
-        from bemkit.model.finite_sliding import why_off
+        number = rows.other - len(prepared.bodies)
+        reason = ""
+        if norms(displacement[is_pressed]).max() > _BY_DEFORMATION * deformation:
+            from bemkit.model.finite_sliding import why_off
 
-        if reason := why_off(prepared, rows, displacement, is_pressed, deformation):
+            reason = why_off(prepared, rows, displacement, is_pressed, deformation)
+        elif number >= 0:
+            from bemkit.model.finite_sliding import why_moved_off
+
+            motion, _ = model.rigid_bodies(result.state)[number]
+            reason = why_moved_off(prepared, rows, motion, displacement, is_pressed, deformation)
+        if reason:
             status = Status.FINITE_SLIDING
             return replace(result, status=status, message=f"{status.value} [{reason}]")
     return result

@@ -82,6 +82,13 @@ def test_a_rigid_body_moves_by_more_than_its_contact(obstacle: bk.Obstacle) -> N
     refused(pressed(obstacle, bk.Frictionless(), x=0.1, y=-1e-3))
 
 
+@pytest.mark.parametrize("x", [0.8, 1.6])
+def test_a_cylinder_that_moves_so_far_that_its_false_gap_deforms_the_block_as_much_is_refused(x: float) -> None:
+    solution = bk.run(pressed(bk.RigidCircle((0.0, 1.0), 1.0), bk.Frictionless(), x=x, y=-1e-3))
+    assert solution.status is bk.Status.FINITE_SLIDING, solution.message
+    assert "the rigid body moves by" in solution.message
+
+
 def test_a_rigid_plane_moves_along_itself_without_limit_and_drags_by_friction() -> None:
     plane = bk.RigidHalfPlane((0.0, 0.0), (0.0, -1.0))
     solution = bk.run(pressed(plane, bk.Coulomb(0.3), x=0.5, y=-1e-3))
