@@ -80,7 +80,7 @@ def test_pin_in_a_hole_of_an_infinite_sheet(clearance: float, half_angle: float,
         name="pin", shape=bk.Ring(radius, 1.0), material=material,
         parts=(core, bk.Part("surface", bk.Free(), quadrants("outer"))),
     )  # fmt: skip
-    pair, options = bk.ContactPair(("pin.surface", "sheet.hole")), bk.MeshOptions(accuracy=0.005)
+    pair, options = bk.ContactPair(("pin.surface", "sheet.hole")), bk.MeshOptions(accuracy=0.004)
     scene = bk.Scene(title="Pin", bodies=(sheet, pin), contacts=(pair,), discretisation=bk.Galerkin(2), mesh=options)
     solution = bk.run(scene)
     assert solution.is_converged
