@@ -484,7 +484,7 @@ def test_a_bolt_in_a_plate_needs_few_elements_for_five_digits() -> None:
     assert fine.is_converged
     assert fine.n_elements <= 300
     assert rough.energy == pytest.approx(fine.energy, rel=1e-8)
-    assert [each.s for each in rough.transitions] == pytest.approx([each.s for each in fine.transitions], abs=1e-6)
+    assert [each.s for each in rough.transitions] == pytest.approx([each.s for each in fine.transitions], abs=3e-6)
 
 
 def test_copies_have_one_mesh_as_fine_as_the_worst_needs() -> None:
