@@ -11,6 +11,7 @@ import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray
 from bemkit.contact.obstacle import SIMPLE_OBSTACLES, Obstacle, measure_contact
+from bemkit.geometry.placement import Placement
 from bemkit.geometry.spaces import element_nodes
 from bemkit.geometry.vectors import norms, turned_left
 from bemkit.model.contacts import ContactInterface
@@ -84,9 +85,10 @@ def why_moved_off(
     gap, _ = measure_contact(body.obstacle, points, frame[:, 0])
     arm = points + gap[:, None] * frame[:, 0] - centre
     moved = points + np.einsum("nk,nkc->nc", relative, frame) + [x, y] + turn * turned_left(arm)
+    motion_of_body = Placement((float(x), float(y)), float(np.degrees(turn)))
     # the rigid body moves back to its place, and takes the points along
-    back = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
-    followed, _ = measure_contact(body.obstacle, centre + (moved - centre - [x, y]) @ back, frame[:, 0] @ back)
+    back = centre + motion_of_body.back(moved - centre)
+    followed, _ = measure_contact(body.obstacle, back, motion_of_body.turned_back(frame[:, 0]))
     if not (np.abs(followed - (gap - relative[:, 0])) > _OFF * deformation).any():
         return ""
     length, beside = (amount(each, "length", prepared.scene.units, 3) for each in (float(np.hypot(x, y)), deformation))

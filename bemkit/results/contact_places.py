@@ -205,12 +205,19 @@ class ContactPlaces:
         pairs = np.concatenate([body.mesh.node_elements, body.mesh.node_elements[:, ::-1]])
         excluded = np.setdiff1d(elements, counted)
         source = pairs[np.isin(pairs[:, 0], excluded) & np.isin(pairs[:, 1], counted), 0]
-        degrees = element_degrees(body.scene.discretisation.displacement_space(body.mesh))[source]
-        return float(errors[counted].sum() + (NEIGHBOUR_SHARE / degrees) ** 2 @ errors[source])
+        return float(errors[counted].sum() + (NEIGHBOUR_SHARE / self._degrees[name][source]) ** 2 @ errors[source])
 
     def squared_energy_error(self) -> float:
         """Return the squared error in the energy norm [J/m] where zones end inside elements of degree 3 and more."""
         return self._transition_errors[1] if self.lowest_degree > 2 else 0.0
+
+    @cached_property
+    def _degrees(self) -> dict[str, IntArray]:
+        """Degrees of the displacements on the elements (n_elements,) of all bodies."""
+        return {
+            name: element_degrees(body.scene.discretisation.displacement_space(body.mesh))
+            for name, body in self.solution.bodies.items()
+        }
 
     @cached_property
     def lowest_degree(self) -> int:
@@ -242,10 +249,9 @@ class ContactPlaces:
             for k, side in enumerate(self.sides(transition.part)):
                 end = side.near(np.array([transition.x, transition.y]))
                 if end.element in self._counted[side.body]:
-                    body = solution.bodies[side.body]
-                    degree = element_degrees(body.scene.discretisation.displacement_space(body.mesh))[end.element]
-                    squared, length = transition_error(table, fields, transition, transitions, end, int(degree))
-                    plane_modulus = body.scene.material.plane_modulus
+                    degree = int(self._degrees[side.body][end.element])
+                    squared, length = transition_error(table, fields, transition, transitions, end, degree)
+                    plane_modulus = solution.bodies[side.body].scene.material.plane_modulus
                     energy += 0.5 * squared * length / plane_modulus
                     if k == 0:  # the side with the nodes, for both
                         traction += solution.n_sides(transition.part) * squared

@@ -118,13 +118,11 @@ def boundary_arrays(solution: Solution) -> dict[str, FloatArray | IntArray]:
     table = solution.contact
     arrays: dict[str, Any] = {f"contact/{name}": column for name, column in table.columns().items()}
     arrays["contact/part"] = np.array(table.part, dtype=str)
-    from bemkit.results.vtk import bodies_of
-
-    for prefix, body in bodies_of(solution).items():
-        fields = body.boundary
+    for name, body in solution.bodies.items():
+        prefix, fields = f"{name}/" if name else "", body.boundary
         arrays |= {f"{prefix}nodes": body.mesh.nodes, f"{prefix}elements": body.mesh.elements}
-        for name in ("points", "displacement", "centres", "traction", "traction_dofs", "reaction"):
-            arrays[prefix + name] = getattr(fields, name)
+        for field in ("points", "displacement", "centres", "traction", "traction_dofs", "reaction"):
+            arrays[prefix + field] = getattr(fields, field)
     return arrays
 
 

@@ -197,10 +197,12 @@ def contact_forces(
     transitions : sequence of Transition
         Of the same table.
     """
-    return tuple(
-        ContactForce(**(vars(resultant) | contact_sizes(table, depth, resultant.name, length, transitions)))
-        for resultant, length in zip(resultants, lengths, strict=True)
-    )
+    zones, forces = unrolled(table, transitions), []
+    for resultant, length in zip(resultants, lengths, strict=True):
+        closed = min(length, _contact_length(*zones, resultant.name))
+        entries = vars(resultant) | _sizes(table, depth, resultant.name)
+        forces.append(ContactForce(**entries, contact_length=closed))
+    return tuple(forces)
 
 
 def forces_on_parts(on_sides: Iterable[tuple[tuple[str, str], PartForce]]) -> dict[str, dict[str, PartForce]]:
@@ -212,16 +214,13 @@ def forces_on_parts(on_sides: Iterable[tuple[tuple[str, str], PartForce]]) -> di
     return forces
 
 
-def contact_sizes(
-    table: ContactTable, depth: float, part: str, length: float, transitions: Sequence[Transition]
-) -> dict[str, float]:
-    """Return the entries of `ContactForce` besides the resultant."""
+def _sizes(table: ContactTable, depth: float, part: str) -> dict[str, float]:
+    """Return the entries of `ContactForce` besides the resultant and the contact length."""
     nodes = table.rows(part)
     closed = nodes & (table.status != NodeStatus.SEPARATED)
     return {
         "force_normal": -depth * float(table.weight[nodes] @ table.sigma_n[nodes]),
         "force_tangential": depth * float(table.weight[nodes] @ table.sigma_t[nodes]),
-        "contact_length": min(length, _contact_length(*unrolled(table, transitions), part)),
         "peak_pressure": max(0.0, float(np.max(-table.sigma_n[nodes], initial=0.0))),  # not -0
         "largest_slip": float(np.abs(table.u_t[closed]).max(initial=0.0)),
     }

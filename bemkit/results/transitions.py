@@ -98,8 +98,7 @@ def find_transitions(contact: ContactTable, slip: FloatArray | None = None) -> t
             coordinate[of_part] = np.interp(arc_lengths[of_part], table.s[nodes], column[nodes])
     at = zip(changes, parts, x.tolist(), y.tolist(), arc_lengths.tolist(), strict=True)
     found = [Transition(part, a, b, contact.wrapped(part, s), words[i], words[i + 1]) for i, part, a, b, s in at]
-    order = {part: k for k, part in enumerate(contact.parts)}
-    return tuple(sorted(found, key=lambda each: (order[each.part], each.s)) if contact.circumferences else found)
+    return _in_order(contact, found) if contact.circumferences else tuple(found)
 
 
 def unrolled(contact: ContactTable, transitions: Sequence[Transition]) -> tuple[ContactTable, tuple[Transition, ...]]:
@@ -107,10 +106,15 @@ def unrolled(contact: ContactTable, transitions: Sequence[Transition]) -> tuple[
     table, _ = contact.unrolled
     if not contact.circumferences:
         return table, tuple(transitions)
-    start = {part: float(table.s[table.rows(part)][0]) for part in table.parts}
-    moved = [replace(each, s=contact.wrapped(each.part, each.s, start[each.part])) for each in transitions]
-    order = {part: k for k, part in enumerate(table.parts)}
-    return table, tuple(sorted(moved, key=lambda each: (order[each.part], each.s)))
+    start = {part: float(table.s[table.part.index(part)]) for part in contact.circumferences}
+    moved = [replace(each, s=contact.wrapped(each.part, each.s, start.get(each.part, 0.0))) for each in transitions]
+    return table, _in_order(table, moved)
+
+
+def _in_order(contact: ContactTable, transitions: Sequence[Transition]) -> tuple[Transition, ...]:
+    """Return transitions in the order of the parts of a table, and along each part."""
+    order = {part: k for k, part in enumerate(contact.parts)}
+    return tuple(sorted(transitions, key=lambda each: (order[each.part], each.s)))
 
 
 def resolved_transitions(contact: ContactTable, transitions: Sequence[Transition]) -> tuple[Transition, ...]:

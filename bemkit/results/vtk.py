@@ -112,11 +112,6 @@ def _add(piece: ElementTree.Element[str], place: str, arrays: Mapping[str, npt.N
         entry.text = b64encode(len(data).to_bytes(8, "little") + data).decode("ascii")
 
 
-def bodies_of(solution: Solution) -> Mapping[str, SolvedBody]:
-    """Return the bodies of a solution by the prefix of their arrays."""
-    return {f"{name}/" if name else "": body for name, body in solution.bodies.items()}
-
-
 def write_vtk(path: Path, solution: Solution, inside: int = 0) -> None:
     """Write a .vtu file.
 
@@ -135,7 +130,7 @@ def write_vtk(path: Path, solution: Solution, inside: int = 0) -> None:
     ``traction`` [Pa] of lines and ``body``, its number. What is not defined somewhere is not a number there. Triangles
     end at the boundary; an exterior and a half-plane are cut at half their size from it.
     """
-    bodies = list(bodies_of(solution).values())
+    bodies = list(solution.bodies.values())
     blocks = [_contact_nodes(solution, bodies)] if solution.contact.n_contact else []
     blocks += [_boundary(body, number) for number, body in enumerate(bodies)]
     if inside:

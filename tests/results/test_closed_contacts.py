@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 import bemkit as bk
 from bemkit.results.contact_table import ContactTable
 from bemkit.results.error_indicators import contact_errors
-from bemkit.results.part_forces import contact_sizes
+from bemkit.results.part_forces import PartForce, contact_forces
 from bemkit.results.slip_reversals import slip_reversals
 from bemkit.results.transitions import find_transitions, resolved_transitions, unresolved_contacts, unrolled
 from bemkit.solvers.active_sets import NodeStatus
@@ -61,8 +61,8 @@ def test_transitions_do_not_depend_on_the_first_node(begin: int) -> None:
 def test_lengths_and_estimates_do_not_depend_on_the_first_node(begin: int) -> None:
     table = hole(begin)
     transitions = find_transitions(table)
-    sizes = contact_sizes(table, 1.0, "hole", 2.0 * np.pi, transitions)
-    assert sizes["contact_length"] == pytest.approx(2.0 * HALF_ANGLE, abs=1e-3)
+    (force,) = contact_forces(table, 1.0, [PartForce("hole", 0.0, 0.0, 0.0)], [2.0 * np.pi], transitions)
+    assert force.contact_length == pytest.approx(2.0 * HALF_ANGLE, abs=1e-3)
     unrolled_table, on_it = unrolled(table, transitions)
     assert len(resolved_transitions(unrolled_table, on_it)) == 4
     assert not unresolved_contacts(unrolled_table, on_it)

@@ -11,7 +11,7 @@ import pytest
 
 import bemkit as bk
 from bemkit.results.contact_table import ContactTable
-from bemkit.results.part_forces import contact_sizes
+from bemkit.results.part_forces import PartForce, contact_forces
 from bemkit.results.solution import BoundaryFields, Solution
 from bemkit.results.transitions import find_transitions
 from bemkit.runs.run import run
@@ -197,7 +197,8 @@ def test_each_run_of_nodes_with_partners_has_its_own_contact_length() -> None:
     rows = table([STICK] * 3 + [SEPARATED] * 3 + [SEPARATED, FORWARD], s=s, x=s)
     (end,) = find_transitions(rows)
     assert end.s == 21.0
-    assert contact_sizes(rows, 1.0, "a", 30.0, (end,))["contact_length"] == pytest.approx(3.0 + 1.0, rel=1e-12)
+    (force,) = contact_forces(rows, 1.0, [PartForce("a", 0.0, 0.0, 0.0)], [30.0], (end,))
+    assert force.contact_length == pytest.approx(3.0 + 1.0, rel=1e-12)
 
 
 def test_a_contact_beside_a_part_that_faces_nothing_is_no_longer_than_its_part() -> None:
