@@ -102,19 +102,22 @@ def with_least_clearances(sample: Sample, n_pieces: int, xi: FloatArray) -> Poin
 
     Notes
     -----
-    A parabola falls below the least of three equidistant points by at most a quarter of the difference between them. An
-    interval about the least of the points is searched where that difference leads below zero: on every piece without
-    traction, because its contact may be missed, and on the deepest of the others.
+    A parabola falls below the least of three equidistant points by at most a quarter of the difference between them,
+    and the distance from a sharp corner between two points by at most what it rises beyond them. An interval about the
+    least of the points is searched where the difference of the points beside it leads below zero: on every piece that
+    is free of traction or apart at all points, because its contact may be missed, and on the deepest of the others.
     """
     pieces, low, high = np.arange(n_pieces), np.full(n_pieces, -1.0), np.ones(n_pieces)
     values = sample(pieces, low, high)
     found, owners = [values], [np.repeat(pieces, xi.size)]
-    is_free = np.all(values.is_free.reshape(n_pieces, xi.size), axis=1)
+    # friction that acts across a gap has a normal component where the direction of contact turns
+    is_free = np.all((values.is_free | (values.clearance > 0.0)).reshape(n_pieces, xi.size), axis=1)
     while pieces.size:
         clearance = values.clearance.reshape(pieces.size, xi.size)
         least = clearance.min(axis=1)
-        first = np.clip(np.argmin(clearance, axis=1) - 1, 0, xi.size - 3)
-        about = np.take_along_axis(clearance, first[:, None] + np.arange(3), axis=1)
+        nearest = np.argmin(clearance, axis=1)
+        beside = np.clip(nearest[:, None] + np.arange(-2, 3), 0, xi.size - 1)
+        about, first = np.take_along_axis(clearance, beside, axis=1), np.clip(nearest - 1, 0, xi.size - 3)
         bound = 2.0 * least - about.max(axis=1)
         chosen = (bound < np.minimum(0.0, np.where(is_free, 0.0, least.min()))) & (high - low > 2.0 * _SHORTEST)
         half, middle = 0.5 * (high - low), 0.5 * (high + low)

@@ -7,6 +7,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 import bemkit as bk
 from bemkit.results.between_nodes import BetweenNodes, missed_contacts
@@ -111,15 +113,18 @@ def test_a_rigid_body_that_meets_no_node_ends_by_name(approach: float) -> None:
         assert solution.missed_contacts["block.top / ball"] == pytest.approx((0.013, 0.0), abs=1e-3)
 
 
-def sampled(low: float, middle: float) -> PointsBetween:
-    """Return the points of one piece whose clearance is a parabola with its least value `low` at `middle`."""
-    xi = np.linspace(-1.0, 1.0, 9)
+def sampled(low: float, middle: float, power: int = 2, n: int = 9, friction: float = 0.0) -> PointsBetween:
+    """Return the points of one piece whose clearance rises with a power of the distance from `low` at `middle`."""
+    xi = -np.cos(np.linspace(0.0, np.pi, n))
 
     def sample(pieces, low_end, high_end):
         at = (0.5 * (low_end + high_end)[:, None] + 0.5 * (high_end - low_end)[:, None] * xi).ravel()
         nothing = np.zeros_like(at)
         points = np.stack([at, nothing], axis=1)
-        return PointsBetween(points, at, points, (at - middle) ** 2 + low, nothing, nothing, nothing)
+        clearance = np.abs(at - middle) ** power + low
+        # friction across the gap points to the corner from one side, and away from it on the other
+        along = friction * np.sign(middle - at)
+        return PointsBetween(points, at, points, clearance, along, nothing, nothing)
 
     return with_least_clearances(sample, 1, xi)
 
@@ -130,6 +135,16 @@ def test_the_least_clearance_is_found_where_no_point_is_inside(middle: float) ->
     assert depth == pytest.approx(1e-9, rel=1e-6)
     assert place[0] == pytest.approx(middle, abs=1e-2)
     assert deepest(sampled(1e-9, middle))[0] == 0.0
+
+
+@pytest.mark.parametrize("friction", [0.0, 1.0])
+@pytest.mark.parametrize("n", [5, 9, 13])
+@given(middle=st.floats(-0.98, 0.98))
+def test_a_sharp_corner_between_two_points_is_found(n: int, friction: float, middle: float) -> None:
+    """The deepest points lie in the smallest interval, which is as long as the overlap."""
+    depth, place = deepest(sampled(-0.005, middle, 1, n, friction))
+    assert depth == pytest.approx(0.005, abs=0.003)
+    assert place[0] == pytest.approx(middle, abs=0.005)
 
 
 def test_a_jump_between_two_elements_is_no_parabola() -> None:
