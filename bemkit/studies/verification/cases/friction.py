@@ -123,32 +123,7 @@ def _least_friction(scene: Scene, n: float) -> Solution:
     return known
 
 
-def complete_contact_60() -> Case:
-    """Press a sharp edge."""
-    return _complete_contact(60)
-
-
-def complete_contact_75() -> Case:
-    """Press an edge of 75 degrees."""
-    return _complete_contact(75)
-
-
-def complete_contact_90() -> Case:
-    """Press a square edge."""
-    return _complete_contact(90)
-
-
-def complete_contact_105() -> Case:
-    """Press an edge of 105 degrees."""
-    return _complete_contact(105)
-
-
-def complete_contact_120() -> Case:
-    """Press a blunt edge."""
-    return _complete_contact(120)
-
-
-def _complete_contact(degrees: int) -> Case:
+def complete_contact(degrees: int) -> Case:
     """Press a sector on a half disc with the tractions and displacements of the leading field on their arcs."""
     material = Material(1e3, 0.3)
     exact = CompleteContact(float(np.radians(degrees)), material)

@@ -253,22 +253,7 @@ def periodic_wave() -> Case:
     )
 
 
-def closed_cracks_10() -> Case:
-    """Take short cracks."""
-    return _closed_cracks("0.1", (2.4e-2, 1.2e-2, 6e-3))
-
-
-def closed_cracks_25() -> Case:
-    """Take cracks of half the period."""
-    return _closed_cracks("0.25", (1.1e-2, 5.5e-3, 2.7e-3))
-
-
-def closed_cracks_40() -> Case:
-    """Take long cracks."""
-    return _closed_cracks("0.4", (1e-2, 5e-3, 2.5e-3))
-
-
-def _closed_cracks(half_length: str, bounds: tuple[float, ...]) -> Case:
+def closed_cracks(half_length: float, bounds: tuple[float, ...]) -> Case:
     """Model one face of cracks in a line: beside them everything sticks."""
     effective = 2e-4  # shear less friction on the faces; E' = 1
     law = Coulomb(Expression(f"where(abs(x) < {half_length}, 0.1, 100)"))
@@ -278,6 +263,6 @@ def _closed_cracks(half_length: str, bounds: tuple[float, ...]) -> Case:
     def slip(solution: Solution) -> float:
         return 2.0 * abs(float(solution.contact.weight @ solution.contact.u_t)) / effective  # of both faces
 
-    quantity = Quantity("mean slip", slip, bounds, closed_cracks_slip(float(half_length)), order=0.9)
+    quantity = Quantity("mean slip", slip, bounds, closed_cracks_slip(half_length), order=0.9)
     validity = "antisymmetric: an incompressible half-plane on a rigid body moves like one face of the cracks"
     return Case(replace(scene, shape=_PERIOD), "Westergaard1939", validity, (200, 400, 800), (quantity,))
