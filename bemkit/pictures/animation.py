@@ -16,7 +16,6 @@ from bemkit.pictures.drawing import new_figure
 from bemkit.pictures.magnification import magnification
 from bemkit.pictures.plane import joined_frame, set_frame
 from bemkit.pictures.shown import Result, shown
-from bemkit.scene.unit_names import UnitNames
 
 GIF, MP4 = ".gif", ".mp4"
 _DOTS_PER_INCH = 80
@@ -24,9 +23,7 @@ _MARGIN = 0.15
 """Margin for loads and supports around the bodies, relative to the longer side."""
 
 
-def save_animation(
-    path: str | Path, steps: Sequence[Result], *, units: UnitNames | None = None, steps_per_second: int = 3
-) -> Path:
+def save_animation(path: str | Path, steps: Sequence[Result], *, steps_per_second: int = 3) -> Path:
     """Write a moving picture of the deformed bodies over the steps of a load history.
 
     Displacements of all steps are enlarged by the same factor: the smallest factor of all steps.
@@ -37,8 +34,6 @@ def save_animation(
         Ends in ``.gif``, or in ``.mp4`` where the encoder ffmpeg is installed, or the package imageio-ffmpeg with one.
     steps : sequence of Solution
         As `bemkit.run` returns them for a sequence of scenes.
-    units : UnitNames, optional
-        Those of the scene by default.
     steps_per_second : int
 
     Raises
@@ -68,7 +63,7 @@ def save_animation(
         with writer.saving(figure, str(film), dpi=_DOTS_PER_INCH):
             for number, step in enumerate(steps, start=1):
                 figure.clear()
-                axes = draw_deformation(step, figure.add_subplot(), factor=factor, units=units)
+                axes = draw_deformation(step, figure.add_subplot(), factor=factor)
                 axes.set_title(f"{step.title}\nstep {number} of {len(steps)}", parse_math=False)
                 set_frame(axes, frame, margin=_MARGIN)
                 writer.grab_frame()

@@ -10,14 +10,14 @@ from bemkit.pictures.contact_axes import axes_with_strip, cut_peaks
 from bemkit.pictures.drawing import BLUE, VERMILION, Axes, axes_or_new, label_values
 from bemkit.pictures.traction_curves import boundary_curve
 from bemkit.results.solution import Solution
-from bemkit.scene.unit_names import UnitNames, with_unit
+from bemkit.scene.unit_names import with_unit
 
 _FREE, _PARTS = "#F2F2F2", ("#C6DBEA", "#F3D9B1")
 _READABLE = 0.06
 """Least length of a piece that has room for its name, relative to the boundary."""
 
 
-def draw_boundary_traction(solution: Solution, axes: Axes | None = None, *, units: UnitNames | None = None) -> Axes:
+def draw_boundary_traction(solution: Solution, axes: Axes | None = None) -> Axes:
     """Draw the normal and the tangential traction along the boundary, above the parts it belongs to.
 
     Closed curves of the boundary follow each other; a line marks where each of them begins. Peaks that would flatten
@@ -26,10 +26,10 @@ def draw_boundary_traction(solution: Solution, axes: Axes | None = None, *, unit
     Parameters
     ----------
     solution : Solution
-    axes, units : optional
+    axes : optional
         As for `bemkit.pictures.contact_curves.draw_contact_displacement`.
     """
-    units = units or solution.units
+    units = solution.units
     order = np.concatenate(solution.mesh.loops)
     curve = boundary_curve(solution.body, order)
     axes = axes_or_new(axes)

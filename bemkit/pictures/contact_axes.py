@@ -28,10 +28,8 @@ _NAMED = 0.12
 """Least length of a zone that has room for its name, relative to the contact."""
 
 
-def contact_axes(
-    axes: Axes | None, solution: Result, part: str, units: UnitNames | None, subject: str
-) -> tuple[Axes, UnitNames | None]:
-    """Return axes above a strip that shows the status along a contact, and the names of units.
+def contact_axes(axes: Axes | None, solution: Result, part: str, subject: str) -> Axes:
+    """Return axes above a strip that shows the status along a contact.
 
     Parameters
     ----------
@@ -40,21 +38,18 @@ def contact_axes(
     solution : Solution
     part : str
         Name of the contact part, or of the contact of several bodies.
-    units : UnitNames or None
-        Those of the scene by default.
     subject : str
         First line of the title.
     """
-    units = units or solution.units
     axes = axes_or_new(axes)
     strip = axes_with_strip(axes, f"{subject}\n{solution.title}")
     abscissa = Abscissa.along(solution, part)
-    strip.set_xlabel(abscissa.label(units), parse_math="$" not in part)
+    strip.set_xlabel(abscissa.label(solution.units), parse_math="$" not in part)
     _draw_status(strip, solution, part, abscissa)
     places = [abscissa.at(transition.s) for transition in solution.transitions if transition.part == part]
     for place in places if len(places) <= _MOST_LINES else ():
         axes.axvline(place, color=GREY, linestyle="-", linewidth=0.8, zorder=0)
-    return axes, units
+    return axes
 
 
 def axes_with_strip(axes: Axes, title: str) -> Axes:

@@ -20,12 +20,10 @@ from bemkit.pictures.crowds import MANY, marked
 from bemkit.pictures.drawing import BLUE, VERMILION, Axes, axes_or_new, ignore_round_off, label_values, show_grid
 from bemkit.pictures.shown import Result
 from bemkit.pictures.traction_curves import traction_curve
-from bemkit.scene.unit_names import UnitNames, with_unit
+from bemkit.scene.unit_names import with_unit
 
 
-def draw_contact_displacement(
-    solution: Result, part: str, axes: Axes | None = None, *, units: UnitNames | None = None
-) -> Axes:
+def draw_contact_displacement(solution: Result, part: str, axes: Axes | None = None) -> Axes:
     """Draw normal and tangential displacement and the gap along one contact part, above its status.
 
     Contacts on horizontal lines are drawn over x, with slip and friction positive along x; others over the arc length
@@ -38,15 +36,13 @@ def draw_contact_displacement(
         Name of a contact part, or of a contact of several bodies.
     axes : Axes, optional
         Of matplotlib; those of a new figure by default.
-    units : UnitNames, optional
-        Those of the scene by default.
 
     Returns
     -------
     Axes
         The panel; the strip of the status is its child.
     """
-    axes, units = contact_axes(axes, solution, part, units, "Displacements on the contact boundary")
+    axes, units = contact_axes(axes, solution, part, "Displacements on the contact boundary"), solution.units
     contact, chosen = solution.contact, solution.contact.rows(part)
     abscissa = Abscissa.along(solution, part)
     s, gap = abscissa.at(contact.s[chosen]), contact.gap[chosen]
@@ -59,9 +55,7 @@ def draw_contact_displacement(
     return axes
 
 
-def draw_contact_traction(
-    solution: Result, part: str, axes: Axes | None = None, *, units: UnitNames | None = None
-) -> Axes:
+def draw_contact_traction(solution: Result, part: str, axes: Axes | None = None) -> Axes:
     """Draw normal and tangential traction and the friction bound; see `draw_contact_displacement`.
 
     Lines are the tractions of the discretisation: steps where they are constant on each element, straight or curved
@@ -69,7 +63,7 @@ def draw_contact_traction(
     there are no more than `bemkit.pictures.crowds.MANY`. Peaks that would flatten all else are cut, and the picture
     says so.
     """
-    axes, units = contact_axes(axes, solution, part, units, "Tractions on the contact boundary")
+    axes, units = contact_axes(axes, solution, part, "Tractions on the contact boundary"), solution.units
     contact, chosen = solution.contact, solution.contact.rows(part)
     abscissa, curve = Abscissa.along(solution, part), traction_curve(solution, part)
     s, along = abscissa.at(contact.s[chosen]), abscissa.at(curve.s)
@@ -87,14 +81,12 @@ def draw_contact_traction(
     return axes
 
 
-def draw_contact_clearance(
-    solution: Result, part: str, axes: Axes | None = None, *, units: UnitNames | None = None
-) -> Axes:
+def draw_contact_clearance(solution: Result, part: str, axes: Axes | None = None) -> Axes:
     """Draw contact pressure and clearance along one contact part; see `draw_contact_displacement`.
 
     Peaks of the pressure are cut as those of tractions in `draw_contact_traction`.
     """
-    axes, units = contact_axes(axes, solution, part, units, "Contact pressure and clearance")
+    axes, units = contact_axes(axes, solution, part, "Contact pressure and clearance"), solution.units
     contact, chosen = solution.contact, solution.contact.rows(part)
     abscissa, curve = Abscissa.along(solution, part), traction_curve(solution, part)
     along = abscissa.at(curve.s)
@@ -115,9 +107,7 @@ def draw_contact_clearance(
     return axes
 
 
-def draw_friction_cone(
-    solution: Result, part: str, axes: Axes | None = None, *, units: UnitNames | None = None
-) -> Axes:
+def draw_friction_cone(solution: Result, part: str, axes: Axes | None = None) -> Axes:
     """Draw the tractions of the nodes of one contact over its pressures, within the friction bound.
 
     Nodes that stick lie between the bounds, nodes that slip on one of them. Where the coefficient varies along the
@@ -125,8 +115,7 @@ def draw_friction_cone(
 
     See `draw_contact_displacement`.
     """
-    units = units or solution.units
-    axes = axes_or_new(axes, 5.6, 4.6)
+    axes, units = axes_or_new(axes, 5.6, 4.6), solution.units
     table, rows = solution.contact, solution.contact.rows(part)
     pressure, scale = -table.sigma_n, traction_scale(solution)
     friction = Abscissa.along(solution, part).sign * table.sigma_t

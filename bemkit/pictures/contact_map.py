@@ -16,7 +16,7 @@ from bemkit.pictures.obstacles import draw_obstacles, draw_rigid_bodies
 from bemkit.pictures.plane import draw_arrows, draw_bodies, draw_initial, joined_frame, plane_axes, set_frame
 from bemkit.pictures.shown import DrawnScene, Result, shown
 from bemkit.results.contact_table import ContactTable
-from bemkit.scene.unit_names import UnitNames, amount
+from bemkit.scene.unit_names import amount
 
 _TOOTH, _SHARE, _SHORTEST = 0.1, 1.0 / 3.0, 0.03
 """Length of the longest tooth, relative to the picture or to the smallest body, and its lower limit, relative to the
@@ -31,19 +31,18 @@ _NODES_AROUND = 3.0
 """Size of the frame around a zone of a single node, in distances of neighbouring nodes."""
 
 
-def draw_contact_map(solution: Result, axes: Axes | None = None, *, units: UnitNames | None = None) -> Axes:
+def draw_contact_map(solution: Result, axes: Axes | None = None) -> Axes:
     """Draw all bodies, and each contact once: its status by colour, its pressure by the length of a comb.
 
     Parameters
     ----------
     solution : Solution
-    axes, units : optional
+    axes : optional
         As for `bemkit.pictures.deformation.draw_deformation`.
     """
     from matplotlib.collections import LineCollection
 
-    scene, table = shown(solution), solution.contact
-    units = units or solution.units
+    scene, table, units = shown(solution), solution.contact, solution.units
     nodes = contact_nodes(solution, scene, 0.0)
     points, pressure = nodes.points, np.maximum(-table.sigma_n, 0.0)[nodes.rows]
     largest = float(pressure.max(initial=0.0))
@@ -79,14 +78,14 @@ def is_short(solution: Result) -> bool:
     return frame is not None and float(np.hypot(*np.ptp(frame, axis=1))) < SHORT * scene.size
 
 
-def draw_zoom(solution: Result, axes: Axes | None = None, *, units: UnitNames | None = None) -> Axes:
+def draw_zoom(solution: Result, axes: Axes | None = None) -> Axes:
     """Draw the zone of contact from near by, with the tractions on the contact nodes as arrows.
 
     Parameters
     ----------
     solution : Solution
         With contact; where nothing touches, the whole contact boundary is shown.
-    axes, units : optional
+    axes : optional
         As for `bemkit.pictures.deformation.draw_deformation`.
     """
     scene = shown(solution)
@@ -97,7 +96,7 @@ def draw_zoom(solution: Result, axes: Axes | None = None, *, units: UnitNames | 
     middle = frame.mean(axis=1)
     frame = np.stack([middle - 0.8 * size, middle + 0.8 * size], axis=1)
     factor = magnification(scene, size)
-    axes = plane_axes(axes, frame, f"Zone of contact\n{scene.title}", units or scene.units)
+    axes = plane_axes(axes, frame, f"Zone of contact\n{scene.title}", scene.units)
     draw_bodies(axes, scene, factor)
     set_frame(axes, frame, margin=0.0)
     draw_rigid_bodies(axes, scene, factor)

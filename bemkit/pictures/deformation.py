@@ -11,12 +11,9 @@ from bemkit.pictures.obstacles import draw_obstacles, draw_rigid_bodies, relief_
 from bemkit.pictures.plane import draw_bodies, draw_initial, draw_symmetry_lines, joined_frame, plane_axes, set_frame
 from bemkit.pictures.shown import Drawable, DrawnScene, Result, shown
 from bemkit.pictures.supports import draw_supports
-from bemkit.scene.unit_names import UnitNames
 
 
-def draw_deformation(
-    solution: Result, axes: Axes | None = None, *, factor: float | None = None, units: UnitNames | None = None
-) -> Axes:
+def draw_deformation(solution: Result, axes: Axes | None = None, *, factor: float | None = None) -> Axes:
     """Draw all bodies before and after, with supports, loads and obstacles.
 
     Parameters
@@ -27,8 +24,6 @@ def draw_deformation(
     factor : float, optional
         Factor by which displacements are enlarged; by default so small that contacts are drawn closed. The picture
         states it.
-    units : UnitNames, optional
-        Those of the scene by default.
 
     Returns
     -------
@@ -37,17 +32,17 @@ def draw_deformation(
     scene = shown(solution)
     if factor is None:  # of a relief that fills the height nothing needs to be enlarged
         factor = magnification(scene) if relief_frame(scene, 1.0) is None else 1.0
-    axes = plane_axes(axes, scene.frame, scene.title, units or scene.units)
+    axes = plane_axes(axes, scene.frame, scene.title, scene.units)
     draw_bodies(axes, scene, factor)
     loops = [loop for body in scene.bodies for loop in body.outlines(factor)]
     _complete(axes, scene, factor, loops)
     return axes
 
 
-def draw_scene(scene: Drawable, axes: Axes | None = None, *, units: UnitNames | None = None) -> Axes:
+def draw_scene(scene: Drawable, axes: Axes | None = None) -> Axes:
     """Draw what a scene states: bodies, supports, loads and obstacles; see `draw_deformation`."""
     stated = shown(scene)
-    axes = plane_axes(axes, stated.frame, stated.title, units or stated.units)
+    axes = plane_axes(axes, stated.frame, stated.title, stated.units)
     draw_initial(axes, stated, is_filled=True)
     _complete(axes, stated, 0.0, [])
     return axes

@@ -22,7 +22,7 @@ from bemkit.pictures.drawing import (
 from bemkit.pictures.shown import Result
 from bemkit.results.contact_table import STATUS_WORDS
 from bemkit.results.load_history import LoadHistory
-from bemkit.scene.unit_names import UnitNames, with_unit
+from bemkit.scene.unit_names import with_unit
 
 _NO_FRICTION = 1e-9
 """Ratio of friction to pressing force that is round-off."""
@@ -35,7 +35,7 @@ def history_of(solution: Result) -> LoadHistory:
     return solution.loading
 
 
-def draw_friction_loop(solution: Result, axes: Axes | None = None, *, units: UnitNames | None = None) -> Axes:
+def draw_friction_loop(solution: Result, axes: Axes | None = None) -> Axes:
     """Draw the friction force over the mean tangential displacement of the contact nodes, step by step.
 
     If all contacts lie on horizontal lines, both are positive along x, else along the boundary.
@@ -44,7 +44,7 @@ def draw_friction_loop(solution: Result, axes: Axes | None = None, *, units: Uni
     ----------
     solution : Solution
         Of a load history.
-    axes, units : optional
+    axes : optional
         As for `bemkit.pictures.contact_curves.draw_contact_displacement`.
 
     Raises
@@ -52,7 +52,7 @@ def draw_friction_loop(solution: Result, axes: Axes | None = None, *, units: Uni
     InputError
         If there is no load history.
     """
-    loading, units = history_of(solution), units or solution.units
+    loading, units = history_of(solution), solution.units
     axes = axes_or_new(axes, 6.0, 4.2)
     direction = solution.contact.common_direction
     sign, over = direction or 1.0, " along $x$" if direction else ""
@@ -78,13 +78,13 @@ def has_friction(loading: LoadHistory) -> bool:
     return any(abs(step.force_tangential) > _NO_FRICTION * abs(step.force_normal) for step in loading.steps)
 
 
-def draw_work(solution: Result, axes: Axes | None = None, *, units: UnitNames | None = None) -> Axes:
+def draw_work(solution: Result, axes: Axes | None = None) -> Axes:
     """Draw the work of loads, the dissipation by friction and the elastic energy over time.
 
     The error of the increments is drawn where it is visible: the external work is the sum of the others.
     See `draw_friction_loop`.
     """
-    loading, units = history_of(solution), units or solution.units
+    loading, units = history_of(solution), solution.units
     axes = axes_or_new(axes, 6.0, 4.2)
     times = np.concatenate([[0.0], loading.times])
     external = np.cumsum([0.0, *(step.work.external_work for step in loading.steps)])
@@ -105,9 +105,7 @@ def draw_work(solution: Result, axes: Axes | None = None, *, units: UnitNames | 
     return axes
 
 
-def draw_status_over_time(
-    solution: Result, part: str, axes: Axes | None = None, *, units: UnitNames | None = None
-) -> Axes:
+def draw_status_over_time(solution: Result, part: str, axes: Axes | None = None) -> Axes:
     """Draw where the nodes of a contact are separated, slip or stick, for every step of a load history.
 
     The part is the name of a contact part, or of a contact of several bodies. See `draw_friction_loop`.
@@ -129,7 +127,7 @@ def draw_status_over_time(
     axes = axes_or_new(axes)
     colours = ListedColormap([STATUS_COLOURS[name] for name in names])
     axes.pcolormesh(edges, times, statuses, cmap=colours, vmin=-0.5, vmax=len(names) - 0.5)
-    axes.set_xlabel(abscissa.label(units or solution.units))
+    axes.set_xlabel(abscissa.label(solution.units))
     axes.set_ylabel("time $t$")
     axes.set_title(f"Status over time\n{solution.title}", parse_math=False, fontsize=11)
     handles = [Patch(color=STATUS_COLOURS[name], label=name) for name in names]

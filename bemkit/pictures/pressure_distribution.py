@@ -6,18 +6,16 @@ from bemkit.pictures.contact_axes import FIRST
 from bemkit.pictures.drawing import Axes, axes_or_new, show_grid
 from bemkit.pictures.shown import Result
 from bemkit.results.pressure_distribution import pressure_shares
-from bemkit.scene.unit_names import UnitNames, unit_of, with_unit
+from bemkit.scene.unit_names import unit_of, with_unit
 
 
-def draw_pressure_distribution(
-    solution: Result, part: str, axes: Axes | None = None, *, units: UnitNames | None = None
-) -> Axes:
+def draw_pressure_distribution(solution: Result, part: str, axes: Axes | None = None) -> Axes:
     """Draw the probability density of the pressures on one contact that are not zero.
 
     The area below is the share of the contact that touches, which the title states. See
     `bemkit.pictures.contact_curves.draw_contact_displacement` for the parameters.
     """
-    units, axes = units or solution.units, axes_or_new(axes, 5.6, 4.0)
+    units, axes = solution.units, axes_or_new(axes, 5.6, 4.0)
     shares = list(pressure_shares(solution.contact, part))
     edges = [0.0, *(each.pressure_to for each in shares)]
     axes.stairs([each.density for each in shares], edges, fill=True, alpha=0.3, color=FIRST["color"])

@@ -24,9 +24,7 @@ _FLAT = 1e-6
 """Variation of stresses that is drawn as none, relative to the largest."""
 
 
-def draw_stress(
-    solution: Result, axes: Axes | None = None, *, measure: str = "von-mises", units: UnitNames | None = None
-) -> Axes:
+def draw_stress(solution: Result, axes: Axes | None = None, *, measure: str = "von-mises") -> Axes:
     """Draw a stress inside all bodies in their final positions.
 
     Parameters
@@ -36,8 +34,6 @@ def draw_stress(
         Of matplotlib; those of a new figure by default.
     measure : str
         One of `STRESSES`.
-    units : UnitNames, optional
-        Those of the scene by default.
 
     Returns
     -------
@@ -49,7 +45,7 @@ def draw_stress(
     InputError
         If the measure is unknown.
     """
-    chosen, scene, units = find_measure(measure), shown(solution), units or solution.units
+    chosen, scene, units = find_measure(measure), shown(solution), solution.units
     bodies = tuple(solution.bodies.values())
     size = float(np.ptp(scene.frame, axis=1).max())
     spacing = size / _ACROSS

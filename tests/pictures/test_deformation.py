@@ -111,7 +111,9 @@ def test_the_factor_minds_obstacles_that_displacements_along_the_contact_reach()
 
 
 def test_the_deformation_tells_its_factor_and_its_units(solution: Solution) -> None:
-    axes = draw_deformation(solution, units=UnitNames("mm", "MPa"))
+    axes = draw_deformation(
+        dataclasses.replace(solution, scene=dataclasses.replace(solution.scene, units=UnitNames("mm", "MPa")))
+    )
     legend = [text.get_text() for text in axes.get_legend().get_texts()]
     scene = shown(solution)
     factor = magnification(scene)

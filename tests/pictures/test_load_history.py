@@ -34,7 +34,7 @@ def loading(solution: bk.Solution) -> LoadHistory:
 
 def test_the_loop_begins_at_rest_and_passes_through_all_steps(solution: bk.Solution, loading: LoadHistory) -> None:
     axes = Figure().add_subplot()
-    assert draw_friction_loop(solution, axes, units=UNITS) is axes
+    assert draw_friction_loop(replace(solution, scene=replace(solution.scene, units=UNITS)), axes) is axes
     line = axes.lines[0]
     expected = [0.0, *(step.force_tangential for step in loading.steps)]
     np.testing.assert_array_equal(line.get_ydata(), expected)

@@ -159,8 +159,8 @@ def test_bodies_without_an_end_are_drawn_as_far_as_the_frame() -> None:
 
 @pytest.mark.parametrize("measure", slow_except(STRESSES, "von-mises", "stress-xy"))
 def test_each_measure_has_a_scale_and_a_largest_value(measure: str) -> None:
-    solution = bk.run(bk.load_scene("bending"))
-    axes = draw_stress(solution, measure=measure, units=bk.UnitNames("mm", "MPa"))
+    solution = bk.run(replace(bk.load_scene("bending"), units=bk.UnitNames("mm", "MPa")))
+    axes = draw_stress(solution, measure=measure)
     assert axes.collections
     assert axes.get_title().splitlines()[0].endswith("MPa")
     (scale,) = axes.child_axes
