@@ -44,10 +44,10 @@ from bemkit.geometry.shapes import Rectangle as Rectangle
 from bemkit.geometry.shapes import Ring as Ring
 from bemkit.geometry.shapes import Sector as Sector
 from bemkit.geometry.symmetry import Symmetry as Symmetry
-from bemkit.operators.linear.solvers import Automatic as Automatic
-from bemkit.operators.linear.solvers import DenseCholesky as DenseCholesky
-from bemkit.operators.linear.solvers import Hierarchical as Hierarchical
-from bemkit.operators.linear.solvers import MatrixFree as MatrixFree
+from bemkit.operators.linear_solvers import Automatic as Automatic
+from bemkit.operators.linear_solvers import DenseCholesky as DenseCholesky
+from bemkit.operators.linear_solvers import Hierarchical as Hierarchical
+from bemkit.operators.linear_solvers import MatrixFree as MatrixFree
 from bemkit.operators.material import Material as Material
 from bemkit.operators.material import Plane as Plane
 from bemkit.pictures.files import save_pictures as save_pictures

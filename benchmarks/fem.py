@@ -28,7 +28,7 @@ from bemkit.arrays import BoolArray, FloatArray, IntArray
 from bemkit.contact.condensation.dense_body import DenseBody
 from bemkit.contact.problem import ContactProblem
 from bemkit.geometry.quadrature import gauss_legendre
-from bemkit.operators.linear.threads import blas_threads_for
+from bemkit.operators.threads import blas_threads_for
 from bemkit.results.contact_table import ContactTable
 from bemkit.results.transitions import find_transitions
 from bemkit.solvers.base import solve

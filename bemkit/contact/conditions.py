@@ -170,7 +170,7 @@ class LinearConditions:
     def _sparse_free_motions(self, motions: csr_array) -> csr_array:
         from scipy import sparse
 
-        from bemkit.operators.linear.null_space import null_space
+        from bemkit.operators.null_space import null_space
 
         nodes = np.arange(self.n_contact)
         blocks = np.ascontiguousarray(self._scaled_on_displacement)

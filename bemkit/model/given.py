@@ -14,7 +14,7 @@ from bemkit.errors import InputError
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.spaces import BoundarySpace, element_nodes
 from bemkit.model.units import Units
-from bemkit.operators.linear.solvers import (
+from bemkit.operators.linear_solvers import (
     Automatic,
     ChosenLinearSolver,
     DenseCholesky,
@@ -22,9 +22,9 @@ from bemkit.operators.linear.solvers import (
     LinearSolver,
     LinearSolverChoice,
     MatrixFree,
+    Tag,
     choose_linear_solver,
 )
-from bemkit.operators.pair_form import Tag
 from bemkit.operators.steklov_poincare import SteklovPoincare, TractionField
 from bemkit.operators.steklov_poincare.cost import BodyCase, physical_memory
 from bemkit.operators.steklov_poincare.nodal_conditions import (

@@ -31,9 +31,8 @@ from bemkit.model.given import (
 from bemkit.model.placed import Meshes, PlacedBody, place
 from bemkit.model.same_bodies import bodies_under, check_step, find_units, found_contacts, with_found_contacts
 from bemkit.model.units import Units
-from bemkit.operators.linear.solvers import ChosenLinearSolver, DenseCholesky, LinearSolver
+from bemkit.operators.linear_solvers import ChosenLinearSolver, DenseCholesky, LinearSolver, Tag
 from bemkit.operators.material import Material
-from bemkit.operators.pair_form import Tag
 from bemkit.operators.steklov_poincare import SteklovPoincare
 from bemkit.operators.steklov_poincare.cost import BodyCase
 from bemkit.operators.steklov_poincare.nodal_conditions import GivenData, NodalConditions, free_modes, turning

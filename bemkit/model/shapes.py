@@ -10,11 +10,11 @@ from bemkit.errors import CANNOT_BE_SENT, InputError, why_not_sent
 from bemkit.model.given import loaded_map
 from bemkit.model.placed import groups
 from bemkit.model.prepared import Prepared
-from bemkit.operators.linear.dense import SingularMatrixError
-from bemkit.operators.linear.threads import blas_threads_for
+from bemkit.operators.linear_solvers import SingularMatrixError
 from bemkit.operators.steklov_poincare import CondensedMap, SteklovPoincare
 from bemkit.operators.steklov_poincare.forces_inside import ForcesInside
 from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions
+from bemkit.operators.threads import blas_threads_for
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor

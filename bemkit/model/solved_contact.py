@@ -20,7 +20,7 @@ from bemkit.geometry.vectors import norms
 from bemkit.model.contacts import ContactInterface
 from bemkit.model.model import Model
 from bemkit.model.prepared import PreparedBody
-from bemkit.operators.pair_form import Tag
+from bemkit.operators.linear_solvers import Tag
 from bemkit.operators.rigid_modes import traction_free_modes
 from bemkit.operators.steklov_poincare import CondensedMap, SteklovPoincare
 from bemkit.result_warning import ResultWarning

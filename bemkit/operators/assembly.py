@@ -24,8 +24,8 @@ from bemkit.geometry.series import columns_of, series
 from bemkit.geometry.spaces import BoundarySpace
 from bemkit.operators.integrals.pairs import Degrees, PairIntegrals
 from bemkit.operators.integrals.sweep import FEW, PairSweep
-from bemkit.operators.linear.threads import for_each_chunk
 from bemkit.operators.pair_form import Functions, PairForm, Term
+from bemkit.operators.threads import for_each_chunk
 from bemkit.stopwatch import assembling
 
 if TYPE_CHECKING:

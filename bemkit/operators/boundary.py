@@ -25,8 +25,9 @@ from bemkit.operators.forms import (
     definite,
     mass_matrix,
 )
+from bemkit.operators.linear_solvers import Tag
 from bemkit.operators.material import Material
-from bemkit.operators.pair_form import PairForm, Tag, require_one_mesh
+from bemkit.operators.pair_form import PairForm, require_one_mesh
 
 Matrix: TypeAlias = "FloatArray | csr_array[np.float64]"
 

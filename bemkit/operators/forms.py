@@ -22,7 +22,8 @@ from bemkit.errors import GeometryError
 from bemkit.geometry.reflection import antisymmetric_dofs
 from bemkit.geometry.series import columns_of, series
 from bemkit.geometry.spaces import BoundarySpace
-from bemkit.operators.pair_form import Functions, PairForm, Tag, Term, require_one_mesh
+from bemkit.operators.linear_solvers import Tag
+from bemkit.operators.pair_form import Functions, PairForm, Term, require_one_mesh
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array

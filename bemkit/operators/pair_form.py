@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import enum
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -10,6 +9,7 @@ from typing import NamedTuple
 from bemkit.arrays import FloatArray
 from bemkit.errors import GeometryError
 from bemkit.geometry.spaces import BoundarySpace
+from bemkit.operators.linear_solvers import Tag
 from bemkit.operators.material import Material
 
 
@@ -48,16 +48,6 @@ class Term:
     def is_double(self) -> bool:
         """Whether the kernel is the double layer of the Laplace equation."""
         return len(self.tensors) == 1
-
-
-class Tag(enum.Enum):
-    """Properties of an operator; `bemkit.testing.check_operator` verifies each one."""
-
-    SYMMETRIC = "symmetric"
-    POSITIVE_DEFINITE = "positive definite"
-    POSITIVE_SEMIDEFINITE = "positive semidefinite"
-    KILLS_RIGID_MOTIONS = "zero on rigid motions"
-    KILLS_TRANSLATIONS = "zero on translations"
 
 
 @dataclass(frozen=True, eq=False)

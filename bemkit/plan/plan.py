@@ -13,7 +13,7 @@ from bemkit.model.placed import Meshes, groups
 from bemkit.model.prepared import Prepared, prepare_steps
 from bemkit.notebook import ShownInNotebooks
 from bemkit.operators.counts import OperationCounts
-from bemkit.operators.linear.solvers import LinearSolver
+from bemkit.operators.linear_solvers import LinearSolver
 from bemkit.operators.steklov_poincare.cost import (
     CONTACT_STEPS,
     BodyCase,

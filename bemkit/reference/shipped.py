@@ -15,7 +15,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from bemkit.operators.linear.solvers import Automatic
+from bemkit.operators.linear_solvers import Automatic
 from bemkit.reference.column import uniaxial_strain_modulus
 from bemkit.reference.compare import Reference, SampledFields, SamplePoints, ZoneEnd
 from bemkit.reference.disc import DiscBetweenPlates

@@ -13,8 +13,7 @@ from bemkit.arrays import BoolArray, FloatArray, read_only
 from bemkit.errors import InputError
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.spaces import ConstantSpace
-from bemkit.operators.linear.solvers import DenseCholesky
-from bemkit.operators.pair_form import Tag
+from bemkit.operators.linear_solvers import DenseCholesky, Tag
 from bemkit.scene.body_scene import BodyScene
 from bemkit.scene.conditions import Clamped, Load, PrescribedDisplacement, Roller
 

@@ -15,7 +15,7 @@ from bemkit.geometry.local_values import values_on_elements
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.neighbours import break_nodes
 from bemkit.geometry.vectors import norms
-from bemkit.operators.pair_form import Tag
+from bemkit.operators.linear_solvers import Tag
 from bemkit.operators.rigid_modes import without_motion
 from bemkit.result_warning import ResultWarning, first_of_each_kind
 from bemkit.results.between_nodes import BetweenNodes

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from bemkit.contact.solvability import find_unsolvable_load
-from bemkit.operators.linear.threads import blas_threads_for
+from bemkit.operators.threads import blas_threads_for
 from bemkit.runs.run import LoadHistoryError, UnsolvableSceneError, on_its_meshes
 from bemkit.runs.solution_of import solution_of
 from bemkit.runs.steps import NoContactError, built, checked, explained, planned

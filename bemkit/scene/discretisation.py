@@ -15,7 +15,7 @@ from bemkit.errors import GeometryError
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.neighbours import break_nodes
 from bemkit.geometry.spaces import BoundarySpace, ConstantSpace, LagrangeSpace, check_degree
-from bemkit.operators.linear.solvers import LinearSolver
+from bemkit.operators.linear_solvers import LinearSolver
 from bemkit.operators.material import Material
 from bemkit.operators.steklov_poincare import SteklovPoincare
 

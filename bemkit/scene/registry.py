@@ -276,13 +276,13 @@ DISCRETISATIONS = Registry(
 LINEAR_SOLVERS = Registry(
     "linear solver",
     {
-        "automatic": "bemkit.operators.linear.solvers:Automatic",
-        "direct": "bemkit.operators.linear.solvers:DenseCholesky",
-        "hierarchical": "bemkit.operators.linear.solvers:Hierarchical",
-        "matrix-free": "bemkit.operators.linear.solvers:MatrixFree",
+        "automatic": "bemkit.operators.linear_solvers:Automatic",
+        "direct": "bemkit.operators.linear_solvers:DenseCholesky",
+        "hierarchical": "bemkit.operators.linear_solvers:Hierarchical",
+        "matrix-free": "bemkit.operators.linear_solvers:MatrixFree",
     },
     hints={"krylov": "was removed: use 'hierarchical', faster and smaller for constant elements, or 'automatic'"},
-    protocol="bemkit.operators.linear.solvers:LinearSolver",
+    protocol="bemkit.operators.linear_solvers:LinearSolver",
 )
 
 SOLVERS = Registry(

@@ -19,7 +19,7 @@ from bemkit.errors import InputError, Mistakes
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.shapes import Shape
 from bemkit.notebook import ShownInNotebooks
-from bemkit.operators.linear.solvers import Automatic, LinearSolverChoice
+from bemkit.operators.linear_solvers import Automatic, LinearSolverChoice
 from bemkit.operators.material import Material
 from bemkit.scene.body import Body, check_accuracy, check_place, lines_across
 from bemkit.scene.body_scene import BodyScene

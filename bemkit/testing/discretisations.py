@@ -12,9 +12,8 @@ from bemkit.contact.obstacle import RigidHalfPlane
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.shapes import PlateWithHole, Rectangle
 from bemkit.geometry.spaces import dof_points
-from bemkit.operators.linear.solvers import DenseCholesky
+from bemkit.operators.linear_solvers import DenseCholesky, Tag
 from bemkit.operators.material import Material
-from bemkit.operators.pair_form import Tag
 from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions
 from bemkit.results.interior import interior_fields
 from bemkit.results.solution import Solution

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from bemkit.arrays import FloatArray
-from bemkit.operators.linear.dense import SingularMatrixError
-from bemkit.operators.linear.solvers import LinearSolver
+from bemkit.operators.linear_solvers import LinearSolver, SingularMatrixError
 from bemkit.testing.failure import demand
 
 _ORDER = 40

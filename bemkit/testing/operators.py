@@ -8,7 +8,7 @@ from scipy.sparse.linalg import LinearOperator
 from bemkit.arrays import FloatArray
 from bemkit.geometry.spaces import dof_points
 from bemkit.operators.boundary import BoundaryOperator, mass
-from bemkit.operators.pair_form import Tag
+from bemkit.operators.linear_solvers import Tag
 from bemkit.operators.rigid_modes import rigid_motions
 from bemkit.testing.failure import demand
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from bemkit.operators.linear.solvers import Automatic, DenseCholesky, LinearSolverChoice
+from bemkit.operators.linear_solvers import Automatic, DenseCholesky, LinearSolverChoice
 from bemkit.scene.body import Body
 from bemkit.scene.conditions import Part, Pressure, Traction
 from bemkit.scene.mesh_options import MeshOptions

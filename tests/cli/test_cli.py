@@ -28,7 +28,7 @@ import bemkit.runs.run
 from bemkit.cli.console import ConvergenceTable, format_size
 from bemkit.cli.exit_codes import BAD_INPUT, INACCURATE, NOT_CONVERGED, most_serious
 from bemkit.cli.main import commands, main
-from bemkit.operators.linear.solvers import Hierarchical
+from bemkit.operators.linear_solvers import Hierarchical
 from bemkit.results.result_file import read_result
 from bemkit.scene.discretisation import Galerkin
 from bemkit.scene.mesh_options import MeshOptions

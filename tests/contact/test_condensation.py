@@ -17,7 +17,7 @@ from bemkit.contact.problem import ContactProblem, ContactState
 from bemkit.geometry import BoundaryMesh, Polygon, Rectangle, Selection, Shape, discretise
 from bemkit.geometry.spaces import BoundarySpace, LinearSpace, dof_points
 from bemkit.model.contact_free_body import ContactFreeBody, certified
-from bemkit.operators.linear.dense import SingularMatrixError
+from bemkit.operators.linear_solvers import SingularMatrixError
 from bemkit.operators.material import Material
 from bemkit.operators.steklov_poincare import CondensedMap, SteklovPoincare
 from bemkit.operators.steklov_poincare.collocation import CollocationElasticity

@@ -16,11 +16,11 @@ from bemkit.contact.problem import ContactProblem
 from bemkit.errors import InputError
 from bemkit.model.model import Model, build_model
 from bemkit.model.prepared import prepare
+from bemkit.operators import threads
 from bemkit.operators.hierarchy.factor import Factor
 from bemkit.operators.hierarchy.skeletons import Compression
 from bemkit.operators.hierarchy.system import HierarchicalSystem, LocalConditions
-from bemkit.operators.linear import threads
-from bemkit.operators.linear.solvers import DenseCholesky, Hierarchical
+from bemkit.operators.linear_solvers import DenseCholesky, Hierarchical
 from bemkit.operators.steklov_poincare.hierarchical import HierarchicalCollocation
 from bemkit.operators.steklov_poincare.nodal_conditions import Support
 from bemkit.testing import check_body

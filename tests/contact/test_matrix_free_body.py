@@ -12,7 +12,7 @@ from bemkit.contact.condensation.hierarchical_body import HierarchicalBody
 from bemkit.contact.conditions import stick
 from bemkit.model.model import build_model
 from bemkit.model.prepared import prepare
-from bemkit.operators.linear.solvers import DenseCholesky, MatrixFree
+from bemkit.operators.linear_solvers import DenseCholesky, MatrixFree
 from tests.contact.test_hierarchical_body import loose_block, tilted
 from tests.scenes import paper
 from tests.slow import slow_except, slow_only

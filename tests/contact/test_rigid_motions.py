@@ -6,7 +6,7 @@ from scipy import sparse
 
 from bemkit.contact.conditions import orthonormal, separated, slip, stick
 from bemkit.contact.joined.member import diagonal_blocks
-from bemkit.operators.linear.null_space import null_space
+from bemkit.operators.null_space import null_space
 from tests.slow import slow_except
 
 

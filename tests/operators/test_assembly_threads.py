@@ -7,8 +7,8 @@ import pytest
 
 import bemkit as bk
 from bemkit.geometry.spaces import LagrangeSpace
+from bemkit.operators import threads
 from bemkit.operators.boundary import hypersingular
-from bemkit.operators.linear import threads
 
 
 @pytest.fixture

@@ -23,7 +23,7 @@ from bemkit.operators.boundary import (
     single_layer,
 )
 from bemkit.operators.integrals.sweep import PairSweep
-from bemkit.operators.linear.dense import Cholesky, DenseLU, SingularMatrixError, multiply
+from bemkit.operators.linear_solvers import Cholesky, DenseLU, SingularMatrixError, multiply
 
 MATERIAL = bk.Material(2.0, 0.25)
 

@@ -12,7 +12,7 @@ from bemkit.contact.conditions import separated, stick
 from bemkit.geometry import BoundaryMesh, Selection
 from bemkit.geometry.neighbours import corner_nodes
 from bemkit.geometry.spaces import LinearSpace, QuadraticSpace, dof_points
-from bemkit.operators.linear.dense import SingularMatrixError
+from bemkit.operators.linear_solvers import SingularMatrixError
 from bemkit.operators.steklov_poincare.collocation import CollocationElasticity
 from bemkit.operators.steklov_poincare.galerkin import GalerkinElasticity
 from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions, Support, integrate_traction

@@ -22,7 +22,7 @@ from bemkit.geometry import (
 )
 from bemkit.geometry.neighbours import corner_nodes
 from bemkit.geometry.spaces import LinearSpace, QuadraticSpace, dof_points
-from bemkit.operators.linear.solvers import Automatic
+from bemkit.operators.linear_solvers import Automatic
 from bemkit.operators.material import Material, Plane
 from bemkit.operators.rigid_modes import rigid_motions
 from bemkit.operators.steklov_poincare import SteklovPoincare

@@ -112,13 +112,13 @@ LEFT_OUT = {
     "constant": (
         "operators.forms.HypersingularForm.terms",
         "operators.forms.DoubleLayerForm.terms",
-        "operators.linear.dense.Cholesky.__init__",
+        "operators.linear_solvers.Cholesky.__init__",
         "operators.integrals.inner.far_inner",
         "operators.integrals.curved_geometry.fit",
     ),
     "linear": (
         "operators.steklov_poincare.collocation.MixedSystem._sweep",
-        "operators.linear.dense.DenseLU.__init__",
+        "operators.linear_solvers.DenseLU.__init__",
         "operators.integrals.inner.far_inner",
         "operators.integrals.curved_geometry.fit",
     ),

@@ -13,7 +13,7 @@ import pytest
 
 import bemkit as bk
 from bemkit.model.prepared import prepare
-from bemkit.operators.linear.solvers import ChosenLinearSolver, DenseCholesky
+from bemkit.operators.linear_solvers import ChosenLinearSolver, DenseCholesky
 from bemkit.operators.steklov_poincare.galerkin import GalerkinElasticity
 from bemkit.plan import check_elements
 from bemkit.results.solved_steps import with_times

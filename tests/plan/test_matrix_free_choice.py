@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 import bemkit as bk
-from bemkit.operators.linear.solvers import choose_linear_solver
+from bemkit.operators.linear_solvers import choose_linear_solver
 from bemkit.operators.steklov_poincare.galerkin import GalerkinElasticity
 from tests.contact.test_hierarchical_body import loose_block
 from tests.plan.test_hierarchical_choice import chosen, scene_of

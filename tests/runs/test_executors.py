@@ -18,7 +18,7 @@ import bemkit as bk
 from bemkit.model.model import build_model
 from bemkit.model.prepared import prepare
 from bemkit.model.shapes import NotSentError
-from bemkit.operators.linear.dense import SingularMatrixError
+from bemkit.operators.linear_solvers import SingularMatrixError
 from bemkit.operators.steklov_poincare.galerkin import GalerkinElasticity
 from bemkit.results.solution import Solution
 

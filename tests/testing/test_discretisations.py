@@ -14,8 +14,7 @@ import bemkit as bk
 from bemkit.arrays import FloatArray
 from bemkit.cli.main import main
 from bemkit.geometry.spaces import BoundarySpace, ConstantSpace, LinearSpace, QuadraticSpace
-from bemkit.operators.linear.solvers import LinearSolver
-from bemkit.operators.pair_form import Tag
+from bemkit.operators.linear_solvers import LinearSolver, Tag
 from bemkit.operators.steklov_poincare import CondensedMap
 from bemkit.operators.steklov_poincare.collocation import CollocationElasticity
 from bemkit.operators.steklov_poincare.cost import BodyCase, BodyCost

@@ -10,7 +10,7 @@ import pytest
 
 from bemkit.arrays import FloatArray
 from bemkit.operators.counts import Factorisation
-from bemkit.operators.linear.solvers import (
+from bemkit.operators.linear_solvers import (
     Automatic,
     DenseCholesky,
     Hierarchical,

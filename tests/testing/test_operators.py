@@ -29,8 +29,8 @@ from bemkit.operators.boundary import (
     single_layer,
 )
 from bemkit.operators.forms import DoubleLayerForm, SingleLayerForm
+from bemkit.operators.linear_solvers import Tag
 from bemkit.operators.material import Material, Plane
-from bemkit.operators.pair_form import Tag
 from bemkit.testing import CheckFailed, check_double_layer, check_operator
 from tests.slow import slow_only
 from tests.testing.test_spaces import public_classes

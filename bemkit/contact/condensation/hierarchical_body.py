@@ -16,7 +16,7 @@ from bemkit.contact.equilibrium import NOISE_FACTOR, Imbalance, resultant_imbala
 from bemkit.geometry.spaces import dof_points
 from bemkit.operators.counts import OperationCounts
 from bemkit.operators.hierarchy.system import NodeConditions
-from bemkit.operators.linear.dense import SingularMatrixError
+from bemkit.operators.linear_solvers import SingularMatrixError
 from bemkit.operators.rigid_modes import admissible_modes, without_motion
 from bemkit.operators.steklov_poincare.forces_inside import ForcesInside
 from bemkit.operators.steklov_poincare.hierarchical import HierarchicalCollocation, LoadedSystem

@@ -13,7 +13,7 @@ from bemkit.contact.half_plane.surface_body import SurfaceBody
 from bemkit.contact.reduced_conditions import ReducedConditions, as_pairs
 from bemkit.operators.half_plane.large import LargeHalfPlane
 from bemkit.operators.hierarchy.system import LocalConditions, NodeConditions
-from bemkit.operators.linear.dense import SingularMatrixError
+from bemkit.operators.linear_solvers import SingularMatrixError
 
 _SAMPLED = 24
 """Number of elements in contact whose equations the certificate evaluates without compression."""

@@ -11,7 +11,7 @@ from bemkit.contact.body import SingularResponse
 from bemkit.contact.half_plane.surface_body import SurfaceBody
 from bemkit.contact.reduced_conditions import ReducedConditions
 from bemkit.operators.half_plane.elasticity import HalfPlaneElasticity
-from bemkit.operators.linear.dense import DenseLU, SingularMatrixError
+from bemkit.operators.linear_solvers import DenseLU, SingularMatrixError
 
 
 @dataclass(frozen=True, eq=False)

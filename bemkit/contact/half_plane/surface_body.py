@@ -24,7 +24,7 @@ from bemkit.contact.reduced_conditions import ReducedConditions, as_complex, as_
 from bemkit.geometry.spaces import dof_points
 from bemkit.operators.counts import OperationCounts
 from bemkit.operators.half_plane.surface import SurfaceElasticity
-from bemkit.operators.linear.dense import SingularMatrixError
+from bemkit.operators.linear_solvers import SingularMatrixError
 from bemkit.operators.steklov_poincare.forces_inside import ForcesInside
 from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions
 

@@ -14,7 +14,7 @@ from bemkit.contact.body import ContactState
 from bemkit.contact.condensation.held_friction import HeldFriction
 from bemkit.contact.joined.member import Member, Shape, blocks_of_members, deformation, shapes_of
 from bemkit.errors import InputError
-from bemkit.operators.linear.null_space import null_space
+from bemkit.operators.null_space import null_space
 
 _ROUNDS = 2
 """Number of fits of rigid motions: normal equations hold half of the digits, too few for stiff bodies."""

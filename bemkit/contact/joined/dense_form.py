@@ -12,7 +12,7 @@ from bemkit.arrays import FloatArray
 from bemkit.contact.condensation.dense_body import DenseBody, FollowingTangents
 from bemkit.contact.joined.coupled_members import CoupledMembers
 from bemkit.contact.joined.member import Member
-from bemkit.operators.linear.dense import DenseLU
+from bemkit.operators.linear_solvers import DenseLU
 
 _TIED = "the bodies tied to each other at all contact nodes (remove a tie that follows from the others)"
 

@@ -20,7 +20,7 @@ from bemkit.contact.conditions import LinearConditions
 from bemkit.contact.joined.coupled_members import CoupledMembers
 from bemkit.contact.joined.member import blocks_of_members
 from bemkit.errors import printable
-from bemkit.operators.linear.dense import SingularMatrixError
+from bemkit.operators.linear_solvers import SingularMatrixError
 
 _MISSING = "SuperLU (pip install 'bemkit[pardiso]' brings PARDISO, which is faster)"
 _OPTIONS = {1: 1, 2: 2, 8: 0, 10: 13, 11: 0, 13: 0}

@@ -18,8 +18,8 @@ from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.spaces import ConstantSpace, dof_points
 from bemkit.operators.counts import Factorisation, FactorKind, OperationCounts
 from bemkit.operators.half_plane.far_motion import FarMotion
+from bemkit.operators.linear_solvers import Tag
 from bemkit.operators.material import Material
-from bemkit.operators.pair_form import Tag
 from bemkit.operators.steklov_poincare.cost import BodyCase, BodyCost
 from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions
 from bemkit.operators.steklov_poincare.protocol import BoundaryMap, CondensedMap

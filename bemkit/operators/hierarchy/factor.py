@@ -25,8 +25,8 @@ from bemkit.operators.hierarchy.merge import ClusterResponse, merge_siblings
 from bemkit.operators.hierarchy.skeletons import Compression, LevelView, Skeleton
 from bemkit.operators.hierarchy.system import LocalConditions
 from bemkit.operators.hierarchy.tree import ClusterTree
-from bemkit.operators.linear.dense import SingularMatrixError, SmallLU
-from bemkit.operators.linear.threads import for_each_chunk
+from bemkit.operators.linear_solvers import SingularMatrixError, SmallLU
+from bemkit.operators.threads import for_each_chunk
 
 
 class SingularClusterError(SingularMatrixError):

@@ -9,7 +9,7 @@ import numpy as np
 
 from bemkit.arrays import FloatArray
 from bemkit.operators.hierarchy.skeletons import Skeleton
-from bemkit.operators.linear.dense import SingularMatrixError, SmallLU
+from bemkit.operators.linear_solvers import SingularMatrixError, SmallLU
 
 
 @dataclass(eq=False)

@@ -12,7 +12,7 @@ import numpy as np
 from bemkit.arrays import BoolArray, FloatArray, IntArray
 from bemkit.operators.boundary_equations import BoundaryEquations
 from bemkit.operators.hierarchy.tree import ClusterTree
-from bemkit.operators.linear.dense import SingularMatrixError
+from bemkit.operators.linear_solvers import SingularMatrixError
 
 _PREFERRED = 0.1
 """One quantity of each direction is eliminated unless the determinant of another pair is ten times larger."""

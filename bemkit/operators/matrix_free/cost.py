@@ -6,7 +6,7 @@ Times and memory are those of a square with 1e4 to 1e5 elements, measured by `be
 from __future__ import annotations
 
 from bemkit.operators.collocation import compiled
-from bemkit.operators.linear.solvers import MatrixFree
+from bemkit.operators.linear_solvers import MatrixFree
 from bemkit.operators.steklov_poincare.cost import NO_HYPERSINGULAR, BodyCase, BodyCost, PlanItem, slopes_item
 
 _FEWEST_ELEMENTS = 200

@@ -12,7 +12,7 @@ from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.operators.collocation.equations import CollocationEquations, collocation_border
 from bemkit.operators.hierarchy.system import LocalConditions
 from bemkit.operators.hierarchy.tree import ClusterTree
-from bemkit.operators.linear.solvers import MatrixFree
+from bemkit.operators.linear_solvers import MatrixFree
 from bemkit.operators.material import Material
 from bemkit.operators.matrix_free.fast_multipole import LEAF_SIZE, FastMultipole
 from bemkit.operators.matrix_free.preconditioner import Preconditioner

@@ -16,7 +16,7 @@ from bemkit.arrays import BoolArray, FloatArray
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.operators.collocation.equations import CollocationEquations, collocation_border
 from bemkit.operators.hierarchy.system import LocalConditions
-from bemkit.operators.linear.dense import DenseLU
+from bemkit.operators.linear_solvers import DenseLU
 from bemkit.operators.material import Material
 from bemkit.operators.matrix_free.coarse_equations import ElementGroups
 from bemkit.operators.matrix_free.traction_hierarchy import TractionHierarchy

@@ -28,7 +28,6 @@ from bemkit.geometry.spaces import BoundarySpace, local_coefficients
 from bemkit.operators.element_geometry import ElementGeometry
 from bemkit.operators.hierarchy.tree import Pairs
 from bemkit.operators.kernels import legendre_of_monomials, legendre_values
-from bemkit.operators.linear.threads import for_each_chunk
 from bemkit.operators.material import Material
 from bemkit.operators.somigliana.far_fields import FarFields
 from bemkit.operators.somigliana.locate import Location, Locator, PointNotInsideError
@@ -40,6 +39,7 @@ from bemkit.operators.somigliana.moments import (
     straight_gradient_moments,
 )
 from bemkit.operators.somigliana.potentials import Background, PotentialFields, as_points
+from bemkit.operators.threads import for_each_chunk
 
 CHUNK_PAIRS = 8192
 """Pairs of points and near elements that are integrated at a time."""

@@ -12,13 +12,12 @@ from bemkit.geometry.spaces import BoundarySpace, ConstantSpace
 from bemkit.operators.collocation.equations import collocation_equations, displacement_rows
 from bemkit.operators.collocation.layers import straight_layer
 from bemkit.operators.counts import Entries, OperationCounts
-from bemkit.operators.linear.dense import DenseLU, SingularMatrixError
-from bemkit.operators.linear.threads import for_each_chunk
+from bemkit.operators.linear_solvers import DenseLU, SingularMatrixError, Tag
 from bemkit.operators.material import Material
-from bemkit.operators.pair_form import Tag
 from bemkit.operators.steklov_poincare.cost import CHUNK_PAIRS, BodyCase, BodyCost, collocation_cost
 from bemkit.operators.steklov_poincare.nodal_conditions import GivenData, NodalConditions, turn_columns
 from bemkit.operators.steklov_poincare.protocol import BoundaryMap, CondensedMap
+from bemkit.operators.threads import for_each_chunk
 from bemkit.stopwatch import assembling
 
 

@@ -14,11 +14,11 @@ import numpy as np
 
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.operators.counts import Entries, Factorisation, FactorKind, OperationCounts
-from bemkit.operators.linear.solvers import ChosenLinearSolver, DenseCholesky
-from bemkit.operators.linear.threads import n_threads
+from bemkit.operators.linear_solvers import ChosenLinearSolver, DenseCholesky
 from bemkit.operators.material import Material
 from bemkit.operators.rigid_modes import admissible_modes
 from bemkit.operators.steklov_poincare.nodal_conditions import SLIDES, GivenData, NodalConditions
+from bemkit.operators.threads import n_threads
 
 _BYTES = 8
 CONTACT_STEPS = 8

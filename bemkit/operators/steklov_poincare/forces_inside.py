@@ -17,8 +17,8 @@ from bemkit.arrays import FloatArray, IntArray, blended
 from bemkit.geometry.local_values import values_on_elements
 from bemkit.geometry.quadrature import gauss_legendre
 from bemkit.geometry.spaces import BoundarySpace, dof_points
+from bemkit.operators.linear_solvers import Tag
 from bemkit.operators.material import Material
-from bemkit.operators.pair_form import Tag
 from bemkit.operators.rigid_modes import without_motion
 from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions, integrate_traction
 from bemkit.operators.steklov_poincare.protocol import CondensedMap, SteklovPoincare

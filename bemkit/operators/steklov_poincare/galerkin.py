@@ -18,17 +18,18 @@ from bemkit.geometry.spaces import BoundarySpace, ConstantSpace, LinearSpace, do
 from bemkit.geometry.vectors import turned_right
 from bemkit.operators.counts import OperationCounts
 from bemkit.operators.forms import mass_matrix
-from bemkit.operators.linear.dense import Cholesky, multiply
-from bemkit.operators.linear.solvers import (
+from bemkit.operators.linear_solvers import (
     Automatic,
+    Cholesky,
     DenseCholesky,
     Hierarchical,
     LinearSolver,
     LinearSolverChoice,
     MatrixFree,
+    Tag,
+    multiply,
 )
 from bemkit.operators.material import Material
-from bemkit.operators.pair_form import Tag
 from bemkit.operators.rigid_modes import traction_free_modes
 from bemkit.operators.steklov_poincare.cost import BodyCase, BodyCost, galerkin_cost
 from bemkit.operators.steklov_poincare.layer_operators import assemble_layers, dilatation_of
@@ -110,7 +111,7 @@ class GalerkinElasticity(BoundaryMap):
         if isinstance(linear_solver, Automatic | Hierarchical | MatrixFree):
             raise InputError(
                 f"linear_solver is {linear_solver}: give DenseCholesky(), or the result of "
-                "bemkit.operators.linear.solvers.choose_linear_solver"
+                "bemkit.operators.linear_solvers.choose_linear_solver"
             )
         self.linear_solver: LinearSolver = linear_solver
 

@@ -12,8 +12,7 @@ from bemkit.operators.collocation.equations import collocation_equations
 from bemkit.operators.hierarchy.factor import Factor
 from bemkit.operators.hierarchy.system import BodyFactor, HierarchicalSystem, LocalConditions, NodeConditions
 from bemkit.operators.hierarchy.tree import ClusterTree
-from bemkit.operators.linear.dense import SingularMatrixError
-from bemkit.operators.linear.solvers import Hierarchical, MatrixFree
+from bemkit.operators.linear_solvers import Hierarchical, MatrixFree, SingularMatrixError
 from bemkit.operators.material import Material
 from bemkit.operators.steklov_poincare.collocation import CollocationElasticity
 from bemkit.operators.steklov_poincare.cost import BodyCase, BodyCost

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from bemkit.operators.linear.solvers import (
+from bemkit.operators.linear_solvers import (
     ChosenLinearSolver,
     DenseCholesky,
     Hierarchical,

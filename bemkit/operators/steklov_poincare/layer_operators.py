@@ -17,7 +17,7 @@ from bemkit.operators.forms import (
     SingleLayerForm,
     mass_matrix,
 )
-from bemkit.operators.linear.dense import Cholesky, multiply, subtract_product
+from bemkit.operators.linear_solvers import Cholesky, multiply, subtract_product
 from bemkit.operators.material import Material
 from bemkit.operators.rigid_modes import traction_free_modes
 

@@ -11,8 +11,8 @@ import numpy as np
 from bemkit.arrays import FloatArray, IntArray
 from bemkit.geometry.spaces import BoundarySpace
 from bemkit.operators.counts import OperationCounts
+from bemkit.operators.linear_solvers import Tag
 from bemkit.operators.material import Material
-from bemkit.operators.pair_form import Tag
 from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions
 
 if TYPE_CHECKING:

@@ -11,8 +11,8 @@ from bemkit.arrays import FloatArray, IntArray
 from bemkit.errors import InputError
 from bemkit.geometry.spaces import BoundarySpace, dof_points
 from bemkit.operators.counts import OperationCounts
+from bemkit.operators.linear_solvers import Tag
 from bemkit.operators.material import Material
-from bemkit.operators.pair_form import Tag
 from bemkit.operators.rigid_modes import rigid_motions
 from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions
 from bemkit.operators.steklov_poincare.protocol import BoundaryMap, CondensedMap, SteklovPoincare

@@ -8,8 +8,7 @@ import numpy as np
 
 from bemkit.arrays import FloatArray, IntArray, block_of
 from bemkit.operators.counts import OperationCounts
-from bemkit.operators.linear.dense import multiply
-from bemkit.operators.linear.solvers import Factor, LinearSolver
+from bemkit.operators.linear_solvers import Factor, LinearSolver, multiply
 from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions, rotated
 from bemkit.operators.steklov_poincare.protocol import CondensedMap
 from bemkit.operators.steklov_poincare.volume_constraint import Volume, VolumeConstraint, without_round_off

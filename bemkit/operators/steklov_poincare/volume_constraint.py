@@ -8,8 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from bemkit.arrays import FloatArray
-from bemkit.operators.linear.dense import SingularMatrixError
-from bemkit.operators.linear.solvers import Factor
+from bemkit.operators.linear_solvers import Factor, SingularMatrixError
 from bemkit.operators.steklov_poincare.nodal_conditions import SLIDES, NodalConditions, turn_columns
 
 

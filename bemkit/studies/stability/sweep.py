@@ -12,7 +12,7 @@ import numpy as np
 from bemkit.errors import BemkitError, InputError
 from bemkit.model.model import build_model
 from bemkit.model.prepared import prepare
-from bemkit.operators.linear.threads import blas_threads_for
+from bemkit.operators.threads import blas_threads_for
 from bemkit.results.solution import Solution
 from bemkit.runs.run import run
 from bemkit.scene.scene import Scene

@@ -6,7 +6,7 @@ from typing import cast
 
 import numpy as np
 
-from bemkit.operators.pair_form import Tag
+from bemkit.operators.linear_solvers import Tag
 from bemkit.results.solution import Solution
 
 LOST = 1e-6

@@ -14,7 +14,7 @@ from bemkit.contact.joined.member import Member
 from bemkit.contact.laws import Coulomb
 from bemkit.contact.problem import ContactProblem, SingularResponse
 from bemkit.errors import InputError
-from bemkit.operators.linear.dense import SingularMatrixError
+from bemkit.operators.linear_solvers import SingularMatrixError
 from bemkit.solvers.alm import AugmentedLagrangian
 from bemkit.solvers.base import solve
 from bemkit.solvers.fixed_point import FixedPoint

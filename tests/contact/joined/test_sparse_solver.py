@@ -7,7 +7,7 @@ from scipy import sparse
 
 from bemkit.contact.joined import sparse_form
 from bemkit.contact.joined.sparse_form import factored, sparse_solver_name
-from bemkit.operators.linear.dense import SingularMatrixError
+from bemkit.operators.linear_solvers import SingularMatrixError
 
 MATRIX = sparse.csr_array(np.array([[2.0, 1.0, 0.0], [0.0, 4.0, -1.0], [1.0, 0.0, -1e-8]]))
 """With a diagonal as small as the penalty of motions."""

@@ -15,7 +15,7 @@ from bemkit.contact.mortar.sides import ContactSide
 from bemkit.geometry.curves import Arc, Curve, Segment
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.spaces import BoundarySpace, ConstantSpace, LagrangeSpace, dof_points
-from bemkit.operators.linear.solvers import DenseCholesky
+from bemkit.operators.linear_solvers import DenseCholesky
 from bemkit.operators.material import Material
 from bemkit.operators.rigid_modes import rigid_motions
 from bemkit.operators.steklov_poincare import CondensedMap

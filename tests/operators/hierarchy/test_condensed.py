@@ -13,7 +13,7 @@ from bemkit.contact.condensation.direct_body import DirectBody
 from bemkit.model.model import build_model
 from bemkit.model.prepared import Prepared, prepare
 from bemkit.operators.hierarchy.system import HierarchicalSystem
-from bemkit.operators.linear.solvers import DenseCholesky, Hierarchical
+from bemkit.operators.linear_solvers import DenseCholesky, Hierarchical
 from bemkit.operators.steklov_poincare.collocation import CollocationElasticity
 from bemkit.operators.steklov_poincare.hierarchical import HierarchicalCollocation, InexactEquationsError
 from tests.scenes import paper

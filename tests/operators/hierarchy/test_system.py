@@ -13,7 +13,7 @@ from bemkit.operators.collocation.equations import collocation_equations
 from bemkit.operators.hierarchy.factor import Factor, SingularClusterError
 from bemkit.operators.hierarchy.system import HierarchicalSystem, LocalConditions, NodeConditions, UndeterminedError
 from bemkit.operators.hierarchy.tree import ClusterTree
-from bemkit.operators.linear.dense import SingularMatrixError
+from bemkit.operators.linear_solvers import SingularMatrixError
 from bemkit.operators.material import Material
 from bemkit.operators.steklov_poincare.collocation import MixedSystem
 from bemkit.operators.steklov_poincare.hierarchical import LEAF_SIZE

@@ -14,8 +14,7 @@ from bemkit.model.prepared import prepare
 from bemkit.operators.collocation.equations import CollocationEquations, collocation_equations
 from bemkit.operators.collocation.layers import Constants
 from bemkit.operators.hierarchy.system import HierarchicalSystem, NodeConditions
-from bemkit.operators.linear.dense import SingularMatrixError
-from bemkit.operators.linear.solvers import MatrixFree
+from bemkit.operators.linear_solvers import MatrixFree, SingularMatrixError
 from bemkit.operators.material import Material
 from bemkit.operators.matrix_free.coarse_equations import ElementGroups
 from bemkit.operators.matrix_free.factor import IterativeFactor, NotConvergedError

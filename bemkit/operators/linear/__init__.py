@@ -1,1 +1,0 @@
-"""Dense and iterative linear algebra: factorisations that name singularity, GMRES, threads."""
