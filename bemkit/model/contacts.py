@@ -18,7 +18,8 @@ from bemkit.geometry.spaces import dof_points
 from bemkit.model.contact_data import ContactData, FacingPart, find_contact
 from bemkit.model.placed import PlacedBody, groups
 from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions
-from bemkit.scene.conditions import Contact, name_at_obstacle
+from bemkit.scene.body_scene import BodyScene
+from bemkit.scene.conditions import name_at_obstacle
 from bemkit.scene.scene import Scene
 
 if TYPE_CHECKING:
@@ -141,11 +142,9 @@ class ContactInterface:
         return is_alike and np.allclose(self.frame, other.frame, rtol=0.0, atol=_SAME_DIRECTION)
 
 
-def may_overlap(scene: Scene, bodies: Sequence[PlacedBody]) -> bool:
+def may_overlap(scene: Scene, bodies: Sequence[BodyScene]) -> bool:
     """Whether there are other bodies, or obstacles of finite size, that a body may overlap beside its contacts."""
-    conditions = [part.condition for body in bodies for part in body.scene.parts]
-    obstacles = [condition.obstacle for condition in conditions if isinstance(condition, Contact)]
-    is_finite = any(not isinstance(obstacle, RigidHalfPlane) for obstacle in obstacles)
+    is_finite = any(not isinstance(obstacle, RigidHalfPlane) for body in bodies for obstacle in body.obstacles)
     return len(bodies) > 1 or bool(scene.rigid) or is_finite
 
 

@@ -7,12 +7,12 @@ from collections.abc import Sequence
 import numpy as np
 
 from bemkit.arrays import FloatArray
-from bemkit.contact.obstacle import RigidCircle
+from bemkit.contact.obstacle import Obstacle, RigidCircle
 from bemkit.contact.polygon import RigidPolygon
 from bemkit.geometry.overlap import ROUND_OFF, Polyline, deepest_overlap, near_pairs
 from bemkit.model.contacts import OverlapError
 from bemkit.model.placed import PlacedBody
-from bemkit.scene.conditions import Contact
+from bemkit.scene.body_scene import BodyScene
 from bemkit.scene.scene import Scene
 
 
@@ -37,27 +37,22 @@ def check_apart(scene: Scene, bodies: Sequence[PlacedBody]) -> None:
         if depth > 0.0:
             raise _overlap(names, depth, place)
     for rigid in scene.rigid:
-        if isinstance(rigid.obstacle, RigidCircle | RigidPolygon):
+        if is_finite(rigid.obstacle):
             for body, outline in zip(finite, outlines, strict=True):
                 points = outline.points.reshape(-1, 2)
                 gap = rigid.obstacle.gap(points, points)
                 k, names = int(gap.argmin()), (body.name, rigid.name)
                 if -gap[k] > ROUND_OFF * body.mesh.diameter + _interference(scene, names):
                     raise _overlap(names, -float(gap[k]), points[k])
-
     for body, outline in zip(finite, outlines, strict=True):
         _check_obstacles(body, outline)
 
 
 def _check_obstacles(body: PlacedBody, outline: Polyline) -> None:
     """Check that fixed obstacles of finite size overlap a body nowhere deeper than on the parts that touch them."""
-    obstacles = {part.name: part.condition.obstacle for part in body.scene.parts if isinstance(part.condition, Contact)}
-    for name, obstacle in obstacles.items():
-        if not isinstance(obstacle, RigidCircle | RigidPolygon):
-            continue
-        points = outline.points.reshape(-1, 2)
+    points = outline.points.reshape(-1, 2)
+    for obstacle, parts in finite_obstacles(body.scene):
         gap = obstacle.gap(points, points)
-        parts = [part for part, other in obstacles.items() if other == obstacle]
         touches = np.isin(outline.elements, np.concatenate([body.mesh.part(part) for part in parts]))
         touches = np.repeat(touches, outline.points.shape[1])
         beside = np.where(touches, np.inf, gap)
@@ -65,9 +60,27 @@ def _check_obstacles(body: PlacedBody, outline: Polyline) -> None:
         if depth > stated + ROUND_OFF * body.mesh.diameter:
             x, y = points[int(beside.argmin())]
             raise OverlapError(
-                f"the obstacle of part {name!r} overlaps the body by {depth:.4g} beside this part, at ({x:.6g}, "
+                f"the obstacle of part {parts[0]!r} overlaps the body by {depth:.4g} beside this part, at ({x:.6g}, "
                 f"{y:.6g}): move it away, or let the part include all that may touch it"
             )
+
+
+def is_finite(obstacle: Obstacle) -> bool:
+    """Whether an obstacle is of finite size, and its distance is known on all sides of it."""
+    return isinstance(obstacle, RigidCircle | RigidPolygon)
+
+
+def finite_obstacles(scene: BodyScene) -> list[tuple[Obstacle, list[str]]]:
+    """Return the different fixed obstacles of finite size of a body, each with the parts that may touch it."""
+    found: list[tuple[Obstacle, list[str]]] = []
+    for part, obstacle in zip(scene.contact_parts, scene.obstacles, strict=True):
+        if is_finite(obstacle):
+            parts = next((known for other, known in found if other == obstacle), None)
+            if parts is None:
+                found.append((obstacle, [part.name]))
+            else:
+                parts.append(part.name)
+    return found
 
 
 def _interference(scene: Scene, names: tuple[str, str]) -> float:

@@ -336,7 +336,7 @@ def prepare_steps(scenes: Sequence[Scene], meshes: Meshes = None) -> tuple[Prepa
         check_step(steps[0], step)
     first = _prepared(steps[0], bodies, find_units(steps, bodies))
     first = replace(first, unresolved=tuple(pair.name for pair, is_resolved in found if not is_resolved))
-    if may_overlap(scenes[0], bodies):
+    if may_overlap(scenes[0], [body.scene for body in bodies]):
         from bemkit.model.overlaps import check_apart
 
         check_apart(scenes[0], bodies)

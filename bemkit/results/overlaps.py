@@ -1,14 +1,16 @@
-"""Warnings of bodies that overlap in their displaced positions, beside the contacts between them."""
+"""Warnings of bodies and obstacles that overlap in their displaced positions, beside the contacts between them."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bemkit.arrays import BoolArray
+from bemkit.arrays import BoolArray, FloatArray
+from bemkit.contact.obstacle import Obstacle
 from bemkit.geometry.overlap import ROUND_OFF, Polyline, deepest_overlap, near_pairs
+from bemkit.model.overlaps import finite_obstacles, is_finite
 from bemkit.result_warning import ResultWarning
 from bemkit.results.between_nodes import Interpolation
 from bemkit.results.solved_body import SolvedBody
@@ -23,30 +25,83 @@ both bodies."""
 
 
 def overlap_warnings(solution: Solution) -> Iterator[ResultWarning]:
-    """Warn of two bodies that overlap beside the contacts stated between them.
+    """Warn of two bodies, or of a body and an obstacle of finite size, that overlap beside the contacts between them.
 
-    Points of sides in contact are measured by `BetweenNodes`, others here: at the displaced points of both boundaries.
+    Points of sides in contact are measured by `BetweenNodes`, others here: at the displaced points of the boundaries.
     """
     bodies = {name: body for name, body in solution.bodies.items() if body.mesh.surface is None}
-    names, outlines = list(bodies), [_displaced(body) for body in bodies.values()]
-    for k, m in near_pairs(outlines):
+    outlines = {name: _displaced(body) for name, body in bodies.items()}
+    yield from _of_bodies(solution, outlines)
+    for name, outline in outlines.items():
+        yield from _of_fixed_obstacles(solution, name, outline)
+        yield from _of_rigid_bodies(solution, name, outline)
+
+
+def _of_bodies(solution: Solution, outlines: dict[str, Polyline]) -> Iterator[ResultWarning]:
+    names, lines = list(outlines), list(outlines.values())
+    for k, m in near_pairs(lines):
         one, two = names[k], names[m]
         beside = [
-            _is_beside(solution, own, other)[outline.elements]
-            for own, other, outline in ((one, two, outlines[k]), (two, one, outlines[m]))
+            _is_beside(solution, own, _parts_in_contact(solution, own, other))[outline.elements]
+            for own, other, outline in ((one, two, lines[k]), (two, one, lines[m]))
         ]
-        moved = max(float(np.abs(bodies[name].boundary.displacement).max()) for name in (one, two))
-        size = min(bodies[name].mesh.diameter for name in (one, two))
-        least = outlines[k].tolerance + outlines[m].tolerance + ROUND_OFF * size + LEAST_OVERLAP * moved
-        depth, (x, y) = deepest_overlap(outlines[k], outlines[m], least, beside)
+        least = lines[k].tolerance + lines[m].tolerance + _least_overlap(solution, (one, two))
+        depth, place = deepest_overlap(lines[k], lines[m], least, beside)
         if depth > 0.0:
+            yield _between(solution, f"Bodies {one!r} and {two!r}", f"{one} / {two}", depth, place)
+
+
+def _of_fixed_obstacles(solution: Solution, name: str, outline: Polyline) -> Iterator[ResultWarning]:
+    for obstacle, parts in finite_obstacles(solution.bodies[name].scene):
+        points = _points_beside(solution, name, parts, outline)
+        depth, place = _deepest(obstacle, points, points)
+        if depth > outline.tolerance + _least_overlap(solution, (name,)):
             yield ResultWarning(
                 "overlap beside contacts",
-                f"{one} / {two}",
-                f"Bodies {one!r} and {two!r} overlap by {amount(depth, 'length', solution.units, 2)} at "
-                f"({x:.4g}, {y:.4g}), beside the contacts between them: state a contact there, or move them apart.",
+                f"{name} {parts[0]}".strip(),
+                f"The obstacle of part {parts[0]!r} overlaps {f'body {name!r}' if name else 'the body'} by "
+                f"{_depth_at(solution, depth, place)}, beside this part: let the part include all that may touch it.",
                 depth,
             )
+
+
+def _of_rigid_bodies(solution: Solution, name: str, outline: Polyline) -> Iterator[ResultWarning]:
+    for rigid in solution.scene.rigid:
+        if not is_finite(rigid.obstacle):
+            continue
+        pairs = (pair for pair in solution.scene.contacts if pair.rigid_body == rigid.name)
+        parts = [part for pair in pairs for body, part in pair.elastic_parts if body == name]
+        points, motion = _points_beside(solution, name, parts, outline), solution.rigid[rigid.name]
+        moved = rigid.motions_at(points) @ np.array([motion.x, motion.y, motion.turn])
+        depth, place = _deepest(rigid.obstacle, points - moved, points)
+        if depth > outline.tolerance + _least_overlap(solution, (name,)):
+            pair = f"Body {name!r} and rigid body {rigid.name!r}"
+            yield _between(solution, pair, f"{name} / {rigid.name}", depth, place)
+
+
+def _between(solution: Solution, pair: str, subject: str, depth: float, place: FloatArray) -> ResultWarning:
+    text = f"{pair} overlap by {_depth_at(solution, depth, place)}, beside the contacts between them: "
+    remedy = "state a contact there, or move them apart."
+    return ResultWarning("overlap beside contacts", subject, text + remedy, depth)
+
+
+def _depth_at(solution: Solution, depth: float, place: FloatArray) -> str:
+    return f"{amount(depth, 'length', solution.units, 2)} at ({place[0]:.4g}, {place[1]:.4g})"
+
+
+def _deepest(obstacle: Obstacle, points: FloatArray, places: FloatArray) -> tuple[float, FloatArray]:
+    """Return the largest depth [m] of points (n, 2) in an obstacle, at most zero outside, and the place (2,) of it."""
+    if not len(points):
+        return 0.0, np.full(2, np.nan)
+    gap = obstacle.gap(points, points)
+    return -float(gap.min()), places[int(gap.argmin())]
+
+
+def _least_overlap(solution: Solution, names: Collection[str]) -> float:
+    """Return the depth [m] that may be round-off or the error of small displacements."""
+    bodies = [solution.bodies[name] for name in names]
+    moved = max(float(np.abs(body.boundary.displacement).max()) for body in bodies)
+    return ROUND_OFF * min(body.mesh.diameter for body in bodies) + LEAST_OVERLAP * moved
 
 
 def _displaced(body: SolvedBody) -> Polyline:
@@ -57,11 +112,21 @@ def _displaced(body: SolvedBody) -> Polyline:
     return Polyline.of(mesh, Interpolation.at(body, elements, at).displacement(body))
 
 
-def _is_beside(solution: Solution, name: str, other: str) -> BoolArray:
-    """Return (n_elements,) bool: the elements of a body that are in no contact with another one."""
+def _points_beside(solution: Solution, name: str, parts: Collection[str], outline: Polyline) -> FloatArray:
+    """Return the points (n, 2) [m] of the polyline of a body beside some parts."""
+    return outline.points[_is_beside(solution, name, parts)[outline.elements]].reshape(-1, 2)
+
+
+def _is_beside(solution: Solution, name: str, parts: Collection[str]) -> BoolArray:
+    """Return (n_elements,) bool: the elements of a body that are in none of some parts."""
     mesh = solution.bodies[name].mesh
     is_beside = np.ones(mesh.n_elements, bool)
-    for sides in solution.contact_sides.values():
-        if {side.body for side in sides} == {name, other}:
-            is_beside[np.concatenate([mesh.part(side.part) for side in sides if side.body == name])] = False
+    for part in parts:
+        is_beside[mesh.part(part)] = False
     return is_beside
+
+
+def _parts_in_contact(solution: Solution, name: str, other: str) -> set[str]:
+    """Return the parts of a body that are in contact with another elastic body."""
+    pairs = (sides for sides in solution.contact_sides.values() if {side.body for side in sides} == {name, other})
+    return {side.part for sides in pairs for side in sides if side.body == name}

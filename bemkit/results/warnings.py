@@ -15,6 +15,7 @@ from bemkit.geometry.local_values import values_on_elements
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.neighbours import break_nodes
 from bemkit.geometry.vectors import norms
+from bemkit.model.contacts import may_overlap
 from bemkit.operators.linear_solvers import Tag
 from bemkit.operators.rigid_modes import without_motion
 from bemkit.result_warning import ResultWarning, first_of_each_kind
@@ -59,7 +60,7 @@ def find_warnings(solution: Solution) -> tuple[ResultWarning, ...]:
     remedy = _remedy(solution.bodies.values())
     laws = solution.laws
     of_all = [_error(solution, remedy)]
-    if len(solution.bodies) > 1:
+    if may_overlap(solution.scene, [body.scene for body in solution.bodies.values()]):
         from bemkit.results.overlaps import overlap_warnings
 
         of_all.append(overlap_warnings(solution))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
 import bemkit as bk
@@ -48,3 +50,53 @@ def test_bodies_that_overlap_beside_contacts_are_warned_of(push: float, in_conta
         assert found[0].subject == "left / right"
         assert found[0].number == pytest.approx(push - 1e-3, rel=1e-6)
         assert "Bodies 'left' and 'right' overlap by 0.002 at (1" in found[0].text
+
+
+def pressed(width: float, depth: float, *, is_rigid: bool) -> bk.Scene:
+    """A block whose top may touch a disc within a width, pressed by a depth; the disc, or the base, moves."""
+    disc = bk.RigidCircle((0.0, 1.0), 1.0)
+    where = bk.Expression(f"abs(x) < {width}")
+    base = bk.Part("base", bk.Clamped() if is_rigid else bk.PrescribedDisplacement(0.0, depth), ("bottom",))
+    top = bk.Part("top", bk.Free() if is_rigid else bk.Contact(disc), ("top",), where)
+    block = bk.Body(name="block", shape=bk.Rectangle(2.0, 1.0, (-1.0, -1.0)), material=STEEL, parts=(base, top))
+    ball = bk.RigidBody(name="ball", obstacle=disc, centre=disc.centre, y=-depth)
+    return bk.Scene(
+        title="pressed",
+        bodies=(block,),
+        rigid=(ball,) if is_rigid else (),
+        contacts=(bk.ContactPair(("block.top", "ball")),) if is_rigid else (),
+        law=bk.Frictionless(),
+        discretisation=bk.Galerkin(1),
+        mesh=bk.MeshOptions(elements=120),
+    )
+
+
+@pytest.mark.parametrize("is_rigid", [True, False])
+@pytest.mark.parametrize(("width", "is_warned"), [(0.1, True), (0.5, False)])
+def test_obstacles_that_overlap_beside_their_contact_are_warned_of(
+    width: float, is_warned: bool, is_rigid: bool
+) -> None:
+    solution = bk.run(pressed(width, 0.05, is_rigid=is_rigid))
+    assert solution.is_converged
+    found = [warning for warning in solution.warnings if warning.kind == "overlap beside contacts"]
+    assert len(found) == is_warned
+    if is_warned:
+        assert 0.005 < found[0].number < 0.05
+        assert found[0].subject == ("block / ball" if is_rigid else "block top")
+        words = (
+            "Body 'block' and rigid body 'ball' overlap by" if is_rigid else "The obstacle of part 'top' overlaps body"
+        )
+        assert words in found[0].text
+
+
+def test_obstacles_of_several_parts_are_measured_once() -> None:
+    scene = pressed(0.1, 0.05, is_rigid=False)
+    (block,) = scene.bodies
+    disc = block.parts[1].condition.obstacle
+    left, right = (
+        bk.Part(name, bk.Contact(disc), ("top",), bk.Expression(f"abs(x - ({at})) < 0.05"))
+        for name, at in (("left", -0.05), ("right", 0.05))
+    )
+    halves = replace(scene, bodies=(replace(block, parts=(block.parts[0], left, right)),))
+    found = [warning for warning in bk.run(halves).warnings if warning.kind == "overlap beside contacts"]
+    assert [warning.subject for warning in found] == ["block left"]
