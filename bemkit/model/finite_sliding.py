@@ -7,10 +7,13 @@ the wrong place: bodies may then come to rest where there is no equilibrium.
 
 from __future__ import annotations
 
+from typing import TypeGuard
+
 import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray
-from bemkit.contact.obstacle import SIMPLE_OBSTACLES, Obstacle, measure_contact
+from bemkit.contact.condensation.nodes import nodes_on
+from bemkit.contact.obstacle import SIMPLE_OBSTACLES, DirectedObstacle, Obstacle
 from bemkit.geometry.placement import Placement
 from bemkit.geometry.spaces import element_nodes
 from bemkit.geometry.vectors import norms, turned_left
@@ -22,6 +25,8 @@ from bemkit.scene.unit_names import amount
 
 _OFF = 0.2
 """Change of gaps that makes pressures wrong, relative to the displacement by contact forces."""
+_FAR = 5.0
+"""Motion against an oblique contact that makes it wrong, in displacements by contact forces."""
 _LEAST_COSINE = 0.866
 """Cosine of the angle by which a direction of contact may turn: 30 degrees."""
 _LEAST_FACING = 0.5
@@ -31,27 +36,36 @@ _SHARE_OF_ZONE = 0.05
 
 
 def why_off(
-    prepared: Prepared, rows: ContactInterface, displacement: FloatArray, is_pressed: BoolArray, deformation: float
+    prepared: Prepared,
+    rows: ContactInterface,
+    motion: FloatArray,
+    displacement: FloatArray,
+    is_pressed: BoolArray,
+    deformation: float,
 ) -> str:
-    """Describe how far the pressed nodes of a contact move; empty if gaps and directions still hold.
+    """Describe how far the nodes of a contact move; empty if gaps and directions still hold.
 
     Parameters
     ----------
     prepared : Prepared
     rows : ContactInterface
+    motion : (3,) array [m, m, rad]
+        Of the rigid body; zero if the partner is none.
     displacement : (n, 2) array [m]
         Relative, normal and tangential.
     is_pressed : (n,) bool array
     deformation : float [m]
-        The displacement that contact forces cause.
+        The displacement that contact forces cause. A motion along the surface that is shorter, or shorter than the
+        distance of nodes, changes no place that the solution knows.
     """
+    short = max(deformation, float(rows.weights[is_pressed].mean()))
     number = rows.other - len(prepared.bodies)
     if number < 0 <= rows.other:
-        is_off = _is_off_side(rows, displacement[:, 1], is_pressed, deformation)
+        is_off = _is_off_side(rows, displacement[:, 1], is_pressed, short, deformation)
     else:
-        obstacle = _fixed_obstacle(prepared, rows) if number < 0 else prepared.scene.rigid[number].obstacle
-        is_off = _is_off_obstacle(rows, obstacle, displacement, is_pressed, deformation)
-        is_off = is_off or _is_oblique(prepared.bodies[rows.body], rows, is_pressed)
+        is_off = _is_off_obstacle(prepared, rows, motion, displacement, is_pressed, short, _OFF * deformation)
+        if norms(displacement[is_pressed]).max() > _FAR * deformation:
+            is_off = is_off or _is_oblique(prepared.bodies[rows.body], rows, is_pressed)
     if not is_off:
         return ""
     units = prepared.scene.units
@@ -63,66 +77,59 @@ def why_off(
     )
 
 
-def why_moved_off(
+def _is_off_side(
+    rows: ContactInterface, slide: FloatArray, is_pressed: BoolArray, short: float, deformation: float
+) -> bool:
+    """Whether another elastic body has moved (n,) [m] by more than its elements, or to a place with another gap."""
+    if np.abs(slide[is_pressed]).max() > max(short, _SHARE_OF_ZONE * float(rows.weights[is_pressed].sum())):
+        return True
+    # both sides turn by the same angle from their mean normal: half of the change of the gap belongs to the partner
+    order = np.argsort(rows.arc_length)
+    s, gap, far = rows.arc_length[order], rows.gap[order], slide - np.clip(slide, -short, short)
+    changes = [np.interp(rows.arc_length + sign * far, s, gap) - rows.gap for sign in (-1.0, 1.0)]
+    return bool(0.5 * np.abs(changes)[:, is_pressed].max() > _OFF * deformation)
+
+
+def _is_off_obstacle(
     prepared: Prepared,
     rows: ContactInterface,
     motion: FloatArray,
     displacement: FloatArray,
     is_pressed: BoolArray,
-    deformation: float,
-) -> str:
-    """Describe how far a rigid body has moved (3,) from the gaps of its contact; empty if these still hold.
-
-    Polygons are not judged: beside their corners gaps change with any motion.
-    """
-    from bemkit.contact.polygon import RigidPolygon
-
-    body = prepared.scene.rigid[rows.other - len(prepared.bodies)]
-    if not is_in_the_plane(body.obstacle) or isinstance(body.obstacle, RigidPolygon):
-        return ""
-    (x, y, turn), centre = motion, np.array(body.centre)
-    points, frame, relative = rows.points[is_pressed], rows.frame[is_pressed], displacement[is_pressed]
-    gap, _ = measure_contact(body.obstacle, points, frame[:, 0])
-    arm = points + gap[:, None] * frame[:, 0] - centre
-    moved = points + np.einsum("nk,nkc->nc", relative, frame) + [x, y] + turn * turned_left(arm)
-    motion_of_body = Placement((float(x), float(y)), float(np.degrees(turn)))
-    # the rigid body moves back to its place, and takes the points along
-    back = centre + motion_of_body.back(moved - centre)
-    followed, _ = measure_contact(body.obstacle, back, motion_of_body.turned_back(frame[:, 0]))
-    if not (np.abs(followed - (gap - relative[:, 0])) > _OFF * deformation).any():
-        return ""
-    length, beside = (amount(each, "length", prepared.scene.units, 3) for each in (float(np.hypot(x, y)), deformation))
-    return (
-        f"contact {rows.name!r}: the rigid body moves by {length}, and contact forces displace by {beside}: draw it "
-        "where it comes to rest, or move it less"
-    )
-
-
-def _is_off_side(rows: ContactInterface, slide: FloatArray, is_pressed: BoolArray, deformation: float) -> bool:
-    """Whether another elastic body has moved (n,) [m] by more than its elements, or to a place with another gap."""
-    longest = np.abs(slide[is_pressed]).max()
-    zone = rows.weights[is_pressed]
-    if longest > max(float(zone.mean()), _SHARE_OF_ZONE * float(zone.sum())):
-        return True
-    # both sides turn by the same angle from their mean normal: half of the change of the gap belongs to the partner
-    order = np.argsort(rows.arc_length)
-    s, gap = rows.arc_length[order], rows.gap[order]
-    changes = [np.interp(rows.arc_length + sign * slide, s, gap) - rows.gap for sign in (-1.0, 1.0)]
-    return bool(0.5 * np.abs(changes)[:, is_pressed].max() > _OFF * deformation)
-
-
-def _is_off_obstacle(
-    rows: ContactInterface, obstacle: Obstacle, displacement: FloatArray, is_pressed: BoolArray, deformation: float
+    short: float,
+    tolerance: float,
 ) -> bool:
-    """Whether pressed nodes have moved to places where the obstacle has another distance or direction."""
+    """Whether nodes have moved to places where the obstacle has another distance or direction, or is inside."""
+    number = rows.other - len(prepared.bodies)
+    obstacle = _fixed_obstacle(prepared, rows) if number < 0 else prepared.scene.rigid[number].obstacle
     if not is_in_the_plane(obstacle):
         return False
-    points, frame, moved = rows.points[is_pressed], rows.frame[is_pressed], displacement[is_pressed]
-    gap, _ = measure_contact(obstacle, points, frame[:, 0])
-    followed, direction = measure_contact(obstacle, points + np.einsum("nk,nkc->nc", moved, frame), frame[:, 0])
-    off = np.abs(followed - (gap - moved[:, 0]))
-    turned = np.sum(direction * frame[:, 0], axis=1)
-    return bool((off > _OFF * deformation).any() or (turned < _LEAST_COSINE).any())
+    points, normals = rows.points, rows.frame[:, 0]
+    gap = obstacle.gap(points, normals)
+    relative = np.einsum("nk,nkc->nc", displacement, rows.frame)
+    carried, placement, centre = np.zeros_like(points), Placement(), np.zeros(2)
+    if rows.motions is not None:
+        x, y, turn = motion.tolist()
+        carried, placement = rows.motions @ motion, Placement((x, y), float(np.degrees(turn)))
+        centre = np.array(prepared.scene.rigid[number].centre)
+    body = prepared.bodies[rows.body]
+    tangents = np.zeros((body.space.n_dofs // 2, 2))
+    nodes, outward = nodes_on(body.space_in_place, rows.elements)
+    tangents[nodes] = turned_left(outward)
+    tangents = tangents[rows.nodes]
+    along = np.sum(relative * tangents, axis=1)[:, None]
+    turned_normals = placement.turned_back(normals)
+    is_off = np.ones(rows.n_contact, bool)
+    for unknown in (0.0, short):
+        moved = relative - np.clip(along, -unknown, unknown) * tangents
+        # the rigid body moves back to its place, and takes the points along
+        back = centre + placement.back(points + moved + carried - centre)
+        followed, direction = obstacle.gap(back, turned_normals), obstacle.approach(back, turned_normals)
+        expected = gap - np.sum(moved * normals, axis=1)
+        cosine = np.sum(direction * turned_normals, axis=1)
+        is_wrong = (np.abs(followed - expected) > tolerance) | (cosine < _LEAST_COSINE)
+        is_off &= np.where(is_pressed, is_wrong, followed < np.minimum(gap, 0.0) - tolerance)
+    return bool(is_off.any())
 
 
 def _is_oblique(body: PlacedBody, rows: ContactInterface, is_pressed: BoolArray) -> bool:
@@ -143,7 +150,7 @@ def _fixed_obstacle(prepared: Prepared, rows: ContactInterface) -> Obstacle:
     return stated[rows.part].obstacle
 
 
-def is_in_the_plane(obstacle: Obstacle) -> bool:
+def is_in_the_plane(obstacle: Obstacle) -> TypeGuard[DirectedObstacle]:
     """Whether an obstacle has a position in the plane, so that its distance from a point that has moved is known."""
     if isinstance(obstacle, SIMPLE_OBSTACLES):
         return True

@@ -41,8 +41,6 @@ _OF_DIFFERENCES = 4.0
 """Rounding errors in a strain, of the size of the displacements: of these, of the motion, of their difference."""
 _ELIMINATION_TOLERANCE = 64.0 * float(np.finfo(float).eps)
 """Round-off of the condensed stiffness, relative to the sensitivity of the whole body."""
-_BY_DEFORMATION = 5.0
-"""Largest motion along a contact that counts as deformation, in displacements by contact forces."""
 _NO_FORCE = 1e-9
 """Displacement by contact forces that is round-off, relative to the largest one."""
 
@@ -277,16 +275,12 @@ def with_sliding_checked(model: Model, result: ContactSolution) -> ContactSoluti
         if not is_pressed.any():
             continue
         number = rows.other - len(prepared.bodies)
-        reason = ""
-        if norms(displacement[is_pressed]).max() > _BY_DEFORMATION * deformation:
-            from bemkit.model.finite_sliding import why_off
+        if number < 0 and norms(displacement[is_pressed]).max() <= deformation:
+            continue
+        from bemkit.model.finite_sliding import why_off
 
-            reason = why_off(prepared, rows, displacement, is_pressed, deformation)
-        elif number >= 0:
-            from bemkit.model.finite_sliding import why_moved_off
-
-            motion, _ = model.rigid_bodies(result.state)[number]
-            reason = why_moved_off(prepared, rows, motion, displacement, is_pressed, deformation)
+        motion = model.rigid_bodies(result.state)[number][0] if number >= 0 else np.zeros(3)
+        reason = why_off(prepared, rows, motion, displacement, is_pressed, deformation)
         if reason:
             status = Status.FINITE_SLIDING
             return replace(result, status=status, message=f"{status.value} [{reason}]")

@@ -38,7 +38,7 @@ def pressed(obstacle: bk.Obstacle, law: bk.FrictionLaw, **motion: float) -> bk.S
     )
 
 
-def on_block(shape: bk.Shape, sides: tuple[str, ...], held: tuple[str, ...], drag: float) -> bk.Scene:
+def on_block(shape: bk.Shape, sides: tuple[str, ...], held: tuple[str, ...], drag: float, y: float = -1e-3) -> bk.Scene:
     """Return an elastic body that is pressed onto a block and dragged."""
     upper = bk.Body(
         name="upper",
@@ -46,7 +46,7 @@ def on_block(shape: bk.Shape, sides: tuple[str, ...], held: tuple[str, ...], dra
         material=bk.Material(1.0, 0.3),
         parts=(
             bk.Part("foot", bk.Free(), sides),
-            bk.Part("held", bk.PrescribedDisplacement(drag, -1e-3), held),
+            bk.Part("held", bk.PrescribedDisplacement(drag, y), held),
         ),
     )
     contact = bk.ContactPair(("block.top", "upper.foot"), reach=0.3)
@@ -84,9 +84,50 @@ def test_a_rigid_body_moves_by_more_than_its_contact(obstacle: bk.Obstacle) -> N
 
 @pytest.mark.parametrize("x", [0.8, 1.6])
 def test_a_cylinder_that_moves_so_far_that_its_false_gap_deforms_the_block_as_much_is_refused(x: float) -> None:
-    solution = bk.run(pressed(bk.RigidCircle((0.0, 1.0), 1.0), bk.Frictionless(), x=x, y=-1e-3))
-    assert solution.status is bk.Status.FINITE_SLIDING, solution.message
-    assert "the rigid body moves by" in solution.message
+    refused(pressed(bk.RigidCircle((0.0, 1.0), 1.0), bk.Frictionless(), x=x, y=-1e-3))
+
+
+@pytest.mark.parametrize("y", [-1e-2, -5e-2])
+@pytest.mark.parametrize("law", slow_only([bk.Frictionless(), bk.Coulomb(0.3)], bk.Coulomb(0.3)))
+def test_a_punch_is_dragged_so_far_that_its_corners_are_at_other_elements(law: bk.FrictionLaw, y: float) -> None:
+    """Whether it is pressed lightly or so hard that the block gives way by half of the motion."""
+    refused(pressed(square(0.0), law, x=0.2, y=y))
+    assert bk.run(pressed(square(0.0), law, x=0.03, y=y)).is_converged
+
+
+def test_a_side_that_ends_outside_of_the_body_moves_along_itself_without_limit() -> None:
+    """The same long box as a punch, and as a floor below the block."""
+    box = bk.RigidPolygon(((-5.0, 0.0), (5.0, 0.0), (5.0, 1.0), (-5.0, 1.0)))
+    assert bk.run(pressed(box, bk.Coulomb(0.3), x=1.0, y=-0.05)).is_converged
+    assert bk.run(on_floor(-7.0, 2.0)).is_converged
+    assert bk.run(on_floor(-7.0, 0.1)).is_converged
+
+
+def on_floor(begin: float, drag: float) -> bk.Scene:
+    """Return a block that is pressed onto a floor, which begins below or beside it, and moved along."""
+    floor = bk.RigidPolygon(((begin, -3.0), (9.0, -3.0), (9.0, -1.5), (begin, -1.5)))
+    foot = bk.Part("foot", bk.Contact(floor), ("bottom",))
+    top = bk.Part("held", bk.PrescribedDisplacement(drag, -0.05), ("top",))
+    return bk.Scene(
+        title="Block on a floor", shape=BLOCK.shape, material=BLOCK.material, parts=(foot, top),
+        discretisation=bk.Galerkin(2), mesh=bk.MeshOptions(elements=96),
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("drag", [0.5, -0.5])
+def test_a_block_is_moved_so_that_more_or_less_of_it_is_above_the_floor(drag: float) -> None:
+    refused(on_floor(0.0, drag))
+    assert bk.run(on_floor(0.0, 0.1 * drag)).is_converged
+
+
+def test_a_wheel_spins_about_its_centre_without_limit() -> None:
+    wheel = pressed(bk.RigidCircle((0.0, 1.0), 1.0), bk.Coulomb(0.3), y=-1e-3, turn=0.5)
+    centred = replace(wheel.rigid[0], centre=(0.0, 1.0))
+    solution = bk.run(replace(wheel, rigid=(centred,)))
+    assert solution.is_converged, solution.message
+    punch = solution.rigid["punch"]
+    assert abs(punch.force_x) == pytest.approx(-0.3 * punch.force_y, rel=1e-3)  # its direction turns along the zone
+    refused(wheel)
 
 
 def test_a_rigid_plane_moves_along_itself_without_limit_and_drags_by_friction() -> None:
@@ -106,7 +147,9 @@ def test_two_bodies_may_move_by_less_than_an_element(drag: float) -> None:
 
 def test_two_bodies_are_dragged_by_more_than_their_contact() -> None:
     refused(on_block(bk.Disk(1.0, (0.0, 1.0)), ("arc-3", "arc-4"), ("arc-1", "arc-2"), 0.1))
-    refused(on_block(bk.Rectangle(2.0, 1.0, (-1.0, 0.0)), ("bottom",), ("top",), 0.5))
+    foot = bk.Rectangle(2.0, 1.0, (-1.0, 0.0))
+    refused(on_block(foot, ("bottom",), ("top",), 0.5))
+    refused(on_block(foot, ("bottom",), ("top",), 0.15, -0.05))
 
 
 def test_the_rule_does_not_depend_on_units_and_position() -> None:
