@@ -32,7 +32,8 @@ class ArcLength:
     """
 
     def __init__(self, derivative: Callable[[FloatArray], FloatArray]) -> None:
-        nodes, to_series = _interpolation()
+        nodes = chebyshev.chebpts1(_DEGREE)
+        to_series = np.linalg.inv(chebyshev.chebvander(nodes, _DEGREE - 1))
         breaks = np.linspace(0.0, 1.0, 5)
         low, high = breaks[:-1], breaks[1:]
         done: list[tuple[FloatArray, FloatArray, FloatArray]] = []
@@ -82,11 +83,3 @@ class ArcLength:
                 break
         result: FloatArray = self._low[piece] + 0.5 * (x + 1.0) * (self._high - self._low)[piece]
         return result
-
-
-def _interpolation() -> tuple[FloatArray, FloatArray]:
-    """Return the Chebyshev points and the matrix from values there to Chebyshev coefficients."""
-    angles = (np.arange(_DEGREE) + 0.5) * (np.pi / _DEGREE)
-    to_series = np.cos(np.outer(np.arange(_DEGREE), angles)) * (2.0 / _DEGREE)
-    to_series[0] *= 0.5
-    return np.cos(angles), to_series

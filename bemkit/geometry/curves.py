@@ -50,7 +50,7 @@ class Curve(Protocol):
 
         By default its largest coordinate.
         """
-        return largest_coordinate(self)
+        return float(np.abs(self.point(_SAMPLES)).max())
 
     def point(self, s: FloatArray) -> FloatArray:
         """Evaluate the curve.
@@ -84,7 +84,7 @@ class Curve(Protocol):
 
 
 @dataclass(frozen=True)
-class Segment:
+class Segment(Curve):
     """A straight segment.
 
     Parameters
@@ -94,7 +94,6 @@ class Segment:
     """
 
     is_straight: ClassVar[bool] = True
-    is_analytic: ClassVar[bool] = True
 
     start: tuple[float, float]
     end: tuple[float, float]
@@ -114,18 +113,13 @@ class Segment:
         # a coordinate that does not change keeps its last digit, so a side along an axis is straight at any distance
         return np.where(start == end, start, (1.0 - s) * start + s * end)
 
-    @property
-    def magnitude(self) -> float:
-        """Its largest coordinate [m]."""
-        return largest_coordinate(self)
-
     def derivative(self, s: FloatArray) -> FloatArray:
         """Return the constant vector from start to end."""
         return np.tile(np.array(self.end) - np.array(self.start), (len(s), 1))
 
 
 @dataclass(frozen=True)
-class Arc:
+class Arc(Curve):
     """A circular arc.
 
     Parameters
@@ -139,7 +133,6 @@ class Arc:
     """
 
     is_straight: ClassVar[bool] = False
-    is_analytic: ClassVar[bool] = True
 
     centre: tuple[float, float]
     radius: float
@@ -178,7 +171,7 @@ class Arc:
 
 
 @dataclass(frozen=True, eq=False)
-class ParametricCurve:
+class ParametricCurve(Curve):
     """A smooth curve given by two vectorised functions of any parameter.
 
     Parameters
@@ -231,11 +224,6 @@ class ParametricCurve:
                 "give the derivative of function with respect to s"
             )
 
-    @property
-    def magnitude(self) -> float:
-        """Its largest coordinate [m]."""
-        return largest_coordinate(self)
-
     @cached_property
     def _arc_length(self) -> ArcLength:
         from bemkit.geometry.arclength import ArcLength
@@ -260,7 +248,7 @@ class ParametricCurve:
 
 
 @dataclass(frozen=True, eq=False)
-class TransformedCurve:
+class TransformedCurve(Curve):
     """The curve matrix (x - origin) + shift, from start to end or, if reversed, from end to start.
 
     Parameters
@@ -314,11 +302,6 @@ def scaled_curve(
 ) -> TransformedCurve:
     """Return the curve (x - origin) * factors; these differ by a sign only, which reflects the curve."""
     return TransformedCurve(curve, origin, ((factors[0], 0.0), (0.0, factors[1])), is_reversed=is_reversed)
-
-
-def largest_coordinate(curve: Curve) -> float:
-    """Return the largest coordinate [m] of points along a curve."""
-    return float(np.abs(curve.point(_SAMPLES)).max())
 
 
 def reverse_curve(curve: Curve) -> Curve:

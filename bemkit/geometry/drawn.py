@@ -16,7 +16,7 @@ from bemkit.geometry.curves import Arc, Curve, ParametricCurve, Segment, as_poin
 from bemkit.geometry.nurbs import Nurbs, clamped_knots
 from bemkit.geometry.outline import Drawing, Outline, Side
 from bemkit.geometry.shapes import CheckedShape
-from bemkit.geometry.vectors import cross, enclosed_area, norms
+from bemkit.geometry.vectors import circle_centre, cross, enclosed_area, norms
 
 Point = tuple[float, float]
 
@@ -93,18 +93,14 @@ class ArcTo:
         to_middle, to_end = middle - begin, end - begin
         if not to_end.any():
             return _arc(begin + 0.5 * to_middle, begin, 2.0 * np.pi)
-        twice_area = float(cross(to_middle, to_end))
-        if abs(twice_area) <= 1e-12 * float(norms(to_middle) * norms(to_end)):
+        centre = circle_centre(begin, middle, end)
+        if centre is None:
             raise GeometryError(
                 f"arc from {format_point(begin)} through {format_point(middle)} to {format_point(end)} is straight: "
                 "write a line"
             )
-        # the centre of the circle through 0, a and b
-        (ax, ay), (bx, by) = to_middle, to_end
-        a, b = to_middle @ to_middle, to_end @ to_end
-        centre = begin + np.array([a * by - b * ay, b * ax - a * bx]) / (2.0 * twice_area)
         angles = np.arctan2(*np.array([begin - centre, end - centre]).T[::-1])
-        is_anticlockwise = twice_area > 0.0  # the middle lies to the right of the chord
+        is_anticlockwise = cross(to_middle, to_end) > 0.0  # the middle lies to the right of the chord
         sweep = float((angles[1] - angles[0]) % (2.0 * np.pi))
         sweep = sweep if is_anticlockwise else sweep - 2.0 * np.pi
         chord = float(norms(to_end))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,11 +14,9 @@ from bemkit.geometry.curves import Curve
 from bemkit.geometry.pieces import (
     Pieces,
     concatenate,
-    derivative_on,
     evaluate_curves,
     find_meeting,
     point_distances,
-    point_on,
     resolution,
     split_until_flat,
 )
@@ -98,8 +96,8 @@ def swept_areas(pieces: Pieces) -> FloatArray:
         xi, weights = gauss_legendre(_N_AREA_POINTS)
         span = pieces.span[rows]
         s = span[:, :1] * (0.5 - 0.5 * xi) + span[:, 1:] * (0.5 + 0.5 * xi)
-        x = evaluate_curves(pieces.curves, pieces.curve[rows], s, point_on) - middle
-        dx = evaluate_curves(pieces.curves, pieces.curve[rows], s, derivative_on)
+        x = evaluate_curves(pieces.curves, pieces.curve[rows], s) - middle
+        dx = evaluate_curves(pieces.curves, pieces.curve[rows], s, derivative=True)
         areas[rows] = 0.25 * (span[:, 1] - span[:, 0]) * (cross(x, dx) @ weights)
     return areas
 
@@ -250,7 +248,7 @@ def check_curves(
             "give an increasing pair of parameters in [0, 1]"
         )
     ends = nodes[elements]
-    distance = norms(evaluate_curves(curves, element_curve, span, point_on) - ends).max(axis=1)
+    distance = norms(evaluate_curves(curves, element_curve, span) - ends).max(axis=1)
     tolerance = _CURVE_TOLERANCE * norms(ends[:, 1] - ends[:, 0]) + resolution(ends[:, 0], ends[:, 1])
     for element in np.flatnonzero(is_curved & ~(distance <= tolerance)):
         raise GeometryError(
@@ -264,7 +262,7 @@ def _check_speed(curves: tuple[Curve, ...], elements: IntArray, element_curve: I
     """Raise unless the speed |dx/ds| is the same all over each curved element."""
     fractions = np.linspace(0.0, 1.0, _N_SPEEDS)
     s = span[:, :1] * (1.0 - fractions) + span[:, 1:] * fractions
-    speed = norms(evaluate_curves(curves, element_curve, s, derivative_on))
+    speed = norms(evaluate_curves(curves, element_curve, s, derivative=True))
     for k in np.flatnonzero(~(np.ptp(speed, axis=1) <= _SPEED_TOLERANCE * speed.max(axis=1))):
         raise GeometryError(
             f"BoundaryMesh: element {elements[k]} follows curve {element_curve[k]} with speeds |dx/ds| from "
@@ -304,21 +302,28 @@ def check_parts(
 
 def follow_loops(elements: IntArray) -> tuple[IntArray, ...]:
     """Return the elements of each loop in order, starting at its smallest; the nodes must have been checked."""
-    starting_at = np.empty(len(elements), dtype=np.intp)
-    starting_at[elements[:, 0]] = np.arange(len(elements))
-    following = starting_at[elements[:, 1]].tolist()
-    is_seen = [False] * len(elements)
-    loops = []
-    for first in range(len(elements)):
-        loop = []
-        element = first
-        while not is_seen[element]:
-            is_seen[element] = True
-            loop.append(element)
-            element = following[element]
-        if loop:
-            loops.append(np.array(loop, dtype=np.intp))
-    return tuple(loops)
+    return tuple(np.array([element for element, _ in chain], np.intp) for chain in closed_chains(elements))
+
+
+def closed_chains(ends: IntArray) -> Iterator[list[tuple[int, bool]]]:
+    """Yield the closed chains of links whose ends (n, 2) are numbered so that two links share each.
+
+    Each as the numbers of its links in order, and whether the link is followed from its first end to its second.
+    """
+    by_end = (np.argsort(ends.ravel(), kind="stable").reshape(-1, 2) // 2).tolist()
+    pairs, is_seen = ends.tolist(), [False] * len(ends)
+    for first in range(len(pairs)):
+        chain, number, end = [], first, pairs[first][0]
+        while not is_seen[number]:
+            is_seen[number] = True
+            start, stop = pairs[number]
+            is_ahead = start == end
+            chain.append((number, is_ahead))
+            end = stop if is_ahead else start
+            one, other = by_end[end]
+            number = other if one == number else one
+        if chain:
+            yield chain
 
 
 def restrict_loops(loops: tuple[IntArray, ...], elements: IntArray) -> tuple[IntArray, ...]:

@@ -24,7 +24,7 @@ from bemkit.geometry.loops import (
     restrict_loops,
     swept_areas,
 )
-from bemkit.geometry.pieces import OnCurve, Pieces, derivative_on, evaluate_curves, make_pieces, point_on
+from bemkit.geometry.pieces import Pieces, evaluate_curves, make_pieces
 from bemkit.geometry.quadrature import gauss_legendre
 from bemkit.geometry.vectors import norms, turned_right
 
@@ -267,7 +267,7 @@ class BoundaryMesh:
         """
         before, after = 0.5 - 0.5 * xi, 0.5 + 0.5 * xi
         straight = before[..., None] * self.start[elements][:, None] + after[..., None] * self.end[elements][:, None]
-        return self._on_curves(elements, xi, point_on, straight)
+        return self._on_curves(elements, xi, straight)
 
     def derivatives(self, elements: IntArray, xi: FloatArray) -> FloatArray:
         """Differentiate elements: dx/dxi [m], (m, q, 2), for (m,) elements at (q,) or (m, q) local coordinates."""
@@ -275,7 +275,7 @@ class BoundaryMesh:
         straight = np.repeat(half_chord[:, None], xi.shape[-1], axis=1)
         if not self.curves:
             return straight
-        derivative = self._on_curves(elements, xi, derivative_on, straight)
+        derivative = self._on_curves(elements, xi, straight, derivative=True)
         # the chain rule: half the span of the parameter for xi from -1 to 1
         is_curved = ~self.is_straight[elements]
         if is_curved.any():
@@ -377,7 +377,9 @@ class BoundaryMesh:
         points = np.concatenate([self.nodes, self.centres])
         return points.min(axis=0), points.max(axis=0)
 
-    def _on_curves(self, elements: IntArray, xi: FloatArray, evaluate: OnCurve, straight: FloatArray) -> FloatArray:
+    def _on_curves(
+        self, elements: IntArray, xi: FloatArray, straight: FloatArray, *, derivative: bool = False
+    ) -> FloatArray:
         """Replace the values (m, q, 2) of straight elements by those on curves where elements are curved."""
         if not self.curves:
             return straight
@@ -385,7 +387,7 @@ class BoundaryMesh:
         if (curve >= 0).any():
             span = self._span[elements]
             s = span[:, :1] * (0.5 - 0.5 * xi) + span[:, 1:] * (0.5 + 0.5 * xi)
-            straight[curve >= 0] = evaluate_curves(self.curves, curve, s, evaluate)[curve >= 0]
+            straight[curve >= 0] = evaluate_curves(self.curves, curve, s, derivative=derivative)[curve >= 0]
         return straight
 
 

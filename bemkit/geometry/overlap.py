@@ -11,7 +11,7 @@ from scipy.spatial import cKDTree
 
 from bemkit.arrays import BoolArray, FloatArray, IntArray
 from bemkit.geometry.mesh import BoundaryMesh
-from bemkit.geometry.pieces import overlapping_boxes
+from bemkit.geometry.pieces import overlapping_boxes, point_distances
 from bemkit.geometry.vectors import norms
 
 ROUND_OFF = 1e-6
@@ -107,7 +107,7 @@ class Polyline:
             some = rows[k : k + n_rows]
             inside = some[self._holds(points[some]) != self.is_exterior]
             if inside.size:
-                distances = _distances(points[inside, None], *self.pieces).min(axis=1)
+                distances = point_distances(points[inside, None], *self.pieces).min(axis=1)
                 largest = int(np.argmax(distances))
                 if distances[largest] > max(depth, least):
                     depth, deepest = float(distances[largest]), int(inside[largest])
@@ -122,7 +122,7 @@ class Polyline:
         """Return distances (n,) from the pieces that begin and end next to points (n, 2)."""
         start, end = self.pieces
         beside = [tree.query(points)[1] for tree in self._trees]
-        return np.asarray(np.min([_distances(points, start[k], end[k]) for k in beside], axis=0))
+        return np.asarray(np.min([point_distances(points, start[k], end[k]) for k in beside], axis=0))
 
     def _holds(self, points: FloatArray) -> BoolArray:
         """Return (n,) bool: whether loops go around points (n, 2)."""
@@ -134,13 +134,6 @@ class Polyline:
         rise = np.where(y1 == y0, 1.0, y1 - y0)
         crosses = is_beside & (x < x0 + (y - y0) / rise * (x1 - x0))
         return np.asarray(np.count_nonzero(crosses, axis=1) % 2 == 1)
-
-
-def _distances(points: FloatArray, start: FloatArray, end: FloatArray) -> FloatArray:
-    """Return the distances of points (..., 2) from pieces (..., 2)."""
-    chord, arms = end - start, points - start
-    share = np.clip(np.sum(arms * chord, axis=-1) / np.maximum(np.sum(chord**2, axis=-1), 1e-300), 0.0, 1.0)
-    return np.asarray(np.sqrt(np.sum((arms - share[..., None] * chord) ** 2, axis=-1)))
 
 
 def near_pairs(outlines: Sequence[Polyline]) -> list[tuple[int, int]]:

@@ -11,7 +11,7 @@ the size of the body, are seen as they are.
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any, TypeAlias
+from typing import Any
 
 import numpy as np
 
@@ -19,9 +19,6 @@ from bemkit.arrays import BoolArray, FloatArray, IntArray
 from bemkit.errors import GeometryError
 from bemkit.geometry.curves import Curve
 from bemkit.geometry.vectors import angles_between, cross, norms
-
-OnCurve: TypeAlias = Callable[[Curve, FloatArray], FloatArray]
-"""Curve, parameters (n,) -> values (n, 2)."""
 
 LARGEST_TURNING = np.pi / 4
 """Pieces are split until they turn by less, so that none can meet itself."""
@@ -32,6 +29,7 @@ RESOLUTION = 8 * float(np.finfo(float).eps)
 """Points closer than this times the size of their coordinates are the same point: they differ by round-off only."""
 _FEW_BOXES = 64
 """Number of boxes that are compared each with each."""
+_TINY = float(np.finfo(float).tiny)
 _MOST_HALVED = 1_000_000  # more pairs than this mean two curves that all but coincide
 
 
@@ -98,7 +96,7 @@ class Pieces:
     def halves(self) -> tuple["Pieces", "Pieces"]:
         """Split curved pieces in the middle of their parameter interval."""
         middle = 0.5 * (self.span[:, 0] + self.span[:, 1])
-        point = evaluate_curves(self.curves, self.curve, middle[:, None], point_on)[:, 0]
+        point = evaluate_curves(self.curves, self.curve, middle[:, None])[:, 0]
         first = _with_turning(self, self.start, point, np.column_stack([self.span[:, 0], middle]))
         second = _with_turning(self, point, self.end, np.column_stack([middle, self.span[:, 1]]))
         return first, second
@@ -145,18 +143,10 @@ def split_until_flat(pieces: Pieces, describe: Callable[[int], str], least_split
     )
 
 
-def point_on(curve: Curve, s: FloatArray) -> FloatArray:
-    """Return the points of a curve."""
-    return curve.point(s)
-
-
-def derivative_on(curve: Curve, s: FloatArray) -> FloatArray:
-    """Return the derivatives of a curve."""
-    return curve.derivative(s)
-
-
-def evaluate_curves(curves: tuple[Curve, ...], curve: IntArray, s: FloatArray, evaluate: OnCurve) -> FloatArray:
-    """Evaluate the curve with index `curve[i]` at the parameters `s[i]`.
+def evaluate_curves(
+    curves: tuple[Curve, ...], curve: IntArray, s: FloatArray, *, derivative: bool = False
+) -> FloatArray:
+    """Evaluate the curve with index `curve[i]`, or its derivative, at the parameters `s[i]`.
 
     Parameters
     ----------
@@ -166,8 +156,7 @@ def evaluate_curves(curves: tuple[Curve, ...], curve: IntArray, s: FloatArray, e
         Indices of curves; rows with -1 are left zero.
     s : (m, q) array
         Parameters.
-    evaluate : callable
-        `point_on` or `derivative_on`.
+    derivative : bool
 
     Returns
     -------
@@ -176,7 +165,8 @@ def evaluate_curves(curves: tuple[Curve, ...], curve: IntArray, s: FloatArray, e
     values = np.zeros((*s.shape, 2))
     for index in np.unique(curve[curve >= 0]):
         rows = np.flatnonzero(curve == index)
-        values[rows] = evaluate(curves[index], s[rows].ravel()).reshape(len(rows), s.shape[1], 2)
+        evaluate = curves[index].derivative if derivative else curves[index].point
+        values[rows] = evaluate(s[rows].ravel()).reshape(len(rows), s.shape[1], 2)
     return values
 
 
@@ -193,7 +183,7 @@ def _with_turning(pieces: Pieces, start: FloatArray, end: FloatArray, span: Floa
         rows = np.flatnonzero(is_curved)
         fractions = np.linspace(0.0, 1.0, _N_TANGENTS)
         s = span[rows, :1] * (1.0 - fractions) + span[rows, 1:] * fractions
-        tangent = evaluate_curves(pieces.curves, pieces.curve[rows], s, derivative_on)
+        tangent = evaluate_curves(pieces.curves, pieces.curve[rows], s, derivative=True)
         turning[rows] = _TURNING_SAFETY * np.abs(angles_between(tangent[:, :-1], tangent[:, 1:])).sum(axis=1)
     return replace(pieces, start=start, end=end, span=span, turning=turning)
 
@@ -297,10 +287,10 @@ def segment_distances(a: FloatArray, b: FloatArray, c: FloatArray, d: FloatArray
 
 
 def point_distances(p: FloatArray, a: FloatArray, b: FloatArray) -> FloatArray:
-    """Return the distances of the points p from the segments from a to b, all (n, 2)."""
+    """Return the distances (...) of the points p from the segments from a to b, all (..., 2)."""
     chord = b - a
-    fraction = ((p - a) * chord).sum(axis=1) / (chord * chord).sum(axis=1)
-    return norms(p - a - np.clip(fraction, 0.0, 1.0)[:, None] * chord)
+    fraction = ((p - a) * chord).sum(axis=-1) / np.maximum((chord * chord).sum(axis=-1), _TINY)
+    return norms(p - a - np.clip(fraction, 0.0, 1.0)[..., None] * chord)
 
 
 def _side(a: FloatArray, b: FloatArray, c: FloatArray) -> FloatArray:

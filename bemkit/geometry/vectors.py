@@ -33,6 +33,16 @@ def enclosed_area(points: FloatArray) -> float:
     return float(0.5 * cross(arms, np.roll(arms, -1, axis=0)).sum())
 
 
+def circle_centre(first: FloatArray, second: FloatArray, third: FloatArray) -> FloatArray | None:
+    """Return the centre (2,) of the circle through three points, None if they lie on a line."""
+    a, b = second - first, third - first
+    twice_area = float(cross(a, b))
+    if abs(twice_area) <= 1e-12 * float(norms(a) * norms(b)):
+        return None
+    (ax, ay), (bx, by), aa, bb = a, b, a @ a, b @ b
+    return np.asarray(first + np.array([aa * by - bb * ay, bb * ax - aa * bx]) / (2.0 * twice_area))
+
+
 def turned_left(vectors: FloatArray) -> FloatArray:
     """Turn vectors anticlockwise by a right angle: outward normals to tangents."""
     return np.stack([-vectors[..., 1], vectors[..., 0]], axis=-1)

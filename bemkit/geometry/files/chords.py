@@ -10,7 +10,7 @@ import numpy as np
 from bemkit.arrays import BoolArray, FloatArray
 from bemkit.geometry.drawn import ArcTo, LineTo, SplineTo
 from bemkit.geometry.files.strokes import Stroke, StrokeSide, pair
-from bemkit.geometry.vectors import angles_between, cross, norms
+from bemkit.geometry.vectors import angles_between, circle_centre, cross, norms
 
 CORNER_ANGLE = 25.0
 """Degrees by which chords of a smooth curve turn at most; 15 chords make a circle."""
@@ -97,8 +97,8 @@ def _closed(loop: ChordLoop) -> Stroke | None:
     points = loop.points
     group, start = loop.names[0], pair(points[0])
     n = len(points)
-    if _is_on_circle(points, (0, n // 3, 2 * n // 3)):
-        opposite = _circle_centre(points, (0, n // 3, 2 * n // 3)) * 2.0 - points[0]
+    if (centre := _circle(points, (0, n // 3, 2 * n // 3))) is not None:
+        opposite = centre * 2.0 - points[0]
         return Stroke(start, ArcTo(start, pair(opposite), group=group))
     pieces = fitted_strokes(np.concatenate([points, points[:1]]), group)
     if len(pieces) == 1 and isinstance(pieces[0].side, SplineTo):
@@ -164,22 +164,15 @@ def _is_arc(points: FloatArray) -> bool:
         return True  # there is a circle through every three points
     turns = angles_between(np.diff(points[:-1], axis=0), np.diff(points[1:], axis=0))
     is_turning = bool((turns > _STRAIGHT).all() or (turns < -_STRAIGHT).all()) and float(np.abs(turns).sum()) < 6.2
-    return is_turning and _is_on_circle(points, (0, n // 2, n - 1))
+    return is_turning and _circle(points, (0, n // 2, n - 1)) is not None
 
 
-def _is_on_circle(points: FloatArray, three: Sequence[int]) -> bool:
-    a, b, c = points[list(three)]
-    if abs(float(cross(b - a, c - a))) <= 1e-12 * float(norms(b - a) * norms(c - a)):
-        return False
-    radii = norms(points - _circle_centre(points, three))
-    return bool(np.ptp(radii) <= _ON_CIRCLE * np.ptp(points, axis=0).max())
-
-
-def _circle_centre(points: FloatArray, three: Sequence[int]) -> FloatArray:
-    start, b, c = points[list(three)]
-    b, c = b - start, c - start
-    offset = np.array([(b @ b) * c[1] - (c @ c) * b[1], (c @ c) * b[0] - (b @ b) * c[0]])
-    return np.asarray(start + offset / (2.0 * cross(b, c)))
+def _circle(points: FloatArray, three: Sequence[int]) -> FloatArray | None:
+    """Return the centre of the circle through three of the points if all are on it, else None."""
+    centre = circle_centre(*points[list(three)])
+    if centre is None or np.ptp(norms(points - centre)) > _ON_CIRCLE * np.ptp(points, axis=0).max():
+        return None
+    return centre
 
 
 def note_on_curves(strokes: Sequence[Stroke]) -> str:

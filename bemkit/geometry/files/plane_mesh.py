@@ -11,7 +11,7 @@ import numpy as np
 from bemkit.arrays import FloatArray, IntArray
 from bemkit.errors import GeometryError, format_point
 from bemkit.geometry.files.chords import ChordLoop
-from bemkit.geometry.files.strokes import closed_chains
+from bemkit.geometry.loops import closed_chains
 from bemkit.geometry.vectors import cross
 
 _PLANE = 1e-9

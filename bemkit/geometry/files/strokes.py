@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import shlex
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
@@ -15,6 +15,7 @@ import numpy as np
 from bemkit.arrays import FloatArray, IntArray
 from bemkit.errors import GeometryError, format_point
 from bemkit.geometry.drawn import ArcTo, LineTo, Loop, NurbsTo, Point, SplineTo
+from bemkit.geometry.loops import closed_chains
 from bemkit.geometry.nurbs import conic_arc
 from bemkit.geometry.vectors import cross, enclosed_area, norms
 
@@ -241,26 +242,6 @@ def _groups_that_close(ends: IntArray, groups: Sequence[str]) -> str:
 def _with_ends(stroke: Stroke, start: FloatArray, end: FloatArray) -> Stroke:
     ends = [(float(x), float(y)) for x, y in (start, end)]
     return Stroke(ends[0], replace(stroke.side, to=ends[1]))
-
-
-def closed_chains(ends: IntArray) -> Iterator[list[tuple[int, bool]]]:
-    """Yield the closed chains of links whose ends (n, 2) are numbered so that two links share each.
-
-    Each as the numbers of its links in order, and whether the link is followed from its first end to its second.
-    """
-    by_end = np.argsort(ends.ravel(), kind="stable").reshape(-1, 2) // 2
-    is_seen = np.zeros(len(ends), dtype=bool)
-    for first in range(len(ends)):
-        chain, number, end = [], first, int(ends[first, 0])
-        while not is_seen[number]:
-            is_seen[number] = True
-            is_ahead = int(ends[number, 0]) == end
-            chain.append((number, is_ahead))
-            end = int(ends[number, 1 if is_ahead else 0])
-            one, other = by_end[end].tolist()
-            number = other if one == number else one
-        if chain:
-            yield chain
 
 
 def named_loops(loops: Sequence[list[Stroke]]) -> tuple[Loop, ...]:
