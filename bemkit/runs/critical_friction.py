@@ -13,14 +13,15 @@ from bemkit.contact.body import SingularResponse
 from bemkit.contact.critical_friction import critical_coefficient, sliding_response
 from bemkit.contact.problem import ContactProblem, LawError
 from bemkit.errors import NoResultError
-from bemkit.model.model import build_model
-from bemkit.model.prepared import prepare
+from bemkit.operators.threads import blas_threads_for
+from bemkit.results.solution import Solution
 from bemkit.runs.run import LoadHistoryError, on_its_meshes
-from bemkit.runs.steps import NoContactError, UnsolvableSceneError
+from bemkit.runs.solution_of import solution_of, with_missed_contact_named
+from bemkit.runs.steps import NoContactError, UnsolvableSceneError, built, checked, planned
 from bemkit.scene.load_history import load_steps
 from bemkit.scene.scene import Scene, check_scene
 from bemkit.solvers.active_sets import NodeStatus
-from bemkit.solvers.base import solve
+from bemkit.solvers.base import ContactSolution, solve
 
 
 class NoSlidingStateError(NoResultError):
@@ -83,7 +84,9 @@ def critical_friction(scene: Scene) -> CriticalFriction:
     UnsolvableSceneError
         If nothing but friction keeps a body from sliding: it does so at any coefficient.
     NoSlidingStateError
-        If the solver finds no solution, or no node is in contact.
+        If no solution is found, or no node is in contact.
+    NoMeshError
+        If the accuracy is not reached.
 
     Notes
     -----
@@ -140,12 +143,16 @@ def _solved(scene: Scene) -> tuple[ContactProblem, np.ndarray[tuple[int], np.dty
         raise LoadHistoryError(f"a load history of {scene.n_steps} steps has no single state: give one load")
     if not scene.has_contact:
         raise NoContactError("no part is in contact: nothing slides")
-    (step,) = load_steps(scene)
-    prepared = prepare(*on_its_meshes(step))
+    scene, mesh = on_its_meshes(scene)
+    (prepared,), plan, clock = planned(load_steps(scene), mesh)
     if not (prepared.n_contact or any(body.scene.contact_parts for body in prepared.bodies)):
         raise NoContactError("no two bodies are in contact: nothing slides")
-    problem = build_model(prepared).problem
-    result = solve(problem, scene.solver, throw=False)
-    if not result.is_converged:
-        raise NoSlidingStateError(f"the scene has no solution to begin with: {result.message}")
-    return problem, result.node_status
+    with blas_threads_for(prepared.largest_matrix):
+        model, clock = built(prepared, clock)
+        result = checked(model, solve(model.problem, scene.solver, throw=False))
+        found: ContactSolution | Solution = result
+        if result.is_converged:
+            found = with_missed_contact_named(solution_of(model, result, plan, clock))
+    if not found.is_converged:
+        raise NoSlidingStateError(f"the scene has no solution to begin with: {found.message}")
+    return model.problem, result.node_status

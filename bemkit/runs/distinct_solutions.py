@@ -7,7 +7,7 @@ from typing import Any
 from bemkit.contact.solvability import find_unsolvable_load
 from bemkit.operators.threads import blas_threads_for
 from bemkit.runs.run import LoadHistoryError, UnsolvableSceneError, on_its_meshes
-from bemkit.runs.solution_of import solution_of
+from bemkit.runs.solution_of import solution_of, with_missed_contact_named
 from bemkit.runs.steps import NoContactError, built, checked, explained, planned
 from bemkit.scene.load_history import load_steps
 from bemkit.scene.scene import Scene, check_scene
@@ -37,6 +37,8 @@ def distinct_solutions(scene: Scene, *, n_starts: int = 8) -> tuple[Any, ...]:
     ------
     UnsolvableSceneError, ValueError
         As for `run`; also if the scene has a load history or `n_starts` is negative.
+    NoMeshError
+        If the accuracy is not reached.
     """
     check_scene(scene)
     if not scene.has_contact:
@@ -56,4 +58,5 @@ def distinct_solutions(scene: Scene, *, n_starts: int = 8) -> tuple[Any, ...]:
         results = probe(model.problem, scene.solver, n_starts=n_starts)
         results = tuple(checked(model, result) for result in results)
         clock = clock.closed(Stage.SOLVE)
-        return tuple(solution_of(model, result, plan, clock) for result in results if result.is_converged)
+        solutions = (solution_of(model, result, plan, clock) for result in results if result.is_converged)
+        return tuple(each for each in map(with_missed_contact_named, solutions) if each.is_converged)

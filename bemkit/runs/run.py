@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from bemkit.errors import InputError
+from bemkit.errors import InputError, NoResultError
 from bemkit.interrupts import interruptible
 from bemkit.model.placed import Meshes
 from bemkit.plan.plan import few_on, make_plan
@@ -27,6 +27,10 @@ _COARSEST_STRIP = 50
 """Elements of the coarsest mesh of a strip of a half-plane."""
 _LARGE = 5000
 """Number of elements of the mesh whose plan decides whether the equations of such a body are compressed."""
+
+
+class NoMeshError(NoResultError):
+    """A scene does not reach its accuracy on any mesh."""
 
 
 class LoadHistoryError(InputError):
@@ -179,9 +183,16 @@ def on_its_meshes(scene: Scene) -> tuple[Scene, Meshes]:
     """Return a scene with the discretisations, and the meshes of its bodies, by which it reaches its accuracy.
 
     Without an accuracy the scene stays as it is.
+
+    Raises
+    ------
+    NoMeshError
+        If the accuracy is not reached.
     """
     if scene.mesh.accuracy is None:
         return scene, None
     found = run(scene)
+    if not found.is_converged:
+        raise NoMeshError(f"no mesh reaches the accuracy, give elements or ask for less: {found.message}")
     placed = {body.name: body.placement for body in scene.placed_bodies}
     return found.scene, {name: placed[name].inverse.mesh(body.mesh) for name, body in found.bodies.items()}

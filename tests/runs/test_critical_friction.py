@@ -13,9 +13,10 @@ import bemkit as bk
 from bemkit.cli.main import main
 from bemkit.runs.critical_friction import NoSlidingStateError
 from bemkit.runs.distinct_solutions import distinct_solutions
-from bemkit.runs.run import LoadHistoryError
+from bemkit.runs.run import LoadHistoryError, NoMeshError
 from bemkit.runs.steps import NoContactError, UnsolvableSceneError
 from bemkit.scene.load_history import with_scaled_loads
+from tests.model.test_finite_sliding import on_floor
 
 LEG = bk.load_scene("wedged-leg")
 
@@ -145,6 +146,40 @@ def test_steps_and_load_factors_count() -> None:
     pulled = bk.critical_friction(replace(LEG, load_factors=(-1.0,)))
     assert pulled == bk.critical_friction(with_scaled_loads(LEG, -1.0))
     assert pulled != bk.critical_friction(LEG)
+
+
+def roll(y: float) -> bk.Scene:
+    """Half a disc that is moved into a plane, which it meets between two nodes."""
+    tip = bk.Part("tip", bk.Contact(bk.RigidHalfPlane()), ("arc",), bk.Expression("-0.1 < x and x < 0.3"))
+    return bk.Scene(
+        title="roll",
+        shape=bk.Sector(1.0, 180.0, 360.0, centre=(0.0, 1.0)),
+        material=bk.Material(1.0, 0.3),
+        law=bk.Coulomb(0.3),
+        parts=(bk.Part("load", bk.PrescribedDisplacement(0.0, y), ("start", "end")), tip),
+        mesh=bk.MeshOptions(elements=41),
+    )
+
+
+@pytest.mark.parametrize(
+    ("scene", "words"),
+    [
+        (roll(-1e-6), "overlaps by 1e-06 at"),
+        (replace(on_floor(0.0, -0.5), law=bk.Coulomb(0.3)), "the sides move by 0.45. along each other"),
+    ],
+)
+def test_states_that_are_none_of_the_scene_are_not_searched(scene: bk.Scene, words: str) -> None:
+    with pytest.raises(NoSlidingStateError, match=f"the scene has no solution to begin with: .*{words}"):
+        bk.critical_friction(scene)
+    assert not distinct_solutions(scene, n_starts=2)
+
+
+def test_an_accuracy_that_no_mesh_reaches_is_named() -> None:
+    options = bk.MeshOptions(accuracy=1e-6, most_elements=60)
+    scene = replace(LEG, mesh=options, discretisation=bk.Galerkin(2))
+    for search in (bk.critical_friction, distinct_solutions):
+        with pytest.raises(NoMeshError, match="no mesh reaches the accuracy, give elements or ask for less: The acc"):
+            search(scene)
 
 
 def test_bodies_that_follow_an_accuracy_are_placed_once() -> None:
