@@ -83,7 +83,7 @@ from bemkit.scene.copies import GridCopies as GridCopies
 from bemkit.scene.copies import ListedCopies as ListedCopies
 from bemkit.scene.discretisation import ConstantCollocation as ConstantCollocation
 from bemkit.scene.discretisation import Galerkin as Galerkin
-from bemkit.scene.mesh_options import MeshOptions as MeshOptions
+from bemkit.scene.discretisation import MeshOptions as MeshOptions
 from bemkit.scene.plane_motion import FarField as FarField
 from bemkit.scene.plane_motion import RigidBody as RigidBody
 from bemkit.scene.scene import Scene as Scene

@@ -25,7 +25,7 @@ from scipy import sparse
 
 import bemkit as bk
 from bemkit.arrays import BoolArray, FloatArray, IntArray
-from bemkit.contact.condensation.dense_body import DenseBody
+from bemkit.contact.dense_body import DenseBody
 from bemkit.contact.problem import ContactProblem
 from bemkit.geometry.quadrature import gauss_legendre
 from bemkit.operators.threads import blas_threads_for

@@ -19,9 +19,9 @@ from rich.console import Console
 from rich.table import Table
 
 import bemkit as bk
-from bemkit.contact.condensation.hierarchical_body import hierarchical_body
-from bemkit.contact.condensation.nodes import opened
 from bemkit.contact.conditions import stick
+from bemkit.contact.contact_nodes import opened
+from bemkit.contact.hierarchical_body import hierarchical_body
 from bemkit.geometry.outline import Outline
 from bemkit.model.prepared import prepare
 from bemkit.operators.collocation import compiled

@@ -27,7 +27,7 @@ from rich.console import Console
 from rich.table import Table
 
 import bemkit as bk
-from bemkit.contact.condensation.hierarchical_body import HierarchicalBody
+from bemkit.contact.hierarchical_body import HierarchicalBody
 from bemkit.operators.collocation import compiled
 from bemkit.operators.hierarchy.factor import Factor
 from bemkit.operators.hierarchy.skeletons import Compression

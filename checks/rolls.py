@@ -30,8 +30,7 @@ from bemkit.runs.run import run
 from bemkit.scene.body import Body
 from bemkit.scene.conditions import Clamped, Contact, Part, PrescribedDisplacement
 from bemkit.scene.contacts import ContactPair
-from bemkit.scene.discretisation import ConstantCollocation, Galerkin
-from bemkit.scene.mesh_options import MeshOptions
+from bemkit.scene.discretisation import ConstantCollocation, Galerkin, MeshOptions
 from bemkit.scene.scene import Scene
 from bemkit.studies.engine import Task
 from checks.random_scenes.draw import Draw

@@ -25,8 +25,7 @@ from bemkit.geometry.meshing.discretise import Algebraic
 from bemkit.model.model import Model, build_model
 from bemkit.model.prepared import prepare
 from bemkit.operators.threads import blas_threads_for
-from bemkit.scene.discretisation import ConstantCollocation
-from bemkit.scene.mesh_options import MeshOptions
+from bemkit.scene.discretisation import ConstantCollocation, MeshOptions
 from bemkit.scene.toml import load_single_body
 from bemkit.solvers.alm import AugmentedLagrangian
 from bemkit.solvers.base import solve

@@ -4,8 +4,8 @@ import zlib
 
 import numpy as np
 
-from bemkit.contact.condensation.direct_body import DirectBody, WholeBody
-from bemkit.contact.condensation.nodes import ContactNodes, approaches, contact_frame, nodes_on, opened
+from bemkit.contact.contact_nodes import ContactNodes, approaches, contact_frame, nodes_on, opened
+from bemkit.contact.direct_body import DirectBody, WholeBody
 from bemkit.contact.laws import Coulomb
 from bemkit.contact.problem import ContactProblem, ContactState, DenseBody, LinearBody
 from bemkit.geometry.local_values import dof_weights

@@ -8,7 +8,7 @@ from pathlib import Path
 import click
 
 from bemkit.cli.options import shown_progress
-from bemkit.cli.streams import print_data
+from bemkit.cli.process import print_data
 
 
 @click.command()

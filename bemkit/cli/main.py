@@ -16,8 +16,16 @@ from typing import NoReturn
 
 import click
 
-from bemkit.cli.exit_codes import BAD_INPUT, INTERRUPTED, PIPE_CLOSED, TERMINATED, exit_code_of_error
-from bemkit.cli.streams import PipeClosedError, complain, guarded_streams
+from bemkit.cli.process import (
+    BAD_INPUT,
+    INTERRUPTED,
+    PIPE_CLOSED,
+    TERMINATED,
+    PipeClosedError,
+    complain,
+    exit_code_of_error,
+    guarded_streams,
+)
 from bemkit.errors import BemkitError, one_line
 from bemkit.interrupts import interruptible
 from bemkit.version import __version__

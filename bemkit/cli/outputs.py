@@ -11,7 +11,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Generic, TypeVar
 
-from bemkit.cli.streams import print_data
+from bemkit.cli.process import print_data
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

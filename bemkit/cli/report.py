@@ -5,8 +5,8 @@ from __future__ import annotations
 import click
 
 from bemkit.cli import options
-from bemkit.cli.exit_codes import exit_code_of
 from bemkit.cli.options import reserve, shown_progress
+from bemkit.cli.process import exit_code_of
 
 
 @click.command()

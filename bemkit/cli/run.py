@@ -13,10 +13,9 @@ from typing import TYPE_CHECKING, Literal
 import click
 
 from bemkit.cli import options
-from bemkit.cli.exit_codes import exit_code_of, exit_code_of_error, most_serious
 from bemkit.cli.options import outputs_of, place_of, reserve, result_target, shown_progress, write_animation
 from bemkit.cli.outputs import Outputs
-from bemkit.cli.streams import complain
+from bemkit.cli.process import complain, exit_code_of, exit_code_of_error, most_serious
 from bemkit.errors import BemkitError, concerning, one_line
 
 if TYPE_CHECKING:

@@ -9,7 +9,7 @@ import click
 from bemkit.cli import options
 from bemkit.cli.options import outputs_of, result_target, shown_progress, write_animation
 from bemkit.cli.outputs import STDOUT
-from bemkit.cli.streams import print_data
+from bemkit.cli.process import print_data
 
 
 @click.command()

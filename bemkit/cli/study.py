@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from bemkit.cli import options
-from bemkit.cli.exit_codes import NOT_CONVERGED
 from bemkit.cli.options import StudyProgress, reserve, shown_progress, study_output
 from bemkit.cli.outputs import STDOUT, Outputs, TextFile, plain_table, stdout_console
+from bemkit.cli.process import NOT_CONVERGED
 from bemkit.errors import concerning
 from bemkit.table import json_text
 

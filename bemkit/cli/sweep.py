@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 import click
 
 from bemkit.cli import options
-from bemkit.cli.exit_codes import NOT_CONVERGED
 from bemkit.cli.options import StudyProgress, reserve, study_output
 from bemkit.cli.outputs import Outputs, TextFile
+from bemkit.cli.process import NOT_CONVERGED
 from bemkit.errors import concerning
 
 if TYPE_CHECKING:

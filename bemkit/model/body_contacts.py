@@ -8,7 +8,7 @@ import numpy as np
 from scipy import sparse
 
 from bemkit.arrays import BoolArray
-from bemkit.contact.condensation.nodes import approaches, nodes_on
+from bemkit.contact.contact_nodes import approaches, nodes_on
 from bemkit.contact.laws import FrictionLaw
 from bemkit.contact.mortar.congruent import CongruentCouplings, PlacedSide
 from bemkit.contact.mortar.facing import find_facing, is_non_mortar

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray, IntArray
-from bemkit.contact.condensation.nodes import ContactNodes, contact_frame, nodes_on
+from bemkit.contact.contact_nodes import ContactNodes, contact_frame, nodes_on
 from bemkit.contact.obstacle import Obstacle, measure_contact
 from bemkit.geometry.local_values import dof_weights
 from bemkit.geometry.mesh import BoundaryMesh

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray, IntArray
-from bemkit.contact.condensation.nodes import approaches
+from bemkit.contact.contact_nodes import approaches
 from bemkit.contact.laws import FrictionLaw, Frictionless, LawOfCoefficients
 from bemkit.contact.obstacle import RigidHalfPlane
 from bemkit.contact.problem import LawError

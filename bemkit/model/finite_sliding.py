@@ -12,7 +12,7 @@ from typing import TypeGuard
 import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray
-from bemkit.contact.condensation.nodes import nodes_on
+from bemkit.contact.contact_nodes import nodes_on
 from bemkit.contact.obstacle import SIMPLE_OBSTACLES, DirectedObstacle, Obstacle
 from bemkit.geometry.placement import Placement
 from bemkit.geometry.spaces import element_nodes

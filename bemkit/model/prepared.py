@@ -14,35 +14,28 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray
-from bemkit.contact.condensation.nodes import ContactNodes
+from bemkit.contact.contact_nodes import ContactNodes
 from bemkit.contact.laws import FrictionLaw
+from bemkit.errors import ResultWarning
 from bemkit.geometry.spaces import dof_points
 from bemkit.model.contact_data import ContactData
 from bemkit.model.contacts import ContactInterface, candidates_of, law_of_rows, may_overlap, obstacle_rows, retained_for
 from bemkit.model.fields import TractionRecovery
-from bemkit.model.given import (
-    far_motion_of,
-    given_data,
-    held_nodes,
-    linear_solver_of,
-    nodal_forces,
-    with_far_motion,
-)
-from bemkit.model.placed import Meshes, PlacedBody, place
-from bemkit.model.same_bodies import bodies_under, check_step, find_units, found_contacts, with_found_contacts
+from bemkit.model.given import far_motion_of, given_data, held_nodes, linear_solver_of, nodal_forces, with_far_motion
+from bemkit.model.placed import Meshes, PlacedBody, bodies_under, check_step, find_units, place, with_found_contacts
 from bemkit.model.units import Units
 from bemkit.operators.linear_solvers import ChosenLinearSolver, DenseCholesky, LinearSolver, Tag
 from bemkit.operators.material import Material
 from bemkit.operators.steklov_poincare import SteklovPoincare
 from bemkit.operators.steklov_poincare.cost import BodyCase
 from bemkit.operators.steklov_poincare.nodal_conditions import GivenData, NodalConditions, free_modes, turning
-from bemkit.result_warning import ResultWarning
-from bemkit.scene.mesh_options import thinness_warnings
+from bemkit.scene.discretisation import thinness_warnings
 from bemkit.scene.scene import Scene
 
 if TYPE_CHECKING:
     from bemkit.operators.half_plane.far_motion import FarMotion
     from bemkit.operators.steklov_poincare.forces_inside import ForcesInside
+    from bemkit.scene.contacts import ContactPair
 
 
 @dataclass(frozen=True, eq=False)
@@ -330,7 +323,11 @@ def prepare_steps(scenes: Sequence[Scene], meshes: Meshes = None) -> tuple[Prepa
         If a scene lacks its symmetry, or an expression is not finite somewhere.
     """
     bodies = place(scenes[0], meshes)
-    found = found_contacts(scenes[0], bodies)
+    found: Sequence[tuple[ContactPair, bool]] = ()
+    if scenes[0].touching is not None:
+        from bemkit.model.body_contacts import touching_pairs  # mortars, which single bodies lack
+
+        found = touching_pairs(scenes[0], bodies)
     steps = [with_found_contacts(step, [pair for pair, is_resolved in found if is_resolved]) for step in scenes]
     for step in steps[1:]:
         check_step(steps[0], step)

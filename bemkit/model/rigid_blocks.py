@@ -17,12 +17,11 @@ from bemkit.contact.obstacle import Obstacle, measure_contact
 from bemkit.contact.solvability import envelopes_of
 from bemkit.geometry.spaces import dof_points
 from bemkit.geometry.vectors import norms, turned_left
-from bemkit.model.body_contacts import reach_of
+from bemkit.model.body_contacts import reach_of, touching_pairs
 from bemkit.model.contacts import check_overlap
 from bemkit.model.given import held_nodes, nodal_forces
 from bemkit.model.particular import particular_solution
-from bemkit.model.placed import PlacedBody
-from bemkit.model.same_bodies import found_contacts, with_found_contacts
+from bemkit.model.placed import PlacedBody, with_found_contacts
 from bemkit.operators.rigid_modes import rigid_motions
 from bemkit.operators.steklov_poincare.forces_inside import ForcesInside
 from bemkit.operators.steklov_poincare.nodal_conditions import free_modes
@@ -206,7 +205,7 @@ def _elastic_block(body: PlacedBody) -> Block:
 def joints_of(scene: Scene, bodies: Sequence[PlacedBody]) -> Iterator[Joint]:
     """Yield the joints between elastic bodies, then those with rigid bodies and with fixed obstacles."""
     names = [*(body.name for body in bodies), *(body.name for body in scene.rigid)]
-    listed = with_found_contacts(scene, [pair for pair, _ in found_contacts(scene, bodies)])
+    listed = with_found_contacts(scene, [pair for pair, _ in touching_pairs(scene, bodies)])
     for pair in listed.contacts:
         parts = [(names.index(body), part) for body, part in pair.elastic_parts]
         if pair.rigid_body is None:

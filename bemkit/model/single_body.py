@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, TypeAlias
 
-from bemkit.contact.condensation.direct_body import DirectBody, WholeBody
-from bemkit.contact.condensation.nodes import NoContactNodesError, opened
+from bemkit.contact.contact_nodes import NoContactNodesError, opened
+from bemkit.contact.direct_body import DirectBody, WholeBody
 from bemkit.errors import InputError
 from bemkit.model.given import without_body_forces
 from bemkit.model.prepared import Prepared
 from bemkit.operators.steklov_poincare import CondensedMap, SteklovPoincare
 
 if TYPE_CHECKING:
-    from bemkit.contact.condensation.hierarchical_body import HierarchicalBody
     from bemkit.contact.half_plane.surface_body import SurfaceBody
+    from bemkit.contact.hierarchical_body import HierarchicalBody
     from bemkit.model.contact_free_body import ContactFreeBody
 
 SingleBody: TypeAlias = "DirectBody | HierarchicalBody | SurfaceBody | ContactFreeBody"
@@ -90,7 +90,7 @@ def single_body(prepared: Prepared, elastic: SteklovPoincare, condensed: Condens
         whole = WholeBody.of(body.own_space, condensed, conditions, body.force, body.free_modes)
         return DirectBody.of(whole, nodes, elastic.material.plane_modulus)
     conditions = opened(body.conditions, nodes)
-    from bemkit.contact.condensation.hierarchical_body import hierarchical_body
+    from bemkit.contact.hierarchical_body import hierarchical_body
     from bemkit.operators.steklov_poincare.hierarchical import HierarchicalCollocation
 
     compressed = without_body_forces(elastic, body.inside)

@@ -15,6 +15,7 @@ import numpy as np
 
 from bemkit.arrays import FloatArray, IntArray
 from bemkit.contact.equilibrium import NOISE_FACTOR, round_off_of
+from bemkit.errors import ResultWarning
 from bemkit.geometry.spaces import BoundarySpace, dof_points
 from bemkit.geometry.vectors import norms
 from bemkit.model.contacts import ContactInterface
@@ -23,7 +24,6 @@ from bemkit.model.prepared import PreparedBody
 from bemkit.operators.linear_solvers import Tag
 from bemkit.operators.rigid_modes import traction_free_modes
 from bemkit.operators.steklov_poincare import CondensedMap, SteklovPoincare
-from bemkit.result_warning import ResultWarning
 from bemkit.scene.conditions import name_at_obstacle
 from bemkit.scene.unit_names import UnitNames, amount
 from bemkit.solvers.active_sets import NodeStatus

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from bemkit.arrays import BoolArray, FloatArray, IntArray
-from bemkit.contact.condensation.nodes import contact_frame
+from bemkit.contact.contact_nodes import contact_frame
 from bemkit.geometry.spaces import dof_points
 from bemkit.geometry.symmetry import Symmetry
 from bemkit.pictures.shown import DrawnScene, Result

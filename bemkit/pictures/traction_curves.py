@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bemkit.arrays import FloatArray, IntArray
-from bemkit.contact.condensation.nodes import contact_frame
+from bemkit.contact.contact_nodes import contact_frame
 from bemkit.contact.obstacle import measure_contact
 from bemkit.geometry.neighbours import along_boundary
 from bemkit.geometry.spaces import BoundarySpace, ConstantSpace

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bemkit.errors import InputError
+from bemkit.errors import InputError, ResultWarning, first_of_each_kind
 from bemkit.model.placed import Meshes, groups
 from bemkit.model.prepared import Prepared, prepare_steps
 from bemkit.notebook import ShownInNotebooks
@@ -24,7 +24,6 @@ from bemkit.operators.steklov_poincare.cost import (
 )
 from bemkit.plan.items import Sizes as Sizes
 from bemkit.plan.items import find_sizes, items_of_one, items_of_several
-from bemkit.result_warning import ResultWarning, first_of_each_kind
 from bemkit.scene.scene import Scene
 from bemkit.stopwatch import announce
 

@@ -20,8 +20,7 @@ from bemkit.geometry.quadrature import gauss_legendre
 from bemkit.geometry.spaces import element_nodes
 from bemkit.results.solution import Solution
 from bemkit.results.transitions import FLICKER
-from bemkit.scene.discretisation import Galerkin
-from bemkit.scene.mesh_options import MeshOptions
+from bemkit.scene.discretisation import Galerkin, MeshOptions
 from bemkit.scene.scene import Scene
 
 MEASURES: Mapping[str, str] = MappingProxyType(

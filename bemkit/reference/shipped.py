@@ -21,8 +21,7 @@ from bemkit.reference.compare import Reference, SampledFields, SamplePoints, Zon
 from bemkit.reference.disc import DiscBetweenPlates
 from bemkit.reference.pressure import places_along
 from bemkit.reference.wavy import WavyObstacle
-from bemkit.scene.discretisation import Galerkin
-from bemkit.scene.mesh_options import MeshOptions
+from bemkit.scene.discretisation import Galerkin, MeshOptions
 from bemkit.scene.scene import Scene
 from bemkit.scene.toml import load_single_body
 from bemkit.solvers.fallbacks import Fallbacks

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from bemkit.arrays import FloatArray, IntArray
-from bemkit.contact.condensation.nodes import contact_frame
+from bemkit.contact.contact_nodes import contact_frame
 from bemkit.contact.mortar.congruent import congruence_key
 from bemkit.contact.mortar.projection import mean_directions
 from bemkit.contact.mortar.segments import Segments, common_refinement, facing_points

@@ -10,7 +10,7 @@ import numpy as np
 
 from bemkit.arrays import FloatArray, IntArray
 from bemkit.contact.body import SlipHistory
-from bemkit.contact.condensation.nodes import contact_frame
+from bemkit.contact.contact_nodes import contact_frame
 from bemkit.contact.laws import FrictionLaw
 from bemkit.contact.obstacle import Obstacle, measure_contact
 from bemkit.geometry.local_values import from_own_nodes

@@ -8,9 +8,8 @@ import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray
 from bemkit.contact.laws import FrictionLaw
-from bemkit.errors import format_point
+from bemkit.errors import ResultWarning, format_point
 from bemkit.geometry.vectors import norms
-from bemkit.result_warning import ResultWarning
 from bemkit.results.contact_table import ContactTable
 
 _CHANGE = 0.1

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from bemkit.errors import ResultWarning, without_duplicates
 from bemkit.notebook import ShownInNotebooks
-from bemkit.result_warning import ResultWarning, without_duplicates
 from bemkit.results.solution import Solution, continued
 from bemkit.solvers.base import StepRecord
 

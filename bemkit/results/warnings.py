@@ -11,6 +11,7 @@ import numpy as np
 from bemkit.arrays import BoolArray, FloatArray, IntArray
 from bemkit.contact.laws import FrictionLaw, LawOfCoefficients
 from bemkit.contact.obstacle import RigidHalfPlane
+from bemkit.errors import ResultWarning, first_of_each_kind
 from bemkit.geometry.local_values import values_on_elements
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.neighbours import break_nodes
@@ -18,7 +19,6 @@ from bemkit.geometry.vectors import norms
 from bemkit.model.contacts import may_overlap
 from bemkit.operators.linear_solvers import Tag
 from bemkit.operators.rigid_modes import without_motion
-from bemkit.result_warning import ResultWarning, first_of_each_kind
 from bemkit.results.between_nodes import BetweenNodes
 from bemkit.results.contact_table import ContactTable, free_contacts
 from bemkit.results.solution import Solution

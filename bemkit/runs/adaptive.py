@@ -17,7 +17,7 @@ from bemkit.runs.hp import LayeredMeshes
 from bemkit.runs.mesh_sequence import Level, MeshSequence
 from bemkit.runs.step_errors import in_which_step
 from bemkit.runs.steps import guess_from, joined, run_on_mesh, solved_history
-from bemkit.scene.mesh_options import MOST_ELEMENTS, MeshOptions
+from bemkit.scene.discretisation import MOST_ELEMENTS, MeshOptions
 from bemkit.scene.scene import Scene
 from bemkit.solvers.base import Status, StepRecord
 

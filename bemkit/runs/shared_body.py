@@ -9,7 +9,7 @@ from typing import Any
 
 from bemkit.errors import BemkitError
 from bemkit.model.model import build_model
-from bemkit.model.same_bodies import find_units, with_found_contacts
+from bemkit.model.placed import find_units, with_found_contacts
 from bemkit.operators.threads import blas_threads_for
 from bemkit.runs.run import run
 from bemkit.runs.steps import History, joined, planned, solve_steps

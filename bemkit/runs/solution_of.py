@@ -11,12 +11,12 @@ import numpy as np
 
 from bemkit.arrays import IntArray
 from bemkit.contact.body import ContactState, SlipHistory
+from bemkit.errors import ResultWarning
 from bemkit.geometry.local_values import mean_tractions
 from bemkit.geometry.spaces import dof_points
 from bemkit.model.model import Model
 from bemkit.model.solved_contact import contact_warnings
 from bemkit.plan import Plan
-from bemkit.result_warning import ResultWarning
 from bemkit.results.contact_table import ContactTable, bound_at, free_contacts
 from bemkit.results.part_forces import PartForce, RigidResult, contact_forces, forces_on_parts, nodal_resultant
 from bemkit.results.solution import Solution

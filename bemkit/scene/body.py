@@ -15,8 +15,7 @@ from bemkit.geometry.placement import Placement
 from bemkit.geometry.shapes import Shape
 from bemkit.operators.material import Material
 from bemkit.scene.conditions import Clamped, Contact, Free, Part, PrescribedDisplacement, Roller
-from bemkit.scene.discretisation import Discretisation
-from bemkit.scene.mesh_options import MeshOptions
+from bemkit.scene.discretisation import Discretisation, MeshOptions
 from bemkit.scene.objects import check_names, check_objects, outline_of
 
 if TYPE_CHECKING:

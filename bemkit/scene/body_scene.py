@@ -21,8 +21,7 @@ from bemkit.geometry.outline import Outline, Selection
 from bemkit.geometry.shapes import Shape
 from bemkit.operators.material import Material
 from bemkit.scene.conditions import Clamped, Contact, Free, Part, PrescribedDisplacement, RigidConnection, Roller
-from bemkit.scene.discretisation import Discretisation, Galerkin
-from bemkit.scene.mesh_options import MeshOptions
+from bemkit.scene.discretisation import Discretisation, Galerkin, MeshOptions
 from bemkit.scene.objects import check_laws
 
 if TYPE_CHECKING:

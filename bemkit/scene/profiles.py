@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from bemkit.contact.rough_profile import Profile, ProfilePoints
-from bemkit.result_warning import ResultWarning
+from bemkit.errors import ResultWarning
 from bemkit.scene.conditions import Contact, Part
 from bemkit.scene.unit_names import UnitNames, amount, check_length_of_file
 

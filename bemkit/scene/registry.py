@@ -290,8 +290,8 @@ SOLVERS = Registry(
     {
         "fallbacks": "bemkit.solvers.fallbacks:Fallbacks",
         "semismooth-newton": "bemkit.solvers.ssn:SemismoothNewton",
-        "springs": "bemkit.solvers.springs:Springs",
-        "solution-path": "bemkit.solvers.solution_path:SolutionPath",
+        "springs": "bemkit.solvers.fallbacks:Springs",
+        "solution-path": "bemkit.solvers.fallbacks:SolutionPath",
         "augmented-lagrangian": "bemkit.solvers.alm:AugmentedLagrangian",
         "fixed-point": "bemkit.solvers.fixed_point:FixedPoint",
         "lemke": "bemkit.solvers.lemke:LemkePivoting",

@@ -24,8 +24,7 @@ from bemkit.operators.material import Material
 from bemkit.scene.body import Body, check_accuracy, check_place, lines_across
 from bemkit.scene.body_scene import BodyScene
 from bemkit.scene.conditions import Contact, Force, Free, Part
-from bemkit.scene.discretisation import Discretisation, Galerkin
-from bemkit.scene.mesh_options import MeshOptions
+from bemkit.scene.discretisation import Discretisation, Galerkin, MeshOptions
 from bemkit.scene.objects import check_laws, check_names, check_objects, check_steps, outline_of
 from bemkit.scene.unit_names import UnitNames
 from bemkit.solvers.base import ContactSolver

@@ -14,8 +14,7 @@ from typing import Any, Literal, cast
 
 from bemkit.errors import InputError, printable
 from bemkit.formulas import closest
-from bemkit.scene.discretisation import Discretisation, Galerkin
-from bemkit.scene.mesh_options import MeshOptions
+from bemkit.scene.discretisation import Discretisation, Galerkin, MeshOptions
 from bemkit.scene.registry import FILE_KINDS, RISING, SOLVERS
 from bemkit.scene.scene import Scene
 from bemkit.scene.serialisation import StructureError, structure

@@ -19,8 +19,7 @@ from bemkit.results.interior import interior_fields
 from bemkit.results.solution import Solution
 from bemkit.runs.run import run
 from bemkit.scene.conditions import Clamped, Contact, Part, Roller, Traction
-from bemkit.scene.discretisation import Discretisation
-from bemkit.scene.mesh_options import MeshOptions
+from bemkit.scene.discretisation import Discretisation, MeshOptions
 from bemkit.scene.scene import Scene
 from bemkit.testing.failure import demand
 from bemkit.testing.spaces import check_space

@@ -24,7 +24,7 @@ from bemkit.scene.conditions import (
     Traction,
 )
 from bemkit.scene.contacts import ContactPair
-from bemkit.scene.mesh_options import MeshOptions
+from bemkit.scene.discretisation import MeshOptions
 from bemkit.scene.scene import Scene
 from checks.random_scenes.draw import Draw
 

@@ -13,8 +13,7 @@ from bemkit.errors import BemkitError
 from bemkit.geometry.meshing.discretise import Algebraic, Grading, Uniform
 from bemkit.results.solution import Solution
 from bemkit.runs.run import run
-from bemkit.scene.discretisation import Galerkin
-from bemkit.scene.mesh_options import MeshOptions
+from bemkit.scene.discretisation import Galerkin, MeshOptions
 from bemkit.scene.scene import Scene
 from bemkit.studies.engine import Task
 from checks.calibration.draw import one_body, two_bodies

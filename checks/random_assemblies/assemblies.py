@@ -10,7 +10,7 @@ import numpy as np
 from bemkit.operators.linear_solvers import Automatic, DenseCholesky, LinearSolverChoice
 from bemkit.scene.body import Body
 from bemkit.scene.conditions import Part, Pressure, Traction
-from bemkit.scene.mesh_options import MeshOptions
+from bemkit.scene.discretisation import MeshOptions
 from bemkit.scene.scene import Scene
 from bemkit.solvers.alm import AugmentedLagrangian
 from bemkit.solvers.base import ContactSolver

@@ -17,8 +17,7 @@ from bemkit.scene.body_forces import BodyForce, Gravity, Heating, Rotation
 from bemkit.scene.conditions import Clamped, Contact, Part, PrescribedDisplacement, Pressure, Roller, Traction
 from bemkit.scene.contacts import ContactPair, Touching
 from bemkit.scene.copies import Copies
-from bemkit.scene.discretisation import ConstantCollocation, Discretisation, Galerkin
-from bemkit.scene.mesh_options import MeshOptions
+from bemkit.scene.discretisation import ConstantCollocation, Discretisation, Galerkin, MeshOptions
 from checks.random_scenes.draw import Draw
 
 _RATIOS = (0.0, 0.2, 0.3, 0.3, 0.3, 0.4, 0.49, 0.4999, 0.5)

@@ -25,8 +25,8 @@ from bemkit.scene.conditions import (
     Roller,
     Traction,
 )
+from bemkit.scene.discretisation import MeshOptions
 from bemkit.scene.load_history import with_scaled_loads
-from bemkit.scene.mesh_options import MeshOptions
 from bemkit.scene.plane_motion import FarField
 from bemkit.scene.scene import Scene
 from bemkit.scene.steps import Step

@@ -15,9 +15,8 @@ from bemkit.geometry.symmetry import Symmetry
 from bemkit.operators.linear_solvers import Automatic, DenseCholesky, LinearSolverChoice
 from bemkit.operators.material import Material, Plane
 from bemkit.scene.conditions import Condition, Contact, Part, PrescribedDisplacement, Pressure, Roller, Traction
-from bemkit.scene.discretisation import ConstantCollocation, Discretisation, Galerkin
+from bemkit.scene.discretisation import ConstantCollocation, Discretisation, Galerkin, MeshOptions
 from bemkit.scene.load_history import with_scaled_loads
-from bemkit.scene.mesh_options import MeshOptions
 from bemkit.scene.scene import Scene
 from bemkit.solvers.alm import AugmentedLagrangian
 from bemkit.solvers.base import ContactSolver

@@ -12,7 +12,7 @@ import pytest
 
 import bemkit as bk
 from bemkit.cli.progress import compute_with_progress
-from bemkit.result_warning import ResultWarning
+from bemkit.errors import ResultWarning
 from bemkit.scene.toml import scene_from_toml
 from bemkit.testing.independent_check import energy_fault
 from checks.random_scenes import RandomCase, random_case

@@ -26,12 +26,11 @@ import bemkit.operators.hierarchy.skeletons
 import bemkit.results.result_file
 import bemkit.runs.run
 from bemkit.cli.console import ConvergenceTable, format_size
-from bemkit.cli.exit_codes import BAD_INPUT, INACCURATE, NOT_CONVERGED, most_serious
 from bemkit.cli.main import commands, main
+from bemkit.cli.process import BAD_INPUT, INACCURATE, NOT_CONVERGED, most_serious
 from bemkit.operators.linear_solvers import Hierarchical
 from bemkit.results.result_file import read_result
-from bemkit.scene.discretisation import Galerkin
-from bemkit.scene.mesh_options import MeshOptions
+from bemkit.scene.discretisation import Galerkin, MeshOptions
 from bemkit.scene.steps import Step
 from bemkit.scene.toml import load_scene, scene_from_toml, scene_to_toml, shipped_files
 from bemkit.solvers.base import Status

@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 import bemkit as bk
-from bemkit.cli.streams import GuardedStream, PipeClosedError, StreamError, guarded_streams, print_data
+from bemkit.cli.process import GuardedStream, PipeClosedError, StreamError, guarded_streams, print_data
 from bemkit.errors import printable
 from tests.slow import slow_except
 

@@ -9,12 +9,12 @@ import pytest
 
 import bemkit as bk
 from bemkit.contact.body import ClosedVolume
-from bemkit.contact.condensation.dense_body import DenseBody
 from bemkit.contact.conditions import separated, stick
+from bemkit.contact.dense_body import DenseBody
 from bemkit.errors import InputError
 from bemkit.model.model import build_model
 from bemkit.model.prepared import prepare
-from bemkit.solvers.springs import Springs
+from bemkit.solvers.fallbacks import Springs
 from bemkit.testing import check_body, check_solution
 from tests.slow import slow_except, slow_only
 

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from bemkit.arrays import FloatArray, IntArray
-from bemkit.contact.condensation.direct_body import DirectBody
-from bemkit.contact.condensation.nodes import ContactNodes
 from bemkit.contact.conditions import LinearConditions, separated, stick
+from bemkit.contact.contact_nodes import ContactNodes
+from bemkit.contact.direct_body import DirectBody
 from bemkit.contact.equilibrium import resultant_imbalance
 from bemkit.contact.laws import Coulomb, FrictionLaw, Frictionless
 from bemkit.contact.problem import ContactProblem, ContactState

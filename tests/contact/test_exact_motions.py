@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bemkit.contact.condensation.node_coupling import resisting_none, with_work
+from bemkit.contact.contact_nodes import resisting_none, with_work
 
 EPS = np.finfo(float).eps
 

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import bemkit as bk
-from bemkit.contact.condensation.held_friction import HeldFriction
 from bemkit.contact.conditions import slip, stick
+from bemkit.contact.held_friction import HeldFriction
 from bemkit.contact.problem import ContactState, SingularResponse
 from bemkit.model.model import build_model
 from bemkit.model.prepared import prepare

@@ -9,9 +9,9 @@ import pytest
 
 import bemkit as bk
 from bemkit.contact.body import ContactState, SingularResponse
-from bemkit.contact.condensation.hierarchical_body import HierarchicalBody, hierarchical_body
-from bemkit.contact.condensation.nodes import NoContactNodesError
 from bemkit.contact.conditions import separated, stick
+from bemkit.contact.contact_nodes import NoContactNodesError
+from bemkit.contact.hierarchical_body import HierarchicalBody, hierarchical_body
 from bemkit.contact.problem import ContactProblem
 from bemkit.errors import InputError
 from bemkit.model.model import Model, build_model

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import bemkit as bk
-from bemkit.contact.condensation.hierarchical_body import HierarchicalBody
 from bemkit.contact.conditions import stick
+from bemkit.contact.hierarchical_body import HierarchicalBody
 from bemkit.model.model import build_model
 from bemkit.model.prepared import prepare
 from bemkit.operators.linear_solvers import DenseCholesky, MatrixFree

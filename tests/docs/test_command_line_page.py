@@ -14,8 +14,8 @@ import click
 import pytest
 from click.testing import CliRunner
 
-from bemkit.cli import exit_codes
 from bemkit.cli import main as cli
+from bemkit.cli import process
 from bemkit.results.tables import TABLES
 from bemkit.scene.toml import load_scene, scene_to_toml
 from bemkit.solvers.base import Status
@@ -76,12 +76,12 @@ def test_every_common_option_belongs_to_a_command() -> None:
 def test_exit_codes() -> None:
     codes = [
         0,
-        exit_codes.NOT_CONVERGED,
-        exit_codes.BAD_INPUT,
-        exit_codes.INACCURATE,
-        exit_codes.INTERRUPTED,
-        exit_codes.PIPE_CLOSED,
-        exit_codes.TERMINATED,
+        process.NOT_CONVERGED,
+        process.BAD_INPUT,
+        process.INACCURATE,
+        process.INTERRUPTED,
+        process.PIPE_CLOSED,
+        process.TERMINATED,
     ]
     assert [int(row[0]) for row in table(section(PAGE, "Exit codes"))] == codes
 

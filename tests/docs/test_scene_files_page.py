@@ -15,7 +15,7 @@ from bemkit.geometry.symmetry import Symmetry
 from bemkit.operators.material import Material
 from bemkit.scene import registry as kinds
 from bemkit.scene.conditions import Part
-from bemkit.scene.mesh_options import MeshOptions
+from bemkit.scene.discretisation import MeshOptions
 from bemkit.scene.plane_motion import FarField
 from bemkit.scene.scene import Scene
 from bemkit.scene.serialisation import structure

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 import bemkit as bk
+from bemkit.errors import ResultWarning
 from bemkit.model.contact_data import find_contact
 from bemkit.model.model import Model, build_model
 from bemkit.model.prepared import prepare
 from bemkit.model.solved_contact import contact_warnings
-from bemkit.result_warning import ResultWarning
 from bemkit.solvers.base import solve
 from tests.slow import slow_except
 

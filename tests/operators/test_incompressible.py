@@ -7,8 +7,8 @@ import pytest
 
 import bemkit as bk
 from bemkit.arrays import FloatArray
-from bemkit.contact.condensation.nodes import ContactNodes
 from bemkit.contact.conditions import separated, stick
+from bemkit.contact.contact_nodes import ContactNodes
 from bemkit.geometry import BoundaryMesh, Selection
 from bemkit.geometry.neighbours import corner_nodes
 from bemkit.geometry.spaces import LinearSpace, QuadraticSpace, dof_points

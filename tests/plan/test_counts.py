@@ -123,12 +123,12 @@ LEFT_OUT = {
         "operators.integrals.curved_geometry.fit",
     ),
     "no contact": (
-        "contact.condensation.dense_body.DenseBody.__init__",
+        "contact.dense_body.DenseBody.__init__",
         "solvers.base._Run.finish",
         "operators.forms.HypersingularForm.terms",
     ),
     "curved": ("operators.forms.HypersingularForm.terms", "operators.forms.SingleLayerForm.terms"),
-    "exterior": ("contact.condensation.dense_body.DenseBody.__init__", "operators.forms.SingleLayerForm.terms"),
+    "exterior": ("contact.dense_body.DenseBody.__init__", "operators.forms.SingleLayerForm.terms"),
 }
 
 

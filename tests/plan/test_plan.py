@@ -21,7 +21,7 @@ from bemkit.operators.steklov_poincare.cost import physical_memory
 from bemkit.plan import Plan, TooLargeError, check_elements, check_memory, make_plan
 from bemkit.scene.body_scene import BodyScene
 from bemkit.scene.conditions import Clamped, Condition, Contact, Part, PrescribedDisplacement, Roller
-from bemkit.scene.mesh_options import MeshOptions
+from bemkit.scene.discretisation import MeshOptions
 from bemkit.scene.scene import Scene
 from bemkit.scene.toml import load_scene, with_overrides
 from tests.slow import slow_only

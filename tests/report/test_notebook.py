@@ -11,8 +11,8 @@ from pathlib import Path
 import pytest
 
 import bemkit as bk
+from bemkit.errors import ResultWarning
 from bemkit.report.notebook import notebook_html
-from bemkit.result_warning import ResultWarning
 from bemkit.scene.toml import with_overrides
 from tests.report.test_page import Page
 

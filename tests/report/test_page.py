@@ -16,8 +16,8 @@ import pytest
 import bemkit as bk
 from bemkit.atomic_files import OutputFileError
 from bemkit.cli.main import main
+from bemkit.errors import ResultWarning
 from bemkit.report.page import report, save_report
-from bemkit.result_warning import ResultWarning
 from bemkit.scene.toml import with_overrides
 from tests.slow import slow_except
 

@@ -15,8 +15,7 @@ from bemkit.contact.further_laws import SlipWeakening
 from bemkit.results.citations import DRIVERS, LAW_WORKS, PACKAGE, Citations, Method, cite, entries
 from bemkit.scene.registry import LAWS, SOLVERS
 from bemkit.scene.toml import shipped_files, with_overrides
-from bemkit.solvers.solution_path import PATH_MESSAGE, SolutionPath
-from bemkit.solvers.springs import Springs
+from bemkit.solvers.fallbacks import PATH_MESSAGE, SolutionPath, Springs
 from bemkit.version import __version__
 
 ROOT = Path(__file__).parents[2]

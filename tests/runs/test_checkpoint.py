@@ -12,7 +12,7 @@ import pytest
 
 import bemkit as bk
 from bemkit.cli.main import main
-from bemkit.result_warning import ResultWarning
+from bemkit.errors import ResultWarning
 from bemkit.results.export import export_result
 from bemkit.results.load_history import LoadHistory
 from bemkit.results.result_file import ResultWriter

@@ -17,7 +17,7 @@ from bemkit.runs import load_path
 from bemkit.runs.steps import UnsolvableSceneError
 from bemkit.scene.load_history import load_steps, with_scaled_loads
 from bemkit.solvers.base import Status
-from bemkit.solvers.solution_path import SolutionPath
+from bemkit.solvers.fallbacks import SolutionPath
 from tests.failing_solver import Failing
 from tests.runs.masonry import FRICTION, wall
 

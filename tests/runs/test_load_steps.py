@@ -327,7 +327,7 @@ def test_work_adds_up() -> None:
 
 def test_laws_that_depend_on_slip_share_what_does_not_depend_on_the_law(monkeypatch: pytest.MonkeyPatch) -> None:
     """Each law of an increment is another problem; the body is asked for little more than the counted solves."""
-    from bemkit.contact.condensation.dense_body import DenseBody
+    from bemkit.contact.dense_body import DenseBody
 
     n_responses, respond = 0, DenseBody.respond
 

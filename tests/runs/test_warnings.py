@@ -15,11 +15,11 @@ import bemkit as bk
 from bemkit.cli.console import print_plan, print_summary
 from bemkit.contact.laws import Coulomb, Frictionless
 from bemkit.contact.obstacle import Gap
+from bemkit.errors import ResultWarning, first_of_each_kind, without_duplicates
 from bemkit.formulas import Expression
 from bemkit.geometry.shapes import Rectangle
 from bemkit.operators.material import Material
 from bemkit.plan import make_plan
-from bemkit.result_warning import ResultWarning, first_of_each_kind, without_duplicates
 from bemkit.results.result_file import read_result, write_result
 from bemkit.results.solution import Solution
 from bemkit.results.tables import to_json
@@ -27,8 +27,7 @@ from bemkit.results.warnings import FEWEST_NODES, find_warnings
 from bemkit.runs.adaptive import run_adaptive
 from bemkit.runs.run import run
 from bemkit.scene.conditions import Clamped, Contact, Part, PrescribedDisplacement, Traction
-from bemkit.scene.discretisation import Galerkin
-from bemkit.scene.mesh_options import MeshOptions
+from bemkit.scene.discretisation import Galerkin, MeshOptions
 from bemkit.scene.scene import Scene
 from bemkit.scene.toml import load_scene, with_overrides
 from bemkit.solvers.active_sets import NodeStatus

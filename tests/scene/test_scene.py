@@ -14,7 +14,7 @@ from bemkit.formulas import Expression
 from bemkit.geometry.shapes import Polygon, Rectangle
 from bemkit.operators.material import Material
 from bemkit.scene.conditions import Clamped, Contact, Part, PrescribedDisplacement, Pressure, Roller, Traction
-from bemkit.scene.mesh_options import MeshOptions
+from bemkit.scene.discretisation import MeshOptions
 from bemkit.scene.scene import Scene
 
 FOUNDATION = Part("foundation", Contact(RigidHalfPlane()), ("bottom",))

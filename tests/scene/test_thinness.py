@@ -8,7 +8,7 @@ import pytest
 import bemkit as bk
 from bemkit.geometry import discretise
 from bemkit.plan import make_plan
-from bemkit.scene.mesh_options import thicknesses
+from bemkit.scene.discretisation import thicknesses
 
 
 def warned(shape: object, n: int, discretisation: object) -> tuple[str, ...]:

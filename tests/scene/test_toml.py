@@ -20,17 +20,14 @@ from bemkit.geometry.meshing.discretise import Algebraic, Geometric, Uniform
 from bemkit.geometry.shapes import Disk, ExteriorOf, PlateWithHole, Polygon, Rectangle, Ring, Sector
 from bemkit.operators.material import Material, Plane
 from bemkit.scene.conditions import Clamped, Contact, Part, PrescribedDisplacement, Pressure, Roller, Traction
-from bemkit.scene.discretisation import ConstantCollocation, Galerkin
-from bemkit.scene.mesh_options import MeshOptions
+from bemkit.scene.discretisation import ConstantCollocation, Galerkin, MeshOptions
 from bemkit.scene.scene import Scene
 from bemkit.scene.serialisation import StructureError
 from bemkit.scene.toml import SceneError, load_scene, scene_from_toml, scene_to_toml, shipped_scenes, with_overrides
 from bemkit.solvers.alm import AugmentedLagrangian, BoundUpdate, InnerNewton
-from bemkit.solvers.fallbacks import Fallbacks
+from bemkit.solvers.fallbacks import Fallbacks, SolutionPath, Springs
 from bemkit.solvers.fixed_point import FixedPoint
 from bemkit.solvers.lemke import LemkePivoting
-from bemkit.solvers.solution_path import SolutionPath
-from bemkit.solvers.springs import Springs
 from bemkit.solvers.ssn import SemismoothNewton
 
 BLOCK = """

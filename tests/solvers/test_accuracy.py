@@ -11,13 +11,12 @@ from bemkit.contact.problem import ContactProblem
 from bemkit.solvers.active_sets import ActiveSets, ProjectionEquations
 from bemkit.solvers.alm import AugmentedLagrangian
 from bemkit.solvers.base import Status, solve
-from bemkit.solvers.fallbacks import Fallbacks
+from bemkit.solvers.fallbacks import Fallbacks, SolutionPath
 from bemkit.solvers.fixed_point import FixedPoint
 from bemkit.solvers.homotopy import why_no_path
 from bemkit.solvers.lemke import LemkePivoting
 from bemkit.solvers.newton import negligible
 from bemkit.solvers.progress import OuterIterate
-from bemkit.solvers.solution_path import SolutionPath
 from bemkit.solvers.ssn import SemismoothNewton
 from tests.handmade import Inexact, block_body, block_problem, hard_problem
 

@@ -9,11 +9,9 @@ from bemkit.contact.further_laws import CohesiveCoulomb
 from bemkit.contact.laws import Coulomb
 from bemkit.contact.problem import ContactProblem
 from bemkit.solvers.base import Iterate, Status, solve
-from bemkit.solvers.fallbacks import Fallbacks, drivers_at_work
+from bemkit.solvers.fallbacks import Fallbacks, SolutionPath, Springs, drivers_at_work
 from bemkit.solvers.fixed_point import FixedPoint
 from bemkit.solvers.lemke import LemkePivoting
-from bemkit.solvers.solution_path import SolutionPath
-from bemkit.solvers.springs import Springs
 from bemkit.solvers.ssn import SemismoothNewton
 from bemkit.testing import check_solver
 from tests.contact.joined.blocks import arch

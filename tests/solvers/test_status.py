@@ -10,11 +10,9 @@ from bemkit.contact.laws import Coulomb, FrictionLaw
 from bemkit.contact.problem import ContactProblem, ContactState, DenseBody, LawError, LinearBody, SingularResponse
 from bemkit.solvers.alm import AugmentedLagrangian, InnerNewton
 from bemkit.solvers.base import ContactFailure, Status, solve
-from bemkit.solvers.fallbacks import Fallbacks
+from bemkit.solvers.fallbacks import Fallbacks, SolutionPath, Springs
 from bemkit.solvers.fixed_point import FixedPoint
 from bemkit.solvers.lemke import LemkePivoting
-from bemkit.solvers.solution_path import SolutionPath
-from bemkit.solvers.springs import Springs
 from bemkit.solvers.ssn import SemismoothNewton
 from tests.handmade import Inexact, assert_solves, block_body, block_problem, hard_problem, random_problem
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from bemkit.arrays import FloatArray
-from bemkit.contact.condensation.nodes import ContactNodes
+from bemkit.contact.contact_nodes import ContactNodes
 from bemkit.contact.half_plane.surface_body import SurfaceBody
 from bemkit.operators.half_plane.elasticity import HalfPlaneElasticity
 from bemkit.operators.half_plane.surface import SurfaceElasticity

@@ -17,8 +17,8 @@ import numpy as np
 
 from bemkit.arrays import ComplexArray, FloatArray, IntArray
 from bemkit.contact.body import ContactState, FreeMotion, LinearBody
-from bemkit.contact.condensation.nodes import ContactNodes
 from bemkit.contact.conditions import LinearConditions, separated
+from bemkit.contact.contact_nodes import ContactNodes
 from bemkit.contact.equilibrium import Imbalance
 from bemkit.contact.reduced_conditions import ReducedConditions, as_complex, as_pairs
 from bemkit.geometry.spaces import dof_points

@@ -11,7 +11,7 @@ from scipy import sparse
 
 from bemkit.arrays import BoolArray, FloatArray, IntArray
 from bemkit.contact.body import ContactState
-from bemkit.contact.condensation.held_friction import HeldFriction
+from bemkit.contact.held_friction import HeldFriction
 from bemkit.contact.joined.member import Member, Shape, blocks_of_members, deformation, shapes_of
 from bemkit.errors import InputError
 from bemkit.operators.null_space import null_space

@@ -9,7 +9,7 @@ import numpy as np
 from scipy import sparse
 
 from bemkit.arrays import FloatArray
-from bemkit.contact.condensation.dense_body import DenseBody, FollowingTangents
+from bemkit.contact.dense_body import DenseBody, FollowingTangents
 from bemkit.contact.joined.coupled_members import CoupledMembers
 from bemkit.contact.joined.member import Member
 from bemkit.operators.linear_solvers import DenseLU

@@ -10,8 +10,8 @@ import numpy as np
 
 from bemkit.arrays import FloatArray
 from bemkit.contact.body import ContactState, FreeMotion, LinearBody, SingularResponse
-from bemkit.contact.condensation.dense_body import DenseBody
 from bemkit.contact.conditions import LinearConditions, RigidMotions, as_dense
+from bemkit.contact.dense_body import DenseBody
 from bemkit.contact.equilibrium import NOISE_FACTOR, Imbalance
 from bemkit.contact.joined.coupled_members import CoupledMembers
 from bemkit.contact.joined.dense_form import RelativeStiffness

@@ -10,8 +10,7 @@ from bemkit.formulas import closest
 from bemkit.plan import make_plan
 from bemkit.reference.compare import MEASURES, Reference, over_resolved
 from bemkit.reference.shipped import find_reference
-from bemkit.scene.discretisation import Discretisation, Galerkin
-from bemkit.scene.mesh_options import MeshOptions
+from bemkit.scene.discretisation import Discretisation, Galerkin, MeshOptions
 from bemkit.scene.registry import RISING
 from bemkit.scene.scene import Scene
 from bemkit.scene.serialisation import structure

@@ -17,8 +17,7 @@ from bemkit.errors import InputError
 from bemkit.geometry.meshing.discretise import Algebraic, Grading, Uniform
 from bemkit.reference.compare import MEASURES, Reference, errors_of, sampled_fields
 from bemkit.runs.run import run as solve
-from bemkit.scene.discretisation import Discretisation, Galerkin
-from bemkit.scene.mesh_options import MeshOptions
+from bemkit.scene.discretisation import Discretisation, Galerkin, MeshOptions
 from bemkit.scene.registry import DISCRETISATIONS, SOLVERS
 from bemkit.scene.scene import Scene
 from bemkit.solvers.base import ContactSolver

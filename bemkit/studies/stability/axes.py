@@ -25,8 +25,8 @@ from bemkit.operators.material import Material
 from bemkit.results.solution import Solution
 from bemkit.scene.body import Body
 from bemkit.scene.conditions import Contact, Part, Pressure, Traction
+from bemkit.scene.discretisation import MeshOptions
 from bemkit.scene.load_history import with_changed_steps
-from bemkit.scene.mesh_options import MeshOptions
 from bemkit.scene.plane_motion import FarField
 from bemkit.scene.scene import Scene
 from bemkit.scene.transform import AffineMap, transformed_scene, with_gap_offset, with_turned_loads

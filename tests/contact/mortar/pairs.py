@@ -9,7 +9,7 @@ import numpy as np
 from scipy.sparse import csr_matrix
 
 from bemkit.arrays import FloatArray, IntArray
-from bemkit.contact.condensation.dense_body import DenseBody
+from bemkit.contact.dense_body import DenseBody
 from bemkit.contact.mortar.coupling import MortarCoupling, couple
 from bemkit.contact.mortar.sides import ContactSide
 from bemkit.geometry.curves import Arc, Curve, Segment

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from bemkit.arrays import FloatArray
-from bemkit.contact.condensation.dense_body import DenseBody
+from bemkit.contact.dense_body import DenseBody
 from bemkit.contact.laws import Coulomb, Frictionless
 from bemkit.contact.problem import ContactProblem
 from bemkit.operators.material import Material

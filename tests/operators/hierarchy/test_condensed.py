@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import bemkit as bk
-from bemkit.contact.condensation.direct_body import DirectBody
+from bemkit.contact.direct_body import DirectBody
 from bemkit.model.model import build_model
 from bemkit.model.prepared import Prepared, prepare
 from bemkit.operators.hierarchy.system import HierarchicalSystem

@@ -23,8 +23,7 @@ from bemkit.scene.body_forces import Gravity
 from bemkit.scene.conditions import Clamped, Contact, Part, PrescribedDisplacement, Pressure, Traction
 from bemkit.scene.contacts import ContactPair, Touching
 from bemkit.scene.copies import CircleCopies
-from bemkit.scene.discretisation import Galerkin
-from bemkit.scene.mesh_options import MeshOptions
+from bemkit.scene.discretisation import Galerkin, MeshOptions
 from bemkit.scene.scene import Scene
 from bemkit.scene.steps import Step
 from bemkit.scene.toml import with_overrides

@@ -31,7 +31,7 @@ from bemkit.reference import (
 from bemkit.results.solution import Solution
 from bemkit.runs.run import run
 from bemkit.scene.conditions import Contact, Part, PrescribedDisplacement
-from bemkit.scene.mesh_options import MeshOptions
+from bemkit.scene.discretisation import MeshOptions
 from bemkit.scene.plane_motion import FarField
 from bemkit.scene.scene import Scene
 from bemkit.scene.steps import Step

@@ -29,8 +29,7 @@ from bemkit.scene.body import Body
 from bemkit.scene.body_forces import Gravity
 from bemkit.scene.conditions import Contact, Free, Part, PrescribedDisplacement, Pressure, Roller, Traction
 from bemkit.scene.contacts import ContactPair
-from bemkit.scene.discretisation import Galerkin
-from bemkit.scene.mesh_options import MeshOptions
+from bemkit.scene.discretisation import Galerkin, MeshOptions
 from bemkit.scene.scene import Scene
 from bemkit.scene.toml import load_scene, with_overrides
 from bemkit.studies.verification.case import Case, Quantity

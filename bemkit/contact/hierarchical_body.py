@@ -9,10 +9,10 @@ import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray, IntArray, spread_fractions
 from bemkit.contact.body import ContactState, FreeMotion, LinearBody, SingularResponse
-from bemkit.contact.condensation.held_friction import HeldFriction
-from bemkit.contact.condensation.nodes import ContactNodes, NoContactNodesError, free_motions, held_nodes
 from bemkit.contact.conditions import LinearConditions, stick
+from bemkit.contact.contact_nodes import ContactNodes, NoContactNodesError, free_motions, held_nodes
 from bemkit.contact.equilibrium import NOISE_FACTOR, Imbalance, resultant_imbalance
+from bemkit.contact.held_friction import HeldFriction
 from bemkit.geometry.spaces import dof_points
 from bemkit.operators.counts import OperationCounts
 from bemkit.operators.hierarchy.system import NodeConditions
@@ -42,7 +42,7 @@ class ElementConditions:
     of_traction, of_displacement : (n_contact, 2, 2) arrays
         ``sigma = of_traction @ t``, where t is the force of an element divided by its weight, and
         ``u = of_displacement @ u_local``. If a support holds a node in one direction, sigma_n is the effective
-        pressure in the other direction, see `bemkit.contact.condensation.held_friction`, and sigma_t is zero.
+        pressure in the other direction, see `bemkit.contact.held_friction`, and sigma_t is zero.
     is_held : (n_contact,) bool array
         Nodes that a support holds in one direction.
     support : (n_contact, 2) array

@@ -17,7 +17,7 @@ from bemkit.errors import InputError
 from bemkit.operators.steklov_poincare.nodal_conditions import SLIDES
 
 if TYPE_CHECKING:
-    from bemkit.contact.condensation.held_friction import HeldFriction
+    from bemkit.contact.held_friction import HeldFriction
 
 _SMALLEST_RCOND = 1e-13
 """Below this reciprocal condition number of a row-scaled system its matrix counts as singular. The condensed stiffness
@@ -40,7 +40,7 @@ class FollowingTangents:
         Indices of the contact nodes, ascending.
     response, at_rest : (n_following, n) array [-], (n_following,) array [m]
         Their tangential displacements are ``at_rest + response @ unknowns``. Friction may act where the normal
-        displacement of the node itself is the only unknown; see `bemkit.contact.condensation.held_friction`.
+        displacement of the node itself is the only unknown; see `bemkit.contact.held_friction`.
     """
 
     nodes: IntArray
@@ -140,7 +140,7 @@ class DenseBody(LinearBody):
                 normal = int(np.searchsorted(self.unknown_dofs, 2 * node))
                 if not np.delete(row, normal).any():
                     slope[node] = row[normal]
-        from bemkit.contact.condensation.held_friction import HeldFriction
+        from bemkit.contact.held_friction import HeldFriction
 
         return HeldFriction(self.tangent_follows, slope)
 

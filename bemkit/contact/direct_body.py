@@ -13,9 +13,8 @@ import numpy as np
 
 from bemkit.arrays import FloatArray
 from bemkit.contact.body import ContactState
-from bemkit.contact.condensation.dense_body import DenseBody
-from bemkit.contact.condensation.node_coupling import NodeCoupling, resisting_none, with_work
-from bemkit.contact.condensation.nodes import ContactNodes
+from bemkit.contact.contact_nodes import ContactNodes, NodeCoupling, resisting_none, with_work
+from bemkit.contact.dense_body import DenseBody
 from bemkit.contact.equilibrium import NOISE_FACTOR, Imbalance, Unbalanced, resultant_imbalance, round_off_of
 from bemkit.geometry.spaces import BoundarySpace, dof_points
 from bemkit.operators.counts import OperationCounts
