@@ -184,7 +184,7 @@ def without_body_forces(elastic: SteklovPoincare, inside: ForcesInside | None) -
     from bemkit.operators.steklov_poincare.forces_inside import ElasticityWithBodyForces
 
     assert isinstance(elastic, ElasticityWithBodyForces)
-    return elastic.without_body_forces
+    return elastic.elastic
 
 
 def given_data(conditions: NodalConditions, force: FloatArray, inside: ForcesInside | None) -> GivenData:

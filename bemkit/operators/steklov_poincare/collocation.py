@@ -295,19 +295,6 @@ class MixedSystem:
             base=base,
         )
 
-    def recovered(self, loaded: _MixedMap, retained: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return displacement and force of all elements under retained unknowns (n_retained,)."""
-        is_free = self._conditions.is_free.ravel()
-        unknowns = loaded.at_rest + self._response @ retained
-        local = np.where(is_free, unknowns, loaded.given)
-        local[self._retained] = retained[: self._retained.size]
-        force = self._weights * np.where(is_free, loaded.traction, unknowns)
-        return self._conditions.in_plane(local), self._conditions.in_plane(force)
-
-    def followed(self, loaded: _MixedMap, directions: IntArray) -> tuple[FloatArray, FloatArray]:
-        """Return response and displacement at rest of free directions; see `CondensedMap.follow`."""
-        return self._response[directions], loaded.at_rest[directions]
-
     def under(self, base: _Solved, force: FloatArray, displacement: FloatArray) -> CondensedMap:
         """Return the condensed map under other data; a multiple of the last data takes no other solution."""
         data, work = GivenData.of(self._conditions, force, displacement), OperationCounts()
@@ -342,7 +329,13 @@ class _MixedMap(CondensedMap):
 
     def recover(self, retained_displacement: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return displacement and force of all elements."""
-        return self.system.recovered(self, retained_displacement)
+        system, conditions = self.system, self.system._conditions
+        is_free = conditions.is_free.ravel()
+        unknowns = self.at_rest + system._response @ retained_displacement
+        local = np.where(is_free, unknowns, self.given)
+        local[system._retained] = retained_displacement[: system._retained.size]
+        force = system._weights * np.where(is_free, self.traction, unknowns)
+        return conditions.in_plane(local), conditions.in_plane(force)
 
     def under(self, force: FloatArray, displacement: FloatArray) -> CondensedMap:
         """Return the map under other loads."""
@@ -350,7 +343,7 @@ class _MixedMap(CondensedMap):
 
     def follow(self, directions: IntArray) -> tuple[FloatArray, FloatArray]:
         """Return response and displacement at rest of free directions."""
-        return self.system.followed(self, directions)
+        return self.system._response[directions], self.at_rest[directions]
 
 
 def _product(columns: FloatArray, values: FloatArray) -> FloatArray:

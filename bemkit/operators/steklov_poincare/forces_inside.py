@@ -17,15 +17,12 @@ from bemkit.arrays import FloatArray, IntArray, blended
 from bemkit.geometry.local_values import values_on_elements
 from bemkit.geometry.quadrature import gauss_legendre
 from bemkit.geometry.spaces import BoundarySpace, dof_points
-from bemkit.operators.linear_solvers import Tag
-from bemkit.operators.material import Material
 from bemkit.operators.rigid_modes import without_motion
 from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions, integrate_traction
-from bemkit.operators.steklov_poincare.protocol import CondensedMap, SteklovPoincare
+from bemkit.operators.steklov_poincare.protocol import CondensedMap, WrappedMap
 
 if TYPE_CHECKING:
     from bemkit.operators.particular_solutions import ParticularSolution
-    from bemkit.operators.steklov_poincare.cost import BodyCase, BodyCost
 
 _MORE_POINTS = 5
 """Gauss points beyond the degree of the tractions."""
@@ -161,54 +158,27 @@ def condensed_under(
 
 
 @dataclass(frozen=True, eq=False)
-class ElasticityWithBodyForces:
-    """An elastic map under body forces and heat; fulfils `SteklovPoincare`.
+class ElasticityWithBodyForces(WrappedMap):
+    """A map of a bounded body under body forces and heat; fulfils `SteklovPoincare`.
 
     Parameters
     ----------
-    without_body_forces : SteklovPoincare
-        Any map of a bounded body.
+    elastic : SteklovPoincare
+        The map without them.
     inside : ForcesInside
         Values on the displacement space of the map.
     """
 
-    without_body_forces: SteklovPoincare
     inside: ForcesInside
-
-    @property
-    def material(self) -> Material:
-        """The material of the body."""
-        return self.without_body_forces.material
-
-    @property
-    def displacement_space(self) -> BoundarySpace:
-        """The space of the displacements."""
-        return self.without_body_forces.displacement_space
-
-    @property
-    def traction_space(self) -> BoundarySpace:
-        """The space of the tractions."""
-        return self.without_body_forces.traction_space
-
-    @property
-    def tags(self) -> frozenset[Tag]:
-        """Tags of the map without body forces."""
-        return self.without_body_forces.tags
-
-    def cost(self, case: BodyCase) -> BodyCost:
-        """Return the costs of the map without body forces."""
-        return self.without_body_forces.cost(case)
 
     def condense(self, conditions: NodalConditions, force: FloatArray) -> CondensedMap:
         """Condense the map without body forces, then add them; see `SteklovPoincare.condense`."""
-        return self.inside.add_to(
-            self.without_body_forces.condense(*self.inside.left_of(conditions, force)), conditions
-        )
+        return self.inside.add_to(self.elastic.condense(*self.inside.left_of(conditions, force)), conditions)
 
     def element_tractions(self, displacement: FloatArray, force: FloatArray) -> FloatArray:
         """Return all tractions (n_elements, n_local, 2) [Pa]; those of the particular solution are projected."""
         inside = self.inside
-        rest = self.without_body_forces.element_tractions(displacement - inside.displacement, force - inside.force)
+        rest = self.elastic.element_tractions(displacement - inside.displacement, force - inside.force)
         return rest + self._particular_tractions
 
     @cached_property
@@ -238,7 +208,7 @@ class ElasticityWithBodyForces:
         nodal forces f_h work on the interpolant of u_p; the tractions t_h, whose normals are interpolated, work on the
         small interpolation error.
         """
-        traction = self.without_body_forces.element_tractions(displacement, force)
+        traction = self.elastic.element_tractions(displacement, force)
         at_nodes, rest, of_heat = self._work_on_particular
         strained = without_motion(self.traction_space.mesh, dof_points(self.displacement_space), displacement)
         pairs = (force, at_nodes), (traction, rest), (of_heat, strained)

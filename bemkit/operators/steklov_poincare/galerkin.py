@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
 
-from bemkit.arrays import FloatArray, IntArray, read_only
+from bemkit.arrays import FloatArray, IntArray
 from bemkit.errors import InputError
 from bemkit.geometry.local_values import values_on_elements
 from bemkit.geometry.mesh import BoundaryMesh
@@ -16,11 +16,9 @@ from bemkit.geometry.quadrature import gauss_legendre
 from bemkit.geometry.reflection import antisymmetric_dofs
 from bemkit.geometry.spaces import BoundarySpace, ConstantSpace, LinearSpace, dof_points, element_nodes
 from bemkit.geometry.vectors import turned_right
-from bemkit.operators.counts import OperationCounts
 from bemkit.operators.forms import mass_matrix
 from bemkit.operators.linear_solvers import (
     Automatic,
-    Cholesky,
     DenseCholesky,
     Hierarchical,
     LinearSolver,
@@ -32,40 +30,16 @@ from bemkit.operators.linear_solvers import (
 from bemkit.operators.material import Material
 from bemkit.operators.rigid_modes import traction_free_modes
 from bemkit.operators.steklov_poincare.cost import BodyCase, BodyCost, galerkin_cost
-from bemkit.operators.steklov_poincare.layer_operators import assemble_layers, dilatation_of
+from bemkit.operators.steklov_poincare.layer_operators import GalerkinFactors, dilatation_of, galerkin_factors
 from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions, integrate_traction
 from bemkit.operators.steklov_poincare.protocol import BoundaryMap, CondensedMap
 from bemkit.operators.steklov_poincare.schur import SchurCondensation
 from bemkit.operators.steklov_poincare.volume_constraint import Volume
 
 _DIRECT = DenseCholesky()
-_MIRRORED = 128
-"""Rows that are mirrored at a time, to stay in the cache."""
 _NEARLY_INCOMPRESSIBLE = 0.49
 """Poisson's ratio above which displacements hardly determine the pressure in a curved hole."""
 _HELD_BODY = "the body held by its supports and its contact boundary"
-
-
-@dataclass(frozen=True, eq=False)
-class GalerkinFactors:
-    """The matrices that a Galerkin map computes once.
-
-    Parameters
-    ----------
-    matrix : (n_dofs, n_dofs) array [Pa]
-        Symmetric S without the uniform pressure.
-    single_layer : Cholesky
-        V = L L^T.
-    whitened_trace : (n_traction_dofs, n_dofs) array
-        L^-1 (1/2 M + K), projected on tractions without a resultant.
-    work : OperationCounts
-        Operations of assembly and factorisation.
-    """
-
-    matrix: FloatArray
-    single_layer: Cholesky
-    whitened_trace: FloatArray
-    work: OperationCounts = field(default_factory=OperationCounts)
 
 
 class GalerkinElasticity(BoundaryMap):
@@ -128,9 +102,7 @@ class GalerkinElasticity(BoundaryMap):
     @cached_property
     def factors(self) -> GalerkinFactors:
         """Matrices of the operator, computed on first use."""
-        layers = assemble_layers(self.displacement_space, self.traction_space, self.material, self._pressures)
-        matrix = _symmetric_sum(layers.hypersingular, layers.whitened_trace)
-        return GalerkinFactors(matrix, layers.single_layer, layers.whitened_trace, layers.work)
+        return galerkin_factors(self.displacement_space, self.traction_space, self.material, self._pressures)
 
     @cached_property
     def _pressures(self) -> FloatArray:
@@ -262,18 +234,3 @@ class GalerkinElasticity(BoundaryMap):
         true_mean = turned_right(mesh.end - mesh.start) / mesh.lengths[:, None]
         shifted: FloatArray = normals + (true_mean - mean)[:, None]
         return shifted
-
-
-def _symmetric_sum(hyper: FloatArray, whitened_trace: FloatArray) -> FloatArray:
-    """Return the symmetric `hyper` plus whitened_trace^T whitened_trace, read-only; `hyper` is overwritten."""
-    from scipy.linalg.blas import dsyrk
-
-    # BLAS computes one triangle (above the diagonal in row-major order), which is then mirrored
-    column_major = hyper.T if hyper.flags.c_contiguous else hyper
-    matrix: FloatArray = dsyrk(1.0, whitened_trace.T, beta=1.0, c=column_major, lower=1, overwrite_c=1).T
-    for begin in range(0, len(matrix), _MIRRORED):
-        block, after = slice(begin, begin + _MIRRORED), slice(begin + _MIRRORED, None)
-        matrix[after, block] = matrix[block, after].T
-        matrix[block, block] = np.triu(matrix[block, block]) + np.triu(matrix[block, block], 1).T
-    read_only(matrix)
-    return matrix

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bemkit.arrays import BoolArray, FloatArray
+from bemkit.arrays import BoolArray, FloatArray, read_only
 from bemkit.geometry.reflection import antisymmetric_dofs
 from bemkit.geometry.spaces import BoundarySpace, dof_points
 from bemkit.operators.assembly import assemble_together
@@ -21,32 +21,36 @@ from bemkit.operators.linear_solvers import Cholesky, multiply, subtract_product
 from bemkit.operators.material import Material
 from bemkit.operators.rigid_modes import traction_free_modes
 
+_MIRRORED = 128
+"""Rows that are mirrored at a time, to stay in the cache."""
+
 
 @dataclass(frozen=True, eq=False)
-class Layers:
-    """Operators of S = W + B^T V^-1 B, with V inverted on tractions without a resultant or a uniform pressure.
+class GalerkinFactors:
+    """The matrices that a Galerkin map computes once.
 
     Parameters
     ----------
+    matrix : (n_dofs, n_dofs) array [Pa]
+        Symmetric S = W + B^T V^-1 B without the uniform pressure.
     single_layer : Cholesky
         V = L L^T.
     whitened_trace : (n_traction_dofs, n_dofs) array
         L^-1 B with B = 1/2 M + K, projected on tractions without a resultant.
-    hypersingular : (n_dofs, n_dofs) array
-        W.
     work : OperationCounts
+        Operations of assembly and factorisation.
     """
 
+    matrix: FloatArray
     single_layer: Cholesky
     whitened_trace: FloatArray
-    hypersingular: FloatArray
     work: OperationCounts
 
 
-def assemble_layers(
+def galerkin_factors(
     displacements: BoundarySpace, tractions: BoundarySpace, material: Material, pressures: FloatArray
-) -> Layers:
-    """Assemble V, K and W of a map, factor V and solve with it.
+) -> GalerkinFactors:
+    """Assemble V, K and W of a map, factor V and form S.
 
     Parameters
     ----------
@@ -57,9 +61,9 @@ def assemble_layers(
 
     Returns
     -------
-    Layers
-        Operators on tractions t with <V n, t> = 0, for a compressible body with normals n; n are the tractions of its
-        dilatation.
+    GalerkinFactors
+        V is inverted on tractions t without a resultant or a uniform pressure, and with <V n, t> = 0 for a compressible
+        body with normals n; n are the tractions of its dilatation.
     """
     u, t, mesh = displacements, tractions, displacements.mesh
     single = SingleLayerForm(t, t, material)
@@ -84,6 +88,7 @@ def assemble_layers(
     trace = _without(k, at_rest)
     del k
     hyper = _without(_without(w, at_rest).T, at_rest).T
+    del w
     dilatation = dilatation_of(u)[:, None][:, : int(is_compressible)]
     excluded = np.column_stack([resultants, annihilated, trace @ dilatation])
     # L^-T maps the orthogonal complement of this basis to the tractions without a resultant
@@ -93,7 +98,21 @@ def assemble_layers(
         subtract_product(whitened.T, multiply(whitened.T, basis), basis)
     n_solved = excluded.shape[1] + whitened.shape[1]
     work += OperationCounts(factorisations=(factor.factorisation,), right_hand_sides=n_solved)
-    return Layers(factor, whitened, hyper, work)
+    return GalerkinFactors(_symmetric_sum(hyper, whitened), factor, whitened, work)
+
+
+def _symmetric_sum(hyper: FloatArray, whitened_trace: FloatArray) -> FloatArray:
+    """Return the symmetric `hyper` plus whitened_trace^T whitened_trace, read-only; `hyper` is overwritten."""
+    from scipy.linalg.blas import dsyrk
+
+    # BLAS computes one triangle (above the diagonal in row-major order), which is then mirrored
+    column_major = hyper.T if hyper.flags.c_contiguous else hyper
+    matrix: FloatArray = dsyrk(1.0, whitened_trace.T, beta=1.0, c=column_major, lower=1, overwrite_c=1).T
+    for begin in range(0, len(matrix), _MIRRORED):
+        block, after = slice(begin, begin + _MIRRORED), slice(begin + _MIRRORED, None)
+        matrix[after, block] = matrix[block, after].T
+        matrix[block, block] = np.triu(matrix[block, block]) + np.triu(matrix[block, block], 1).T
+    return read_only(matrix)
 
 
 def dilatation_of(space: BoundarySpace) -> FloatArray:

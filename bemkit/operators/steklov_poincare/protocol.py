@@ -103,6 +103,43 @@ class BoundaryMap:
         return np.zeros(0)
 
 
+@dataclass(frozen=True, eq=False)
+class WrappedMap(BoundaryMap):
+    """Base of maps that solve with another map.
+
+    Parameters
+    ----------
+    elastic : SteklovPoincare
+        The other map.
+    """
+
+    elastic: SteklovPoincare
+
+    @property
+    def material(self) -> Material:
+        """The material of the body."""
+        return self.elastic.material
+
+    @property
+    def displacement_space(self) -> BoundarySpace:
+        """The space of the displacements."""
+        return self.elastic.displacement_space
+
+    @property
+    def traction_space(self) -> BoundarySpace:
+        """The space of the tractions."""
+        return self.elastic.traction_space
+
+    @property
+    def tags(self) -> frozenset[Tag]:
+        """Tags of the other map."""
+        return self.elastic.tags
+
+    def cost(self, case: BodyCase) -> BodyCost:
+        """Return the costs of the other map."""
+        return self.elastic.cost(case)
+
+
 class SteklovPoincare(Protocol):
     """Map of an elastic body from boundary displacements to nodal forces.
 

@@ -9,20 +9,19 @@ import numpy as np
 
 from bemkit.arrays import FloatArray, IntArray
 from bemkit.errors import InputError
-from bemkit.geometry.spaces import BoundarySpace, dof_points
+from bemkit.geometry.spaces import dof_points
 from bemkit.operators.counts import OperationCounts
 from bemkit.operators.linear_solvers import Tag
-from bemkit.operators.material import Material
 from bemkit.operators.rigid_modes import rigid_motions
 from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions
-from bemkit.operators.steklov_poincare.protocol import BoundaryMap, CondensedMap, SteklovPoincare
+from bemkit.operators.steklov_poincare.protocol import CondensedMap, SteklovPoincare, WrappedMap
 
 if TYPE_CHECKING:
     from bemkit.operators.steklov_poincare.cost import BodyCase, BodyCost
 
 
 @dataclass(frozen=True, eq=False)
-class RigidlyConnected(BoundaryMap):
+class RigidlyConnected(WrappedMap):
     """An elastic map with rigid connections; fulfils `SteklovPoincare`.
 
     The wrapped map takes the nodes of each connection as fixed. The three rigid motions q of a connection are unknown.
@@ -33,8 +32,6 @@ class RigidlyConnected(BoundaryMap):
     elastic : SteklovPoincare
         The wrapped map; symmetric.
     """
-
-    elastic: SteklovPoincare
 
     @classmethod
     def of(cls, elastic: SteklovPoincare, method: str) -> RigidlyConnected:
@@ -52,31 +49,11 @@ class RigidlyConnected(BoundaryMap):
             )
         return cls(elastic)
 
-    @property
-    def tags(self) -> frozenset[Tag]:
-        """Tags of the wrapped map."""
-        return self.elastic.tags
-
     def cost(self, case: BodyCase) -> BodyCost:
         """Return the cost of the wrapped map and of the responses to motions of connections."""
-        cost = self.elastic.cost(case)
+        cost = super().cost(case)
         responses = OperationCounts(right_hand_sides=3 * len(case.conditions.connected))
         return replace(cost, work=cost.work + responses)
-
-    @property
-    def material(self) -> Material:
-        """The material of the body."""
-        return self.elastic.material
-
-    @property
-    def displacement_space(self) -> BoundarySpace:
-        """The space of the displacements."""
-        return self.elastic.displacement_space
-
-    @property
-    def traction_space(self) -> BoundarySpace:
-        """The space of the tractions."""
-        return self.elastic.traction_space
 
     def condense(self, conditions: NodalConditions, force: FloatArray) -> CondensedMap:
         """Condense the map and eliminate the motions of its connections; see `SteklovPoincare.condense`."""

@@ -102,21 +102,6 @@ class SchurCondensation:
             pressure=pressure,
         )
 
-    def recovered(self, loaded: _SchurMap, retained: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return displacement and force of all nodes under retained unknowns (n_retained,)."""
-        local = np.empty(len(self.matrix))
-        local[self._fixed], local[self._retained] = loaded.prescribed, retained[: self._retained.size]
-        local[self._free] = loaded.at_rest + self._response @ retained
-        displacement = self.conditions.in_plane(local)
-        force = self.matrix @ displacement.ravel()
-        force += self.volume.change @ (loaded.pressure + self._pressures @ retained)
-        return displacement, force.reshape(-1, 2)
-
-    def followed(self, loaded: _SchurMap, directions: IntArray) -> tuple[FloatArray, FloatArray]:
-        """Return response and displacement at rest of free directions; see `CondensedMap.follow`."""
-        rows = np.searchsorted(self._free, directions)
-        return self._response[rows], loaded.at_rest[rows]
-
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class _SchurMap(CondensedMap):
@@ -138,7 +123,14 @@ class _SchurMap(CondensedMap):
 
     def recover(self, retained_displacement: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return displacement and force of all nodes."""
-        return self.condensation.recovered(self, retained_displacement)
+        body = self.condensation
+        local = np.empty(len(body.matrix))
+        local[body._fixed], local[body._retained] = self.prescribed, retained_displacement[: body._retained.size]
+        local[body._free] = self.at_rest + body._response @ retained_displacement
+        displacement = body.conditions.in_plane(local)
+        force = body.matrix @ displacement.ravel()
+        force += body.volume.change @ (self.pressure + body._pressures @ retained_displacement)
+        return displacement, force.reshape(-1, 2)
 
     def under(self, force: FloatArray, displacement: FloatArray) -> CondensedMap:
         """Return the map under other loads."""
@@ -146,4 +138,5 @@ class _SchurMap(CondensedMap):
 
     def follow(self, directions: IntArray) -> tuple[FloatArray, FloatArray]:
         """Return response and displacement at rest of free directions."""
-        return self.condensation.followed(self, directions)
+        rows = np.searchsorted(self.condensation._free, directions)
+        return self.condensation._response[rows], self.at_rest[rows]
