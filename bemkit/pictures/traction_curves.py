@@ -10,7 +10,6 @@ from bemkit.arrays import FloatArray, IntArray
 from bemkit.contact.contact_nodes import contact_frame
 from bemkit.contact.obstacle import measure_contact
 from bemkit.geometry.neighbours import along_boundary
-from bemkit.geometry.spaces import BoundarySpace, ConstantSpace
 from bemkit.pictures.shown import Result
 from bemkit.results.solved_body import SolvedBody
 from bemkit.scene.conditions import Contact, name_at_obstacle
@@ -61,7 +60,7 @@ def boundary_curve(body: SolvedBody, elements: IntArray) -> TractionCurve:
 
 def local_points(body: SolvedBody) -> FloatArray:
     """Return the local coordinates (q,) at which an element is drawn: its ends, and more where tractions are curved."""
-    is_straight = traction_space(body).degree <= 1 and bool(body.mesh.is_straight.all())
+    is_straight = body.scene.discretisation.traction_space(body.mesh).degree <= 1 and bool(body.mesh.is_straight.all())
     return np.linspace(-1.0, 1.0, 2 if is_straight else _POINTS_OF_CURVE)
 
 
@@ -72,17 +71,12 @@ def arc_length(body: SolvedBody, elements: IntArray, xi: FloatArray) -> FloatArr
     return np.asarray((begin[:, None] + 0.5 * lengths[:, None] * (xi + 1.0)).ravel())
 
 
-def traction_space(body: SolvedBody) -> BoundarySpace:
-    """Return the space of the tractions that are kept of a body: constant ones in files of older versions."""
-    space = body.scene.discretisation.traction_space(body.mesh)
-    return space if len(body.boundary.traction_dofs) == space.element_dofs.size else ConstantSpace(body.mesh)
-
-
 def _resolved(
     body: SolvedBody, elements: IntArray, xi: FloatArray, s: FloatArray, directions: FloatArray
 ) -> TractionCurve:
     dofs = body.boundary.traction_dofs.reshape(body.mesh.n_elements, -1, 2)[elements]
-    traction = np.einsum("lq,elc->eqc", traction_space(body).basis(xi), dofs).reshape(-1, 2)
+    basis = body.scene.discretisation.traction_space(body.mesh).basis(xi)
+    traction = np.einsum("lq,elc->eqc", basis, dofs).reshape(-1, 2)
     normal, tangential = np.einsum("nkc,nc->kn", contact_frame(directions), traction)
     return TractionCurve(s, normal, tangential)
 

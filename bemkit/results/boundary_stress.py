@@ -14,7 +14,7 @@ from bemkit.geometry.local_values import mean_tractions, values_on_elements
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.neighbours import corner_nodes
 from bemkit.geometry.reflection import reflected_to_whole
-from bemkit.geometry.spaces import BoundarySpace, ConstantSpace, ElementwiseSpace, local_coefficients
+from bemkit.geometry.spaces import BoundarySpace, ElementwiseSpace, local_coefficients
 from bemkit.geometry.vectors import turned_right
 from bemkit.operators.material import Material
 from bemkit.operators.somigliana.fields import InteriorFields
@@ -77,11 +77,8 @@ class BoundaryStress:
         """Return the stress on the whole boundary from the fields on one side of symmetry lines."""
         discretisation, of_whole = scene.discretisation, on_whole_body(scene.discretisation, mesh)
         space, half_space = of_whole.displacement_space(mesh.whole), discretisation.displacement_space(mesh)
-        has_dofs = len(traction_dofs) > mesh.n_elements
-        tractions, half_tractions = (
-            ElementwiseSpace(d.traction_space(m) if has_dofs else ConstantSpace(m))
-            for d, m in ((of_whole, mesh.whole), (discretisation, mesh))
-        )
+        tractions = ElementwiseSpace(of_whole.traction_space(mesh.whole))
+        half_tractions = ElementwiseSpace(discretisation.traction_space(mesh))
         fields = (
             *(space, reflected_to_whole(half_space, space, displacement)),
             *(tractions, reflected_to_whole(half_tractions, tractions, traction_dofs)),

@@ -27,9 +27,9 @@ def interior_fields(solution: Solution | SolvedBody) -> PotentialFields:
     Where body forces act, their particular solution is added in closed form. In plane strain heat adds -E alpha T to
     the stress across the plane, which `von_mises` does not know.
 
-    Displacements and tractions are those of the spaces of the discretisation (constant tractions in files of older
-    versions). Inside, their error decays quickly with the distance from the boundary. Within about one element length
-    of it, stresses are those of the piecewise data, with peaks at the ends of elements: see `InteriorFields`.
+    Displacements and tractions are those of the spaces of the discretisation. Inside, their error decays quickly with
+    the distance from the boundary. Within about one element length of it, stresses are those of the piecewise data,
+    with peaks at the ends of elements: see `InteriorFields`.
     """
     body = solution.body if isinstance(solution, Solution) else solution
     return body.boundary_stress.interior

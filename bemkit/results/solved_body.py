@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -39,12 +39,12 @@ class BoundaryFields:
     centres : (n_elements, 2) array [m]
     traction : (n_elements, 2) array [Pa]
         Mean of each element.
-    traction_dofs : (n_elements * n_local, 2) array [Pa], optional
+    traction_dofs : (n_elements * n_local, 2) array [Pa]
         Values at the local nodes of the traction space of the discretisation, element by element: loads may jump
-        anywhere; see `ElementwiseSpace`. The means by default.
-    reaction : (n_points, 2) array [N/m], optional
+        anywhere; see `ElementwiseSpace`.
+    reaction : (n_points, 2) array [N/m]
         Forces of supports at the points, with which the body is in equilibrium to round-off; tractions there are so but
-        for their error. Empty by default, and in files of older versions.
+        for their error.
 
     Raises
     ------
@@ -56,26 +56,21 @@ class BoundaryFields:
     displacement: FloatArray
     centres: FloatArray
     traction: FloatArray
-    traction_dofs: FloatArray = field(default_factory=lambda: np.zeros((0, 2)))
-    reaction: FloatArray = field(default_factory=lambda: np.zeros((0, 2)))
+    traction_dofs: FloatArray
+    reaction: FloatArray
 
     def __post_init__(self) -> None:
-        if self.reaction.size and self.reaction.shape != self.points.shape:
-            raise InputError(f"reaction has the shape {self.reaction.shape}: give {self.points.shape} to match points")
-        read_only(self.reaction)
-        dofs = self.traction_dofs if self.traction_dofs.size else self.traction.copy()
-        object.__setattr__(self, "traction_dofs", dofs)
-        for place, value in (("points", "displacement"), ("centres", "traction")):
+        for place, value in (("points", "displacement"), ("points", "reaction"), ("centres", "traction")):
             shape = (len(getattr(self, place)), 2)
             for name in (place, value):
                 array = getattr(self, name)
                 if array.shape != shape:
                     raise InputError(f"{name} has the shape {array.shape}: give {shape} to match {place}")
                 read_only(array)
-        if dofs.ndim != 2 or dofs.shape[1] != 2 or len(dofs) % max(len(self.traction), 1):
-            n = len(self.traction)
-            raise InputError(f"traction_dofs has the shape {dofs.shape}: give a multiple of {n} rows to match traction")
-        read_only(dofs)
+        shape, n = self.traction_dofs.shape, len(self.traction)
+        if len(shape) != 2 or shape[1] != 2 or shape[0] % max(n, 1):
+            raise InputError(f"traction_dofs has the shape {shape}: give a multiple of {n} rows to match traction")
+        read_only(self.traction_dofs)
 
     def __repr__(self) -> str:
         """Return one line."""
@@ -222,9 +217,7 @@ class SolvedBody:
             return self.boundary
         total, mesh = self.boundary, self.mesh.unit
         means = self.particular.tractions(ConstantSpace(mesh))[:, 0]
-        dofs = means
-        if len(total.traction_dofs) > len(means):
-            dofs = self.particular.tractions(self.scene.discretisation.traction_space(mesh)).reshape(-1, 2)
+        dofs = self.particular.tractions(self.scene.discretisation.traction_space(mesh)).reshape(-1, 2)
         displacement = total.displacement - self.particular.displacement(total.points)
         return replace(
             total, displacement=displacement, traction=total.traction - means, traction_dofs=total.traction_dofs - dofs
@@ -282,8 +275,6 @@ class SolvedBody:
         from bemkit.results.part_forces import load_force, part_force, support_forces
 
         space = self.scene.discretisation.traction_space(self.mesh)
-        if len(self.boundary.traction_dofs) != space.element_dofs.size:  # a file of an older version
-            space = ConstantSpace(self.mesh)
         load = self.scene.depth * self.boundary.traction_dofs.reshape(self.mesh.n_elements, -1, 2)
         moved = self.scene.discretisation.displacement_space(self.mesh)
         parts = self.mesh.parts.items()
@@ -291,13 +282,9 @@ class SolvedBody:
         for part, elements in self.scene.parts_on(self.mesh):
             if isinstance(part.condition, Load):
                 forces[part.name] = load_force(part.name, moved, elements, part.condition, self.scene.depth)
-        if self.boundary.reaction.size:
-            held = (Clamped, Roller, PrescribedDisplacement)
-            supports = [
-                part.name for part in self.scene.parts if isinstance(part.condition, held) and part.name in forces
-            ]
-            fields = self.boundary
-            forces |= support_forces(supports, moved, space, load, fields.points, fields.reaction)
+        held, fields = (Clamped, Roller, PrescribedDisplacement), self.boundary
+        supports = [part.name for part in self.scene.parts if isinstance(part.condition, held) and part.name in forces]
+        forces |= support_forces(supports, moved, space, load, fields.points, fields.reaction)
         return tuple({name: self.contact_forces.get(name, force) for name, force in forces.items()}.values())
 
     @property

@@ -17,7 +17,7 @@ from bemkit.pictures.contact_map import is_short
 from bemkit.pictures.magnification import LINE, exaggeration, magnification
 from bemkit.pictures.shown import at_mesh_nodes, shown
 from bemkit.results.interior import interior_fields
-from bemkit.results.solution import BoundaryFields, Solution
+from bemkit.results.solution import Solution
 from bemkit.results.stress_mesh import stress_mesh
 from bemkit.runs.run import run
 from bemkit.scene.plane_motion import FarField
@@ -276,9 +276,9 @@ def test_a_zoom_shows_a_short_zone_and_says_what_touches() -> None:
 
 
 def test_displacements_at_nodes_are_those_of_a_linear_field(solution: Solution) -> None:
-    points, centres = solution.boundary.points, solution.boundary.centres
+    points = solution.boundary.points
     gradient = np.array([[0.5, -2.0], [3.0, 0.25]])
-    linear = BoundaryFields(points.copy(), points @ gradient, centres.copy(), np.zeros_like(centres))
+    linear = dataclasses.replace(solution.boundary, displacement=points @ gradient)
     (body,) = shown(changed(solution, boundary=linear)).bodies
     before, after = solution.mesh.node_elements.T
     is_corner = np.sum(solution.mesh.tangents[before] * solution.mesh.tangents[after], axis=1) < 0.5

@@ -10,7 +10,6 @@ import pytest
 
 import bemkit as bk
 from bemkit.errors import InputError
-from tests.solutions import changed
 
 BLOCK = bk.Scene(
     title="Block on a clamped base, beside a smooth wall",
@@ -78,27 +77,7 @@ def test_files_keep_reactions_of_every_step(tmp_path: Path) -> None:
         np.testing.assert_allclose(forces["top"][:2] + forces["floor"][:2], 0.0, atol=1e-11)
 
 
-def test_results_without_reactions_are_written_and_read(tmp_path: Path) -> None:
-    solution = bk.run(replace(BLOCK, load_factors=(0.5, 1.0)))
-    assert solution.loading is not None
-    none = np.zeros((0, 2))
-    steps = tuple(
-        replace(step, end=changed(step.end, boundary=replace(step.end.boundary, reaction=none)))
-        for step in solution.loading.steps
-    )
-    loading = replace(solution.loading, steps=steps)
-    older = changed(solution, boundary=replace(solution.boundary, reaction=none), loading=loading)
-    bk.write_result(tmp_path / "r.h5", older)
-    read = bk.read_result(tmp_path / "r.h5")
-    assert not read.boundary.reaction.size
-    assert not read.at_step(1).boundary.reaction.size
-
-
-def test_without_reactions_tractions_are_summed_up() -> None:
-    """As of files of older versions: with the error of the tractions."""
+def test_reactions_belong_to_points() -> None:
     solution = bk.run(BLOCK)
-    older = changed(solution, boundary=replace(solution.boundary, reaction=np.zeros((0, 2))))
-    missing = sum(resultants(older).values())
-    assert 1e-3 < np.abs(missing).max() < 0.1
     with pytest.raises(InputError, match=r"reaction has the shape \(1, 2\): give \(30, 2\) to match points"):
         replace(solution.boundary, reaction=np.zeros((1, 2)))

@@ -143,9 +143,9 @@ def test_tables_check_their_columns() -> None:
     with pytest.raises(ValueError, match=r"status\[1\] is 7"):
         table([0, 7, 0])
     with pytest.raises(ValueError, match=r"traction has the shape \(2, 2\): give \(3, 2\)"):
-        BoundaryFields(np.zeros((3, 2)), np.zeros((3, 2)), np.zeros((3, 2)), np.zeros((2, 2)))
+        BoundaryFields(*np.zeros((3, 3, 2)), np.zeros((2, 2)), *np.zeros((2, 3, 2)))
     with pytest.raises(ValueError, match=r"traction_dofs has the shape \(4, 2\): give a multiple of 3 rows"):
-        BoundaryFields(*np.zeros((4, 3, 2)), traction_dofs=np.zeros((4, 2)))
+        BoundaryFields(*np.zeros((4, 3, 2)), np.zeros((4, 2)), np.zeros((3, 2)))
 
 
 def test_rows_are_those_of_a_part() -> None:

@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bemkit.results.solution import BoundaryFields, Solution
+from bemkit.results.solution import Solution
 from bemkit.results.tables import TABLES, element_displacement, to_csv, to_json
 from bemkit.runs.run import run
 from bemkit.scene.toml import load_scene, with_overrides
@@ -46,7 +46,7 @@ def test_the_boundary_table_has_a_row_per_element(solution: Solution) -> None:
 def test_displacements_of_elements_are_those_of_a_linear_field(solution: Solution) -> None:
     points, centres = solution.boundary.points, solution.boundary.centres
     gradient = np.array([[0.5, -2.0], [3.0, 0.25]])
-    linear = BoundaryFields(points.copy(), points @ gradient, centres.copy(), np.zeros_like(centres))
+    linear = replace(solution.boundary, displacement=points @ gradient)
     changed = changed_solution(solution, boundary=linear)
     np.testing.assert_allclose(element_displacement(changed), centres @ gradient, atol=1e-14)
 

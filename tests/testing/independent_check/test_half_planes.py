@@ -118,7 +118,8 @@ def changed(solution: bk.Solution, **changes: object) -> Violations:
 
 def with_boundary(solution: bk.Solution, **fields: np.ndarray) -> Violations:
     boundary = first_body(solution).boundary
-    return changed(solution, boundary=replace(boundary, traction_dofs=np.zeros((0, 2)), **fields))
+    traction = fields.get("traction", boundary.traction).copy()  # constant on each element
+    return changed(solution, boundary=replace(boundary, traction_dofs=traction, **fields))
 
 
 @pytest.mark.parametrize("name", slow_except([*SCENES, *AMONG.values()], "punch", "rough", AMONG["punch"]))
