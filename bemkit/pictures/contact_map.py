@@ -8,7 +8,7 @@ import numpy as np
 
 from bemkit.arrays import FloatArray
 from bemkit.pictures.contact_axes import STATUS_COLOURS
-from bemkit.pictures.contact_nodes import Nodes, contact_nodes, is_closed, node_points
+from bemkit.pictures.contact_nodes import Nodes, contact_nodes
 from bemkit.pictures.crowds import marked, seen_apart
 from bemkit.pictures.drawing import VERMILION, Axes, legend_below
 from bemkit.pictures.magnification import magnification
@@ -91,7 +91,7 @@ def draw_zoom(solution: Result, axes: Axes | None = None) -> Axes:
     scene = shown(solution)
     frame = _zone(scene.contact, contact_nodes(solution, scene, 0.0))
     if frame is None:
-        frame = joined_frame(node_points(scene.contact))
+        frame = joined_frame(scene.contact.points)
     size = max(float(np.ptp(frame, axis=1).max()), _NODES_AROUND * float(scene.contact.weight.max()))
     middle = frame.mean(axis=1)
     frame = np.stack([middle - 0.8 * size, middle + 0.8 * size], axis=1)
@@ -110,10 +110,10 @@ def draw_zoom(solution: Result, axes: Axes | None = None) -> Axes:
 
 def _zone(contact: ContactTable, nodes: Nodes) -> FloatArray | None:
     """Return the frame of the nodes that touch, with images not farther away than its size; None if there are none."""
-    closed = is_closed(contact)
+    closed = contact.is_closed
     if not closed.any():
         return None
-    frame = joined_frame(node_points(contact)[closed])
+    frame = joined_frame(contact.points[closed])
     reach = np.ptp(frame, axis=1).max()
     is_near = np.all((nodes.points >= frame[:, 0] - reach) & (nodes.points <= frame[:, 1] + reach), axis=1)
     return joined_frame(nodes.points[closed[nodes.rows] & is_near])

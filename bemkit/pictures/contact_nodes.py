@@ -8,13 +8,11 @@ from typing import NamedTuple
 import numpy as np
 from scipy.spatial import KDTree
 
-from bemkit.arrays import BoolArray, FloatArray, IntArray
+from bemkit.arrays import FloatArray, IntArray
 from bemkit.contact.contact_nodes import contact_frame
 from bemkit.geometry.spaces import dof_points
 from bemkit.geometry.symmetry import Symmetry
 from bemkit.pictures.shown import DrawnScene, Result
-from bemkit.results.contact_table import ContactTable
-from bemkit.solvers.active_sets import NodeStatus
 
 _AT = 1e-6
 """Distance within which a point is a node, relative to the picture."""
@@ -37,11 +35,11 @@ class Nodes(NamedTuple):
 def contact_nodes(solution: Result, shown: DrawnScene, factor: float) -> Nodes:
     """Return the contact nodes of a result, drawn with displacements times a factor."""
     table, symmetry = solution.contact, solution.scene.symmetry
-    rows, points, signs = np.arange(table.n_contact), node_points(table), np.ones((table.n_contact, 2))
+    rows, points, signs = np.arange(table.n_contact), table.points, np.ones((table.n_contact, 2))
     if not table.n_contact:
         return Nodes(rows, points, points, points, points)
     nodes = KDTree(np.concatenate([dof_points(body.space) for body in shown.bodies]))
-    for image, reflected in images_of(symmetry, node_points(table)):
+    for image, reflected in images_of(symmetry, table.points):
         is_new = KDTree(points).query(reflected)[0] > _AT * shown.size  # not on the line
         new = np.flatnonzero(is_new & (nodes.query(reflected)[0] <= _AT * shown.size))
         rows, points = np.append(rows, new), np.concatenate([points, reflected[new]])
@@ -57,13 +55,3 @@ def images_of(symmetry: Symmetry | None, points: FloatArray) -> Iterator[tuple[F
     if symmetry is not None:
         for image in symmetry.images[1:]:
             yield image, symmetry.reflected(points, image)
-
-
-def node_points(contact: ContactTable) -> FloatArray:
-    """Return the places (n_contact, 2) [m] of contact nodes."""
-    return np.stack([contact.x, contact.y], axis=1)
-
-
-def is_closed(contact: ContactTable) -> BoolArray:
-    """Return the mask (n_contact,) of the nodes that touch."""
-    return np.asarray(contact.status != NodeStatus.SEPARATED)

@@ -13,7 +13,6 @@ from bemkit.contact.obstacle import DirectedObstacle, Gap
 from bemkit.pictures.shown import DrawnBody, DrawnScene
 from bemkit.results.contact_table import ContactTable
 from bemkit.scene.conditions import Contact
-from bemkit.solvers.active_sets import NodeStatus
 
 _EXAGGERATION = 0.08
 """Drawn length of the largest displacement, relative to the picture."""
@@ -57,7 +56,7 @@ def exaggeration(size: float, displacement: FloatArray, contact: ContactTable) -
     room = np.maximum(contact.gap[is_closing], 0.0) + LINE * size
     wanted = min(wanted, float(np.min(room / contact.u_n[is_closing], initial=np.inf)))
     # bodies that overlap as they are drawn part by the overlap, and not by a multiple of it
-    is_parting = (contact.status != NodeStatus.SEPARATED) & (contact.gap < 0.0)
+    is_parting = contact.is_closed & (contact.gap < 0.0)
     wanted = min(wanted, 1.0 + float(np.min(LINE * size / -contact.gap[is_parting], initial=np.inf)))
     if wanted <= 1.0 and (is_closing.any() or is_parting.any()):
         return 1.0

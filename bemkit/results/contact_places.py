@@ -17,7 +17,6 @@ from bemkit.geometry.vectors import norms
 from bemkit.results.transitions import resolved_transitions, unresolved_contacts, unrolled
 from bemkit.results.zone_ends import LYING_AT, Side, ZoneEnd
 from bemkit.scene.conditions import name_at_obstacle
-from bemkit.solvers.active_sets import NodeStatus
 
 if TYPE_CHECKING:
     from bemkit.results.singular_corners import SingularCorner
@@ -59,7 +58,7 @@ class ContactPlaces:
         for body, part in self.solution.contact_sides[contact]:
             mesh, zone_length = bodies[body].mesh, None
             if mesh.surface is not None:
-                touches = table.rows(contact) & (table.status != NodeStatus.SEPARATED)
+                touches = table.rows(contact) & table.is_closed
                 zone_length = 0.5 * float(table.weight[touches].sum())
             sides.append(Side(body, mesh, part, zone_length))
         return sides
@@ -181,8 +180,9 @@ class ContactPlaces:
         solution, degree = self.solution, self.lowest_degree
         if degree <= 2:
             # the second difference at the far end of an element takes nodes nearer to the singular point
-            points = np.column_stack([solution.contact.x, solution.contact.y])
-            is_near, with_ends = (self._is_near(points, with_ends=with_ends) for with_ends in (False, True))
+            is_near, with_ends = (
+                self._is_near(solution.contact.points, with_ends=with_ends) for with_ends in (False, True)
+            )
             share = np.where(is_near, 0.0, np.where(with_ends, FAR_END_SHARE[degree - 1], 1.0))
             return nodal_error(solution.contact, degree, solution.n_sides, share)
         if not any(chosen.size for chosen in self._counted.values()):

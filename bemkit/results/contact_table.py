@@ -103,6 +103,16 @@ class ContactTable:
         return len(self.part)
 
     @property
+    def points(self) -> FloatArray:
+        """(n_contact, 2) array [m]: places of the nodes on the undeformed body."""
+        return np.stack([self.x, self.y], axis=1)
+
+    @property
+    def is_closed(self) -> BoolArray:
+        """(n_contact,) bool array: whether a node touches."""
+        return np.asarray(self.status != NodeStatus.SEPARATED)
+
+    @property
     def parts(self) -> tuple[str, ...]:
         """The names of the contact parts, in their order."""
         return tuple(dict.fromkeys(self.part))
@@ -132,6 +142,12 @@ class ContactTable:
         is_of_part = np.zeros(self.n_contact, bool)
         is_of_part[list(self._nodes.get(part, ()))] = True
         return is_of_part
+
+    def runs(self, chosen: BoolArray) -> list[IntArray]:
+        """Return the runs of chosen nodes (n_contact,) that follow each other on one piece of one part."""
+        nodes = np.flatnonzero(chosen)
+        is_end = (np.diff(nodes) != 1) | ~self.is_joined[nodes[:-1]]
+        return [run for run in np.split(nodes, np.flatnonzero(is_end) + 1) if run.size]
 
     def renamed(self, names: Mapping[str, str]) -> ContactTable:
         """Return the rows of some parts, by their names, under other names."""
@@ -211,8 +227,7 @@ def bound_at(table: ContactTable, law: FrictionLaw) -> FloatArray | None:
     """Return the friction bound (n_contact,) [Pa] of a law at the tractions of a table; None without friction."""
     if law.is_frictionless:
         return None
-    is_closed = table.status != NodeStatus.SEPARATED
-    return np.where(is_closed | np.asarray(law.acts_across_gap), law.bound(np.minimum(table.sigma_n, 0.0)), 0.0)
+    return np.where(table.is_closed | np.asarray(law.acts_across_gap), law.bound(np.minimum(table.sigma_n, 0.0)), 0.0)
 
 
 def free_contacts(table: ContactTable) -> set[str]:

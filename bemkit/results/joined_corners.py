@@ -10,13 +10,19 @@ import numpy as np
 from bemkit.arrays import FloatArray
 from bemkit.contact.laws import FrictionLaw
 from bemkit.geometry.neighbours import along_boundary
-from bemkit.geometry.vectors import norms
 from bemkit.operators.material import Material
 from bemkit.results.contact_table import ContactTable
-from bemkit.results.singular_corners import AFTER, BEFORE, DIGITS, GivenSides, SingularCorner, angle_between
-from bemkit.results.wedge import FREE, HELD, JoinedWedge, WedgeSide, joined_exponent
+from bemkit.results.singular_corners import (
+    AFTER,
+    BEFORE,
+    DIGITS,
+    GivenSides,
+    SingularCorner,
+    angle_between,
+    touching_side,
+)
+from bemkit.results.wedge import FREE, JoinedWedge, WedgeSide, joined_exponent
 from bemkit.results.zone_ends import LYING_AT, LYING_ON, Side
-from bemkit.solvers.active_sets import NodeStatus
 
 
 class _Place(NamedTuple):
@@ -59,6 +65,7 @@ def joined_corners(
     materials : mapping of str to Material
         By the name of the body.
     """
+    law_at_nodes, every_node = law.at(table.points), np.arange(table.n_contact)
     points = [(one, two, point) for point in one.ends()]
     same = LYING_AT * min(one.length, two.length)
     points += [(two, one, point) for point in two.ends() if all(np.abs(point - p).max() > same for _, _, p in points)]
@@ -69,9 +76,9 @@ def joined_corners(
         way = AFTER if np.isin(end.after, side.mesh.part(side.part)) else BEFORE  # of the touching element
         touching = (end.before, end.after)[way], (foot.after, foot.before)[way]
         wedges = end.given(given[side.body], way), foot.given(given[other.body], 1 - way)
-        contact = _contact_at(table, law, side.mesh.centres[touching[0]])
+        contact = touching_side(table, law_at_nodes, side.mesh.centres[touching[0]], every_node)
         is_on_other = np.isin(touching[1], other.mesh.part(other.part))
-        if contact is None or not is_on_other or wedges[0] is None or wedges[1] is None:
+        if contact == FREE or not is_on_other or wedges[0] is None or wedges[1] is None:
             continue
         ordered = [
             JoinedWedge(place.angle, materials[place.side.body].kappa, materials[place.side.body].shear_modulus, beside)
@@ -110,16 +117,3 @@ def _foot_of(side: Side, point: FloatArray, near: float) -> _Place | None:
 def _at_node(side: Side, node: int) -> _Place:
     before, after = side.mesh.node_elements[node].tolist()
     return _Place(side, before, after, round(angle_between(side.mesh, before, after), DIGITS))
-
-
-def _contact_at(table: ContactTable, law: FrictionLaw, point: FloatArray) -> WedgeSide | None:
-    """Return how the bodies touch at the contact node nearest to a point; None if they do not."""
-    points = np.stack([table.x, table.y], axis=1)
-    row = int(np.argmin(norms(points - point)))
-    status = NodeStatus(int(table.status[row]))
-    if status is NodeStatus.SEPARATED:
-        return None
-    if status is NodeStatus.STICK:
-        return HELD
-    slope = -law.at(points).bound_derivative(np.minimum(table.sigma_n, 0.0))[row]
-    return WedgeSide(holds_normal=True, friction=float(slope) * (1.0 if status is NodeStatus.SLIP_FORWARD else -1.0))

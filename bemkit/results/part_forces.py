@@ -16,7 +16,6 @@ from bemkit.operators.steklov_poincare.nodal_conditions import integrate_tractio
 from bemkit.results.contact_table import ContactTable
 from bemkit.results.transitions import Transition, unrolled
 from bemkit.scene.conditions import Load
-from bemkit.solvers.active_sets import NodeStatus
 
 
 @dataclass(frozen=True)
@@ -217,7 +216,7 @@ def forces_on_parts(on_sides: Iterable[tuple[tuple[str, str], PartForce]]) -> di
 def _sizes(table: ContactTable, depth: float, part: str) -> dict[str, float]:
     """Return the entries of `ContactForce` besides the resultant and the contact length."""
     nodes = table.rows(part)
-    closed = nodes & (table.status != NodeStatus.SEPARATED)
+    closed = nodes & table.is_closed
     return {
         "force_normal": -depth * float(table.weight[nodes] @ table.sigma_n[nodes]),
         "force_tangential": depth * float(table.weight[nodes] @ table.sigma_t[nodes]),
@@ -231,9 +230,7 @@ def _contact_length(table: ContactTable, transitions: Sequence[Transition], part
 
     Nodes without a partner end a piece.
     """
-    nodes = np.flatnonzero(table.rows(part))
-    gaps = np.flatnonzero((np.diff(nodes) > 1) | ~table.is_joined[nodes[:-1]])
-    return sum(_closed_length(table, piece, part, transitions) for piece in np.split(nodes, gaps + 1))
+    return sum(_closed_length(table, piece, part, transitions) for piece in table.runs(table.rows(part)))
 
 
 def _closed_length(table: ContactTable, nodes: IntArray, part: str, transitions: Sequence[Transition]) -> float:
@@ -243,7 +240,7 @@ def _closed_length(table: ContactTable, nodes: IntArray, part: str, transitions:
     # elements reach beyond the outer nodes, if these do not lie at their ends
     beyond = max(total - float(s[-1] - s[0]), 0.0) * float(weights[0] / (weights[0] + weights[-1]))
     last = begin = max(float(s[0]) - beyond, 0.0)
-    is_inside = bool(table.status[nodes[0]] != NodeStatus.SEPARATED)
+    is_inside = bool(table.is_closed[nodes[0]])
     for transition in transitions:
         if transition.part != part or not s[0] - weights[0] <= transition.s <= s[-1] + weights[-1]:
             continue

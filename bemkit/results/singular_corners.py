@@ -13,8 +13,9 @@ from typing import Any
 
 import numpy as np
 
-from bemkit.arrays import BoolArray, FloatArray
+from bemkit.arrays import BoolArray, FloatArray, IntArray
 from bemkit.contact.body import SlipHistory
+from bemkit.contact.laws import FrictionLaw
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.neighbours import break_nodes
 from bemkit.geometry.vectors import angles_between, norms
@@ -176,24 +177,23 @@ class GivenSides:
         rows = np.flatnonzero(self._table.rows(self._part[element]))
         if not rows.size:  # both nodes of a part of one element belong to its neighbours
             return None
-        row = int(rows[np.argmin(norms(self._points[rows] - self._mesh.centres[element]))])
-        status = NodeStatus(int(self._table.status[row]))
-        if status in (NodeStatus.SEPARATED, NodeStatus.STICK):
-            return FREE if status is NodeStatus.SEPARATED else HELD
-        direction = 1.0 if status is NodeStatus.SLIP_FORWARD else -1.0
-        return WedgeSide(holds_normal=True, friction=direction * float(self._friction[row]))
+        return touching_side(self._table, self._law, self._mesh.centres[element], rows)
 
     @cached_property
-    def _points(self) -> FloatArray:
-        return np.stack([self._table.x, self._table.y], axis=1)
+    def _law(self) -> FrictionLaw:
+        """At the contact nodes."""
+        law = self._scene.law_at(self._table.part, self._table.points)
+        return law if self._motion is None else law.at_slip(self._motion)
 
-    @cached_property
-    def _friction(self) -> FloatArray:
-        """(n_contact,) array: how fast the friction bound rises with the pressure at each contact node."""
-        law = self._scene.law_at(self._table.part, self._points)
-        if self._motion is not None:
-            law = law.at_slip(self._motion)
-        return np.asarray(-law.bound_derivative(np.minimum(self._table.sigma_n, 0.0)))
+
+def touching_side(table: ContactTable, law: FrictionLaw, point: FloatArray, rows: IntArray) -> WedgeSide:
+    """Return the condition of the contact node nearest to a point among some rows, with the law at all nodes."""
+    row = int(rows[np.argmin(norms(table.points[rows] - point))])
+    status = NodeStatus(int(table.status[row]))
+    if status in (NodeStatus.SEPARATED, NodeStatus.STICK):
+        return FREE if status is NodeStatus.SEPARATED else HELD
+    slope = -float(law.bound_derivative(np.minimum(table.sigma_n, 0.0))[row])
+    return WedgeSide(holds_normal=True, friction=slope if status is NodeStatus.SLIP_FORWARD else -slope)
 
 
 def _displaced(normal: FloatArray, is_given: BoolArray) -> WedgeSide | None:

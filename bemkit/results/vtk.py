@@ -25,7 +25,6 @@ from bemkit.operators.somigliana.stress import von_mises
 from bemkit.results.solution import Solution
 from bemkit.results.solved_body import SolvedBody
 from bemkit.results.stress_mesh import stress_mesh
-from bemkit.solvers.active_sets import NodeStatus
 
 _CELL_TYPES = {"vertex": 1, "line": 3, "triangle": 5}
 _TYPES = {"float64": "Float64", "int64": "Int64", "uint8": "UInt8"}
@@ -172,9 +171,9 @@ def _fields(material: Material, displacement: FloatArray, stress: FloatArray) ->
 
 def _contact_nodes(solution: Solution, bodies: Sequence[SolvedBody]) -> Block:
     table = solution.contact
-    points = np.stack([table.x, table.y], axis=1)
+    points = table.points
     values = {name: np.asarray(getattr(table, name), float) for name in _CONTACT}
-    values["slip"] = np.where(table.status == NodeStatus.SEPARATED, np.nan, table.u_t)
+    values["slip"] = np.where(table.is_closed, table.u_t, np.nan)
     nearest = np.full(len(points), np.inf)
     on_bodies: dict[str, FloatArray] = {}
     for body in bodies:

@@ -8,7 +8,7 @@ from itertools import chain
 
 import numpy as np
 
-from bemkit.arrays import BoolArray, FloatArray, IntArray
+from bemkit.arrays import BoolArray, FloatArray
 from bemkit.contact.laws import FrictionLaw, LawOfCoefficients
 from bemkit.contact.obstacle import RigidHalfPlane
 from bemkit.errors import ResultWarning, first_of_each_kind
@@ -304,7 +304,7 @@ def _narrow_zones(contact: ContactTable, smooth: Collection[str], remedy: str) -
             kinds |= {word: is_of_part & chosen for word, chosen in is_word.items()}
         reported = np.zeros(is_of_part.size, bool)
         for kind, chosen in kinds.items():
-            narrow = [zone for zone in _zones(contact, chosen) if zone.size < FEWEST_NODES]
+            narrow = [zone for zone in contact.runs(chosen) if zone.size < FEWEST_NODES]
             narrow = [zone for zone in narrow if not reported[zone].all()]
             if narrow:
                 reported[np.concatenate(narrow)] = True
@@ -342,18 +342,11 @@ def _hidden_overlaps(
             )
 
 
-def _zones(contact: ContactTable, chosen: BoolArray) -> list[IntArray]:
-    """Return the runs of chosen nodes that follow each other on one piece of a part."""
-    nodes = np.flatnonzero(chosen)
-    is_end = (np.diff(nodes) != 1) | ~contact.is_joined[nodes[:-1]]
-    return [zone for zone in np.split(nodes, np.flatnonzero(is_end) + 1) if zone.size]
-
-
 def _enclosed(contact: ContactTable, chosen: BoolArray) -> BoolArray:
     """Return the chosen nodes (n_contact,) in runs that have other nodes on both sides."""
     joined = np.concatenate([[False], contact.is_joined, [False]])
     is_enclosed = np.zeros(chosen.size, bool)
-    for zone in _zones(contact, chosen):
+    for zone in contact.runs(chosen):
         is_enclosed[zone] = joined[zone[0]] and joined[zone[-1] + 1]
     return is_enclosed
 
