@@ -97,7 +97,10 @@ def describe(prepared: Prepared, load: UnsolvableLoad) -> str:
         With the resultant force for a translation, or the moment and the fixed point for a rotation.
     """
     if not prepared.scene.has_obstacles_only:
-        return f"{load.description}: hold what moves by a support, raise the friction, or change the loads"
+        from bemkit.model.turning import turned_by_load
+
+        words = f"{load.description}: hold what moves by a support, raise the friction, or change the loads"
+        return turned_by_load(prepared) or words
     units, scene = prepared.units, prepared.scene
     force = prepared.force_unit * scene.depth
     mode = _rigid_mode(prepared, load)

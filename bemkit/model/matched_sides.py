@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 
+from bemkit.geometry.arcs import common_centre
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.meshing.discretise import Uniform
 from bemkit.scene.body_scene import BodyScene
 from bemkit.scene.contacts import ContactPair
 from bemkit.scene.discretisation import Galerkin
+from bemkit.scene.scene import Scene
 
 ALIKE = 1.02
 """Largest ratio of the lengths of two sides that may fit, and of element lengths that match."""
@@ -17,15 +19,13 @@ LEAST_REST = 0.5
 
 
 def matching_densities(
-    contacts: Iterable[ContactPair], bodies: Mapping[str, BodyScene], meshes: Mapping[str, BoundaryMesh]
+    scene: Scene, bodies: Mapping[str, BodyScene], meshes: Mapping[str, BoundaryMesh]
 ) -> dict[str, dict[str, float]]:
     """Return how densely parts must be divided to match the shorter elements of curved sides that they fit.
 
     Parameters
     ----------
-    contacts : iterable of ContactPair
-        Between elastic bodies, with friction, or of two bodies that cannot turn: without friction others would
-        turn nearly freely on alike meshes.
+    scene : Scene
     bodies : mapping of str to BodyScene
         The placed bodies by name.
     meshes : mapping of str to BoundaryMesh
@@ -42,17 +42,19 @@ def matching_densities(
     Displacements that are linear on curved elements lie inside the curve between the nodes, by a share of the squared
     length of an element, on both sides alike if they are divided alike. Otherwise a uniform pressure varies, and its
     mean is wrong. Only bodies of linear elements, with neither an accuracy nor grading nor density, are matched; the
-    rest of the boundary keeps at least half of its elements.
+    rest of the boundary keeps at least half of its elements. Without friction bodies with a clearance would turn nearly
+    freely on alike meshes; bodies in contact by arcs about one point may turn freely, see
+    `bemkit.contact.mortar.coupling`.
     """
     densities: dict[str, dict[str, float]] = {}
-    for pair in contacts:
+    for pair in scene.elastic_contacts:
         sides = [(name, part, meshes[name], meshes[name].part(part)) for name, part in pair.elastic_parts]
         if not all(elements.size and _is_matched(bodies[name]) for name, _, _, elements in sides):
             continue
         if any(mesh.is_straight[elements].any() for _, _, mesh, elements in sides):
             continue
         side_lengths = [float(mesh.lengths[elements].sum()) for _, _, mesh, elements in sides]
-        if max(side_lengths) > ALIKE * min(side_lengths):
+        if max(side_lengths) > ALIKE * min(side_lengths) or _turns_nearly_freely(scene, pair, bodies, meshes):
             continue
         counts = [elements.size for *_, elements in sides]
         coarse = int(counts[1] < counts[0])
@@ -65,6 +67,17 @@ def matching_densities(
             of_parts = densities.setdefault(name, {})
             of_parts[part] = max(density, of_parts.get(part, 1.0))
     return densities
+
+
+def _turns_nearly_freely(
+    scene: Scene, pair: ContactPair, bodies: Mapping[str, BodyScene], meshes: Mapping[str, BoundaryMesh]
+) -> bool:
+    """Whether a body may turn, with neither friction nor arcs about one point."""
+    if not scene.law_of(pair).is_frictionless or all(bodies[name].cannot_turn for name, _ in pair.elastic_parts):
+        return False
+    placements = {body.name: body.placement for body in scene.placed_bodies}
+    placed = [(placements[name].mesh(meshes[name]), meshes[name].part(part)) for name, part in pair.elastic_parts]
+    return common_centre(placed) is None
 
 
 def _is_matched(body: BodyScene) -> bool:

@@ -171,17 +171,11 @@ def _drawn(scene: Scene, given: Mapping[str, BoundaryMesh]) -> dict[str, Boundar
         if id(own_scene) not in by_scene:
             by_scene[id(own_scene)] = _divided(own_scene, scene, body)
     meshes = {**given, **{body.name: by_scene[id(own_scenes[body.name])] for body in divided}}
-    held = {name for name, own_scene in own_scenes.items() if own_scene.cannot_turn}
-    pairs = [
-        pair
-        for pair in scene.elastic_contacts
-        if not scene.law_of(pair).is_frictionless or held.issuperset(name for name, _ in pair.elastic_parts)
-    ]
-    if not pairs:
+    if not scene.elastic_contacts:
         return meshes
     from bemkit.model.matched_sides import matching_densities
 
-    densities = matching_densities(pairs, own_scenes, meshes)
+    densities = matching_densities(scene, own_scenes, meshes)
     matched: dict[int, BoundaryMesh] = {}
     for body in divided:
         own_scene = own_scenes[body.name]

@@ -14,9 +14,9 @@ from typing import TypeAlias
 import numpy as np
 
 from bemkit.arrays import FloatArray, IntArray
+from bemkit.geometry.arcs import common_centre
 from bemkit.geometry.quadrature import gauss_legendre
 from bemkit.geometry.vectors import cross, norms
-from bemkit.model.model import Model
 from bemkit.model.placed import PlacedBody
 from bemkit.model.prepared import Prepared
 from bemkit.scene.conditions import Clamped, Load, PrescribedDisplacement, Roller
@@ -25,7 +25,7 @@ from bemkit.solvers.base import ContactSolution, Status
 
 _N_POINTS = 12
 _ROUND_OFF = 1e-9
-"""Distance by which normals of arcs may miss their centre, relative to the diameter."""
+"""Round-off of positions, relative to the diameter."""
 _BALANCED = 1e-6
 """Moment that counts as none, relative to the sum of the sizes of the moments of all loads."""
 _UNSETTLED = (Status.STALLED, Status.CYCLING, Status.MAX_STEPS, Status.INNER_FAILED, Status.SINGULAR)
@@ -36,21 +36,25 @@ _Side: TypeAlias = tuple[PlacedBody, IntArray]
 """A body, and elements of its boundary."""
 
 
-def with_turning_checked(model: Model, result: ContactSolution) -> ContactSolution:
+def with_turning_checked(prepared: Prepared, result: ContactSolution) -> ContactSolution:
     """Return the outcome of a solve, named UNSOLVABLE_LOAD if only its mesh keeps a body from turning.
 
-    A failed solve is named SINGULAR if a body may turn under any load. Bodies that friction joins are
-    judged together; the loads of those with forces inside are not.
+    A failed solve is named so too if the load turns a body, else SINGULAR if a body may turn under any load. Bodies
+    that friction joins are judged together; the loads of those with forces inside are not.
     """
     if not (result.is_converged or result.status in _UNSETTLED):
         return result
-    groups = _joined_by_friction(model.prepared)
-    if result.is_converged:
-        status, reasons = Status.UNSOLVABLE_LOAD, (_turned(model.prepared, *group) for group in groups)
-    else:
-        status, reasons = Status.SINGULAR, (_loose(*group) for group in groups)
-    reason = next(filter(None, reasons), "")
+    status, reason = Status.UNSOLVABLE_LOAD, turned_by_load(prepared)
+    if not (reason or result.is_converged):
+        reasons = (_loose(*group) for group in _joined_by_friction(prepared))
+        status, reason = Status.SINGULAR, next(filter(None, reasons), "")
     return replace(result, status=status, message=f"{status.value} [{reason}]") if reason else result
+
+
+def turned_by_load(prepared: Prepared) -> str:
+    """Describe how the load turns bodies that neither supports nor friction keep from turning; empty if it does not."""
+    reasons = (_turned(prepared, *group) for group in _joined_by_friction(prepared))
+    return next(filter(None, reasons), "")
 
 
 def _joined_by_friction(prepared: Prepared) -> list[tuple[list[PlacedBody], list[_Side]]]:
@@ -116,7 +120,9 @@ def _place(bodies: list[PlacedBody], centre: FloatArray) -> str:
 
 def _centre_of_turning(bodies: list[PlacedBody], sides: list[_Side]) -> FloatArray | None:
     """Return the point (2,) [m] about which bodies may turn by these sides; None if they may not."""
-    return _common_centre(sides) if all(_may_turn(body) for body in bodies) else None
+    if not all(_may_turn(body) for body in bodies):
+        return None
+    return common_centre([(body.mesh, elements) for body, elements in sides])
 
 
 def _may_turn(body: PlacedBody) -> bool:
@@ -125,20 +131,6 @@ def _may_turn(body: PlacedBody) -> bool:
     mesh = body.mesh
     is_bounded = not mesh.is_exterior and mesh.surface is None
     return is_bounded and mesh.symmetry is None and not is_held
-
-
-def _common_centre(sides: list[_Side]) -> FloatArray | None:
-    """Return the point (2,) [m] through which the normals of all these elements pass; None if there is none."""
-    (first, _), (xi, _) = sides[0], gauss_legendre(_N_POINTS)
-    if any(body.mesh.is_straight[elements].any() for body, elements in sides):
-        return None
-    points = np.concatenate([body.mesh.points(elements, xi).reshape(-1, 2) for body, elements in sides])
-    normals = np.concatenate([body.mesh.normals_at(elements, xi).reshape(-1, 2) for body, elements in sides])
-    points -= first.mesh.centre
-    arms = np.column_stack([-normals[:, 1], normals[:, 0]])
-    centre = np.linalg.lstsq(arms, cross(normals, points), rcond=None)[0]
-    missed = np.abs(cross(normals, points - centre)).max()
-    return first.mesh.centre + centre if missed <= _ROUND_OFF * first.mesh.diameter else None
 
 
 def _moment(body: PlacedBody, centre: FloatArray) -> tuple[float, float]:

@@ -67,7 +67,7 @@ def checked(model: Model, result: ContactSolution) -> ContactSolution:
     if any(rows.law.is_frictionless for rows in model.prepared.rows):
         from bemkit.model.turning import with_turning_checked
 
-        result = with_turning_checked(model, result)
+        result = with_turning_checked(model.prepared, result)
     return with_sliding_checked(model, result)
 
 

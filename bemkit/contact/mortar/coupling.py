@@ -22,11 +22,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray, IntArray
-from bemkit.contact.mortar.projection import mean_directions
+from bemkit.contact.mortar.projection import mean_directions, on_rays, rays
 from bemkit.contact.mortar.segments import MortarQuadrature, Segments, common_refinement, quadrature_on
 from bemkit.contact.mortar.sides import ContactSide
 from bemkit.errors import GeometryError, format_point
+from bemkit.geometry.arcs import common_centre
 from bemkit.geometry.quadrature import gauss_legendre
+from bemkit.geometry.spaces import dof_points
 from bemkit.geometry.vectors import turned_left
 
 if TYPE_CHECKING:
@@ -217,8 +219,10 @@ def couple(
     Notes
     -----
     The projection is along the mean of both normals, interpolated along the non-mortar side [PusoLaursen2004],
-    [PoppEtAl2010]. If the weight of a node is less than a hundredth of the integral of its basis function, because only
-    a sliver of its elements is covered, other nodes take its share; slivers without other nodes are not covered.
+    [PoppEtAl2010]. If both sides are arcs about one point, the mean positions of both sides of a node lie on a ray from
+    it, which is the direction, so that rotations about it leave the gap and pressures have no moment. If the weight of
+    a node is less than a hundredth of the integral of its basis function, because only a sliver of its elements is
+    covered, other nodes take its share; slivers without other nodes are not covered.
     """
     directions, segments = facing_segments(non_mortar, mortar, reach)
     may_carry = np.ones(non_mortar.dofs.shape, bool) if without is None else ~np.isin(non_mortar.dofs, without)
@@ -265,17 +269,23 @@ def _integrate(
     psi, elements, integrals = multiplier_functions(side, segments, quadrature, may_carry)
     # nodes with a tiny part of their full weight are slivers; the others are the rows of the coupling
     rows, slivers = _MultiplierRows.from_integrals(side, elements, integrals)
-    # mean of the gap vector for each multiplier, along the direction of contact of its node
+    # mortar integrals with the bases of both sides
     weighted_psi = psi * quadrature.weights[:, None]
+    mortar_basis = mortar.space.basis(quadrature.eta.ravel()).reshape(-1, *quadrature.eta.shape).transpose(1, 2, 0)
+    mortar_integrals = np.matmul(weighted_psi, mortar_basis)
+    on_non_mortar = rows.matrix(elements, side.dofs[elements], integrals, side.space.n_dofs // 2)
+    on_mortar = rows.matrix(quadrature.row, mortar.dofs[quadrature.partner], mortar_integrals, mortar.space.n_dofs // 2)
+    # mean of the gap vector for each multiplier, along the direction of contact of its node
     gap = rows.summed(quadrature.row, np.matmul(weighted_psi, quadrature.gap))
     node_xi = side.space.local_nodes[rows.local][:, None]
     direction = side.directions(directions, rows.element, node_xi)[:, 0]
+    centre = common_centre([(each.mesh, each.elements) for each in (side, mortar)])
+    if centre is not None and side.mesh.symmetry is None:
+        direction = rays(on_non_mortar @ dof_points(side.space) - centre, direction)
+        on_mortar = on_rays(on_mortar, direction, dof_points(mortar.space) - centre, mortar.resolution)
     distance = np.einsum("nc,nc->n", direction, gap) / rows.weights
     distance[np.abs(distance) <= max(side.resolution, mortar.resolution)] = 0.0
     overlap, deepest = _deepest_overlap(side, directions, quadrature)
-    # mortar integrals with the bases of both sides
-    mortar_basis = mortar.space.basis(quadrature.eta.ravel()).reshape(-1, *quadrature.eta.shape).transpose(1, 2, 0)
-    mortar_integrals = np.matmul(weighted_psi, mortar_basis)
     coupling = MortarCoupling(
         nodes=rows.dofs,
         points=side.points(rows.element, node_xi)[:, 0],
@@ -286,10 +296,8 @@ def _integrate(
         overlap=overlap,
         deepest=deepest,
         facing=np.einsum("nc,nc->n", direction, side.directions(side.normals, rows.element, node_xi)[:, 0]),
-        on_non_mortar=rows.matrix(elements, side.dofs[elements], integrals, side.space.n_dofs // 2),
-        on_mortar=rows.matrix(
-            quadrature.row, mortar.dofs[quadrature.partner], mortar_integrals, mortar.space.n_dofs // 2
-        ),
+        on_non_mortar=on_non_mortar,
+        on_mortar=on_mortar,
     )
     return coupling, slivers
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from bemkit.arrays import FloatArray, IntArray
 from bemkit.contact.mortar.sides import ContactSide, faces_away
+from bemkit.geometry.arcs import common_centre
 from bemkit.geometry.vectors import cross, norms, turned_right
 
 _LEAST_OPPOSITION = 0.5
@@ -127,8 +128,8 @@ def is_non_mortar(one: ContactSide, two: ContactSide, distance: float = np.inf, 
     -------
     bool
         True if only the first side is completely covered. If both or none are, true if the mean distance of nodes on
-        the first side is not larger than on the second one. Of curved linear sides with friction that cover each other,
-        the coarser side carries the multipliers.
+        the first side is not larger than on the second one. Of curved linear sides that cover each other and have
+        friction or are arcs about one point, the coarser side carries the multipliers.
 
     Notes
     -----
@@ -138,7 +139,8 @@ def is_non_mortar(one: ContactSide, two: ContactSide, distance: float = np.inf, 
 
     Linear elements on conforming curved sides move too far inwards between their nodes. Multipliers of the finer side
     resolve that error, those of the coarser side average over it: the pressure of a disc in a ring with three times
-    longer elements is uniform to 1e-5 instead of 2e-2. Without friction such a disc would rotate nearly freely.
+    longer elements is uniform to 1e-5 instead of 2e-2. Without friction a disc with a clearance would rotate nearly
+    freely.
     """
     _, _, cover, _ = _facing_elements(_Elements.of([one, two], [0, 1]), distance)
     return _is_first_non_mortar(one, two, float(cover.sum()), has_friction=has_friction)
@@ -146,7 +148,9 @@ def is_non_mortar(one: ContactSide, two: ContactSide, distance: float = np.inf, 
 
 def _is_first_non_mortar(one: ContactSide, two: ContactSide, cover: float, *, has_friction: bool) -> bool:
     """Apply the rule of `is_non_mortar` to sides with a common length [m]."""
-    fits = has_friction and not any(side.is_straight or side.space.degree != 1 for side in (one, two))
+    fits = not any(side.is_straight or side.space.degree != 1 for side in (one, two)) and (
+        has_friction or common_centre([(side.mesh, side.elements) for side in (one, two)]) is not None
+    )
     share = _WHOLE_CURVED if fits else _WHOLE
     is_whole = [cover >= share * float(side.lengths.sum()) for side in (one, two)]
     if is_whole[0] != is_whole[1]:

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from bemkit.arrays import FloatArray, IntArray
 from bemkit.contact.mortar.sides import ContactSide
 from bemkit.geometry.vectors import angles_between, cross, norms, turned_left
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_matrix
 
 _MOST_STEPS = 100
 _MOST_PASSES = 8
@@ -142,3 +146,38 @@ def mean_directions(non_mortar: ContactSide, mortar: ContactSide, reach: float) 
         cosine, sine = np.cos(half_angle)[:, None], np.sin(half_angle)[:, None]
         directions = cosine * normals + sine * turned_left(normals)
     return directions
+
+
+def rays(positions: FloatArray, direction: FloatArray) -> FloatArray:
+    """Return unit vectors (n, 2) along positions (n, 2) from a centre, in the sense of directions (n, 2)."""
+    along = np.copysign(1.0, np.einsum("nc,nc->n", positions, direction))
+    return np.asarray(positions * (along / norms(positions))[:, None])
+
+
+def on_rays(shares: csr_matrix, unit: FloatArray, points: FloatArray, resolution: float) -> csr_matrix:
+    """Move the mean positions of points along their side onto rays from the origin.
+
+    Parameters
+    ----------
+    shares : (n, k) sparse matrix
+        Of points in each mean position; rows sum to one.
+    unit : (n, 2) array
+        Directions of the rays.
+    points : (k, 2) array [m]
+    resolution : float [m]
+        Round-off of positions.
+
+    Returns
+    -------
+    (n, k) sparse matrix
+        The nearest shares whose rows sum to one. Positions move by a distance of third order in the length of elements.
+    """
+    n_shares = np.diff(shares.indptr)
+    row = np.repeat(np.arange(len(unit)), n_shares)
+    beside = cross(unit[row], points[shares.indices])
+    off_ray = np.bincount(row, shares.data * beside)
+    beside -= (np.bincount(row, beside) / n_shares)[row]
+    spread = np.bincount(row, beside**2)
+    moved = shares.copy()
+    moved.data -= (off_ray / np.where(spread > resolution**2, spread, np.inf))[row] * beside
+    return moved

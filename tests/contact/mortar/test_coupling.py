@@ -15,6 +15,7 @@ from bemkit.geometry.curves import Arc, Segment
 from bemkit.geometry.local_values import dof_weights
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.spaces import dof_points
+from bemkit.geometry.vectors import cross
 from tests.contact.mortar.pairs import block, chain, quadrangle, space_of
 from tests.geometry.strategies import angles, rotation
 
@@ -103,6 +104,19 @@ def test_arcs_that_cover_each_other(degree: tuple[int, int], n: tuple[int, int],
     assert_is_dual(one, coupling)
     assert not coupling.gap.any()
     np.testing.assert_allclose(coupling.frame[:, 0], coupling.points, atol=1e-2 if degree[0] == 0 else 1e-13)
+
+
+@given(st.tuples(degrees.filter(bool), degrees.filter(bool)), st.tuples(counts, counts), st.floats(0.2, 1.2))
+@settings(max_examples=settings.default.max_examples // 3)
+def test_arcs_about_one_point_turn_without_a_gap(
+    degree: tuple[int, int], n: tuple[int, int], half_angle: float
+) -> None:
+    one, two = cradle(degree, n, half_angle)
+    for pair in ((one, two), (two, one)):
+        coupling = couple(*pair)
+        normal = coupling.frame[:, 0]
+        for side, matrix in zip(pair, (coupling.on_non_mortar, coupling.on_mortar), strict=True):
+            assert np.abs(cross(normal, matrix @ dof_points(side.space))).max() <= ROUND_OFF
 
 
 @given(st.tuples(degrees, degrees), st.tuples(counts, counts), st.floats(-0.85, 0.85), angles)
