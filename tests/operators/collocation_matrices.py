@@ -39,8 +39,7 @@ def collocation_matrices(
     p, conj_p, v, conj_v, s, conj_s = exact.reshape(6, n, whole.n_elements)
     if takes_slopes:
         reconstruction = GradientReconstruction.of(whole, geometry)
-        reconstruction.add_to(v, s, is_conjugate=False)
-        reconstruction.add_to(conj_v, conj_s, is_conjugate=True)
+        v, conj_v = reconstruction.gathered(v, s), reconstruction.gathered(conj_v.conj(), conj_s.conj()).conj()
     return _real(mesh, p, conj_p), _real(mesh, v, conj_v)
 
 

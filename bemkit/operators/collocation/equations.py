@@ -349,17 +349,9 @@ def _reconstruction(
     n = order.size
     if not takes_slopes:
         return np.arange(n)[:, None], np.tile(np.array([1.0 + 0j, 0.0]), (n, 1, 1))
-    position, before, after = np.empty((3, n), np.intp)
+    position, gradients = np.empty(n, np.intp), GradientReconstruction.of(mesh, geometry)
     position[order] = np.arange(n)
-    for loop in mesh.loops:
-        before[loop], after[loop] = np.roll(loop, 1), np.roll(loop, -1)
-    acted_on = np.stack([before, np.arange(n), after], axis=1)
-    gradients = GradientReconstruction.of(mesh, geometry)
-    # the element is neighbour 2 of its predecessor, 1 of itself and 0 of its successor
-    roles = np.array([2, 1, 0])
-    means, slopes = gradients.means[roles, acted_on], gradients.slopes[roles, acted_on]
-    means[:, 1] += 1.0
-    return position[acted_on[order]], np.stack([means, slopes], axis=2)[order]
+    return position[gradients.acted_on[order]], gradients.weights[order]
 
 
 def point_forces(x: ComplexArray, sources: ComplexArray, poisson_ratio: float, log_length: float) -> FloatArray:

@@ -13,11 +13,10 @@ by h^2 / 24 times its curvature except at the midpoint, which makes results of t
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
-from bemkit.arrays import BoolArray, ComplexArray, IntArray, Run, consecutive_runs
+from bemkit.arrays import BoolArray, ComplexArray, IntArray
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.neighbours import corner_nodes
 from bemkit.operators.element_geometry import ElementGeometry
@@ -28,21 +27,19 @@ CORNER_ANGLE = 0.3
 
 @dataclass(frozen=True, eq=False)
 class GradientReconstruction:
-    """Slopes and corrections of means as combinations of the midpoint values of an element and its neighbours.
+    """The linear displacements on elements that the midpoint value of each element causes.
 
     Parameters
     ----------
-    neighbours : (3, n_elements) array
-        The preceding element, the element itself, and the next element along the boundary.
-    slopes : (3, n_elements) complex array
-        Weights of their values in the slope; their sum is zero.
-    means : (3, n_elements) complex array
-        Weights of their values in the correction of the constant part; their sum is zero.
+    acted_on : (n_elements, 3) array
+        Elements on which the value acts: the preceding one, the element itself, and the next one along the boundary.
+    weights : (n_elements, 3, 2) complex array
+        Constant part and slope of a unit value on these. On every element the constant parts add up to one, the slopes
+        to zero.
     """
 
-    neighbours: IntArray
-    slopes: ComplexArray
-    means: ComplexArray
+    acted_on: IntArray
+    weights: ComplexArray
 
     @classmethod
     def of(cls, mesh: BoundaryMesh, geometry: ElementGeometry) -> GradientReconstruction:
@@ -66,25 +63,17 @@ class GradientReconstruction:
         is_used[:, is_used.sum(axis=0) == 1] = True
         arm = np.where(is_used, centre - np.mean(centre, axis=0, where=is_used), 0.0)
         weights = arm.conj() / np.sum(np.square(arm.real) + np.square(arm.imag), axis=0)
-        return cls(neighbours, weights * half, _means(centre, half, is_smooth))
+        # of an element and its neighbours: their weights in its constant part and slope
+        of_values = np.stack([_means(centre, half, is_smooth), weights * half], axis=2)
+        of_values[1, :, 0] += 1.0
+        # an element is neighbour 2 of the preceding one, 1 of itself and 0 of the next one
+        acted_on = neighbours.T
+        return cls(acted_on, of_values[np.array([2, 1, 0]), acted_on])
 
-    def add_to(self, on: ComplexArray, on_slope: ComplexArray, *, is_conjugate: bool) -> None:
-        """Add the contributions of slopes to coefficients (n_rows, n_elements) of displacements or their conjugates."""
-        before, centre, after = self._of_value(on, on_slope, is_conjugate)
-        on += centre
-        # this element is the next or preceding element of its neighbours
-        for contribution, runs in ((after, self._runs[0]), (before, self._runs[1])):
-            for target, source in runs:
-                on[:, target] += contribution[:, source]
-
-    def _of_value(self, on: ComplexArray, on_slope: ComplexArray, is_conjugate: bool) -> tuple[ComplexArray, ...]:
-        """Return the coefficients of the values on the preceding, each and the next element."""
-        slopes, means = (self.slopes.conj(), self.means.conj()) if is_conjugate else (self.slopes, self.means)
-        return tuple(on_slope * slope + on * mean for slope, mean in zip(slopes, means, strict=True))
-
-    @cached_property
-    def _runs(self) -> tuple[list[Run], list[Run]]:
-        return consecutive_runs(self.neighbours[0]), consecutive_runs(self.neighbours[2])
+    def gathered(self, on_constant: ComplexArray, on_slope: ComplexArray) -> ComplexArray:
+        """Return the coefficients (..., n_elements) of values from those of constant parts and slopes."""
+        of_values = np.stack([on_constant[..., self.acted_on], on_slope[..., self.acted_on]], axis=-1)
+        return np.asarray((of_values * self.weights).sum(axis=(-2, -1)))
 
 
 def _means(centre: ComplexArray, half: ComplexArray, is_smooth: BoolArray) -> ComplexArray:

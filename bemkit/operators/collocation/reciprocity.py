@@ -14,8 +14,8 @@ The first field is a source of volume, the second a uniform dilatation; both are
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 
@@ -68,13 +68,13 @@ class Reciprocity:
         reconstruction = GradientReconstruction.of(whole, geometry) if takes_slopes else None
         on_tractions, on_displacements, fields = [], [], []
         for loop, area in zip(mesh.loops, mesh.loop_areas, strict=True):
-            images = reciprocal_fields(mesh, loop, area)
+            images = _reciprocal_fields(mesh, loop, area)
             arcs = Arcs.of(whole, _POINTS_OF_LINES if area > 0.0 and whole.is_straight.all() else _POINTS)
             works = zip(*(field.work(arcs, material) for field in images), strict=True)
             on_traction, on_displacement, on_gradient = (np.sum(work, axis=0) for work in works)
             if reconstruction is not None:
                 on_slope = on_gradient / (geometry.half * geometry.tangent)
-                reconstruction.add_to(on_displacement[None, :], on_slope[None, :], is_conjugate=False)
+                on_displacement = reconstruction.gathered(on_displacement, on_slope)
             on_tractions.append(_folded(mesh, on_traction))
             on_displacements.append(_folded(mesh, on_displacement))
             value = np.sum([field.value(centres) for field in images], axis=0)
@@ -84,20 +84,6 @@ class Reciprocity:
             np.reshape(rows, shape) for rows in (on_tractions, on_displacements, fields)
         )
         return cls(of_traction, of_displacement, values.T)
-
-
-class ReciprocalField(Protocol):
-    """An elastic field w whose work with the solution is known."""
-
-    def value(self, z: ComplexArray) -> ComplexArray:
-        """Return the field at points, up to a constant factor."""
-
-    def work(self, arcs: Arcs, material: Material) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
-        """Return the factors of tractions t, displacements u and gradients g in the work, (n_elements,) each.
-
-        The real part of the sum over elements is the work of t on w, and of u + g (y - x) on t(w) / (2 mu), with the
-        midpoint x of an element.
-        """
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,17 +99,16 @@ class Dilatation:
     centre: complex
     diameter: float
 
-    @classmethod
-    def of(cls, mesh: BoundaryMesh) -> Dilatation:
-        """Return the dilatation about the centre of a body."""
-        return cls(complex(*mesh.centre), mesh.diameter)
-
     def value(self, z: ComplexArray) -> ComplexArray:
         """Return the field at points."""
         return np.asarray((z - self.centre) / self.diameter)
 
     def work(self, arcs: Arcs, material: Material) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
-        """Return the factors of tractions, displacements and gradients; see `ReciprocalField.work`."""
+        """Return the factors of tractions t, displacements u and gradients g in the work, (n_elements,) each.
+
+        The real part of the sum over elements is the work of t on w, and of u + g (y - x) on t(w) / (2 mu), with the
+        midpoint x of an element.
+        """
         factor = (1.0 - 2.0 * material.effective_poisson_ratio) / (2.0 * material.shear_modulus * self.diameter)
         return (
             np.sum((arcs.z - self.centre).conj() * np.abs(arcs.dz), axis=1) * factor,
@@ -146,18 +131,12 @@ class HoleSource:
     centre: complex
     radius: float
 
-    @classmethod
-    def of(cls, mesh: BoundaryMesh, loop: IntArray) -> HoleSource:
-        """Return the source in the centre of the largest circle within a hole."""
-        (x, y), radius = _largest_circle(mesh, loop)
-        return cls(complex(x, y), radius)
-
     def value(self, z: ComplexArray) -> ComplexArray:
         """Return the field at points."""
         return np.asarray(self.radius / (z - self.centre).conj())
 
     def work(self, arcs: Arcs, material: Material) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
-        """Return the factors of tractions, displacements and gradients; see `ReciprocalField.work`."""
+        """Return the factors of tractions, displacements and gradients; see `Dilatation.work`."""
         c, a = self.centre, self.radius
         return (
             np.sum(np.abs(arcs.dz) / (arcs.z - c), axis=1) * (a / (2.0 * material.shear_modulus)),
@@ -166,16 +145,17 @@ class HoleSource:
         )
 
 
-def reciprocal_fields(mesh: BoundaryMesh, loop: IntArray, area: float) -> list[ReciprocalField]:
-    """Return the fields of a closed curve: a dilatation, or sources in a hole and its images."""
+def _reciprocal_fields(mesh: BoundaryMesh, loop: IntArray, area: float) -> Sequence[Dilatation | HoleSource]:
+    """Return the fields of a closed curve: a dilatation, or sources in a hole and its images.
+
+    A source lies in the centre of the largest circle within the hole.
+    """
     if area > 0.0:
-        return [Dilatation.of(mesh)]
-    source = HoleSource.of(mesh, loop)
-    if mesh.symmetry is None:
-        return [source]
-    centre = np.array([source.centre.real, source.centre.imag])
-    images = (mesh.symmetry.reflected(centre, signs) for signs in mesh.symmetry.images)
-    return [HoleSource(complex(*image), source.radius) for image in images]
+        return [Dilatation(complex(*mesh.centre), mesh.diameter)]
+    centre, radius = _largest_circle(mesh, loop)
+    symmetry = mesh.symmetry
+    images = [centre] if symmetry is None else [symmetry.reflected(centre, signs) for signs in symmetry.images]
+    return [HoleSource(complex(*image), radius) for image in images]
 
 
 def _largest_circle(mesh: BoundaryMesh, loop: IntArray) -> tuple[FloatArray, float]:
@@ -216,7 +196,7 @@ class Arcs:
     dz: ComplexArray
 
     @classmethod
-    def of(cls, mesh: BoundaryMesh, n_points: int = _POINTS) -> Arcs:
+    def of(cls, mesh: BoundaryMesh, n_points: int) -> Arcs:
         """Return the points on all elements of a mesh, without images."""
         elements = np.arange(mesh.n_elements)
         xi, weights = gauss_legendre(n_points)

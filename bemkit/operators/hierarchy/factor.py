@@ -13,7 +13,7 @@ of the tractions). They are passed through all clusters together with the skelet
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -39,27 +39,6 @@ class SingularClusterError(SingularMatrixError):
         )
 
 
-@dataclass(frozen=True, eq=False)
-class _Leaf:
-    """The factored equations of a leaf under local conditions.
-
-    Parameters
-    ----------
-    factors : (n, 4, 2) array
-        Factors of the local conditions.
-    of_quantities : (4 n, n_rows + n_outgoing + n_border) array
-        Effect of tractions and displacements on the equations, the outgoing unknowns and the balances.
-    of_unknowns : (2 n, n_rows + n_outgoing + n_border) array
-        Effect of the unknowns z on the same.
-    inverse : SmallLU
-    """
-
-    factors: FloatArray
-    of_quantities: FloatArray
-    of_unknowns: FloatArray
-    inverse: SmallLU
-
-
 class Factor:
     """Boundary equations over a tree, factored under conditions that may change.
 
@@ -68,7 +47,6 @@ class Factor:
     equations : BoundaryEquations
         Numbered in the order of the tree.
     tree : ClusterTree
-        With a single leaf the equations are dense, and the LU factors of that leaf are kept.
     tolerance : float
         Relative tolerance of the compression between clusters.
     may_differ : (n_nodes, 4) bool array, optional
@@ -117,7 +95,6 @@ class Factor:
         for leaf in self.may_change:
             self._is_fixed[tree.positions(0, leaf)] = False
         self._loads, self._is_reloaded = KnownLoads(self._is_fixed), False
-        self._only_leaf: _Leaf | None = None
 
     def prepare(self, loads: Iterable[FloatArray]) -> None:
         """Announce, before the first `update`, the given parts of later conditions; see `KnownLoads`."""
@@ -265,41 +242,28 @@ class Factor:
 
     def _leaf(self, number: int, factors: FloatArray, given: FloatArray) -> ClusterResponse:
         """Return the response of a leaf under factors (n, 4, 2) and k given parts (4 n, k) of local conditions."""
-        leaf, border = self._factored_leaf(number, factors), self.equations.border
-        positions, skeleton, n_rows = self.tree.positions(0, number), self._skeleton(0, number), 2 * len(factors)
-        incoming = border.errors[2 * positions.start : 2 * positions.stop]
-        if skeleton is not None:
-            incoming = np.concatenate([skeleton.row_map.matrix(), incoming], axis=1)
-        response = leaf.inverse.solve(incoming)
-        outgoing, at_rest = leaf.of_unknowns[:, n_rows:].T, np.zeros((n_rows, given.shape[1]))
-        if given.any():
-            at_rest = -leaf.inverse.solve(leaf.of_quantities[:, :n_rows].T @ given)
-        of_loads = outgoing @ at_rest + leaf.of_quantities[:, n_rows:].T @ given
-        return ClusterResponse(outgoing @ response, of_loads, response, at_rest)
-
-    def _factored_leaf(self, number: int, factors: FloatArray) -> _Leaf:
-        """Factor the equations of a leaf under factors (n, 4, 2); a tree of one leaf keeps them."""
-        if self._only_leaf is not None and np.array_equal(self._only_leaf.factors, factors):
-            return self._only_leaf
-        self._only_leaf = None  # free the memory for the new factors
         positions, columns = self.tree.positions(0, number), self.compression.unknowns[number]
-        rows = np.arange(2 * positions.start, 2 * positions.stop)
-        n, n_border, skeleton = len(factors), self.equations.border.errors.shape[1], self._skeleton(0, number)
+        rows, border = np.arange(2 * positions.start, 2 * positions.stop), self.equations.border
+        n, skeleton, incoming = len(factors), self._skeleton(0, number), border.errors[rows]
         n_outgoing = 0 if skeleton is None else skeleton.columns.size
-        # columns: equations, outgoing unknowns, balances
-        of_quantities = np.zeros((4 * n, rows.size + n_outgoing + n_border))
+        # effect of tractions and displacements on the equations, the outgoing unknowns and the balances
+        of_quantities = np.zeros((4 * n, rows.size + n_outgoing + border.errors.shape[1]))
         of_quantities[columns - 4 * positions.start, : rows.size] = self.equations.block(rows, columns).T
         if skeleton is not None:
             outgoing = slice(rows.size, rows.size + n_outgoing)
             of_quantities[columns - 4 * positions.start, outgoing] = skeleton.column_map.matrix()
-        balances = self.equations.border.balances[:, 4 * positions.start : 4 * positions.stop]
+            incoming = np.concatenate([skeleton.row_map.matrix(), incoming], axis=1)
+        balances = border.balances[:, 4 * positions.start : 4 * positions.stop]
         of_quantities[:, rows.size + n_outgoing :] = balances.T
+        # effect of the unknowns on the same
         of_unknowns = (factors.transpose(0, 2, 1) @ of_quantities.reshape(n, 4, -1)).reshape(2 * n, -1)
         inverse = SmallLU(of_unknowns[:, : rows.size].T, SingularClusterError(n))
-        leaf = _Leaf(factors, of_quantities, of_unknowns, inverse)
-        if self.tree.n_leaves == 1:
-            self._only_leaf = leaf
-        return leaf
+        response, at_rest = inverse.solve(incoming), np.zeros((rows.size, given.shape[1]))
+        if given.any():
+            at_rest = -inverse.solve(of_quantities[:, : rows.size].T @ given)
+        emitted = of_unknowns[:, rows.size :].T
+        of_loads = emitted @ at_rest + of_quantities[:, rows.size :].T @ given
+        return ClusterResponse(emitted @ response, of_loads, response, at_rest)
 
     def _parent(self, level: int, cluster: int) -> ClusterResponse:
         """Merge the children of a cluster; children of fixed conditions then drop their scattering matrices."""

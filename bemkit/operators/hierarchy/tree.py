@@ -65,11 +65,6 @@ class ClusterTree:
             order[begin:end].sort()
         return cls(order, bounds, n_levels)
 
-    @classmethod
-    def single(cls, n: int) -> ClusterTree:
-        """Return a tree of one cluster with n points in their given order."""
-        return cls(np.arange(n), np.array([0, n]), 0)
-
     @property
     def n_leaves(self) -> int:
         """Number of leaves."""

@@ -67,7 +67,9 @@ def system_of(
     *,
     is_dense: bool = False,
 ) -> HierarchicalSystem:
-    tree = ClusterTree.single(mesh.n_elements) if is_dense else ClusterTree.of(mesh.centres, LEAF_SIZE)
+    n, tree = mesh.n_elements, ClusterTree.of(mesh.centres, LEAF_SIZE)
+    if is_dense:
+        tree = ClusterTree(np.arange(n), np.array([0, n]), 0)
     equations = collocation_equations(mesh, MATERIAL, tree.order, takes_slopes=slopes)
     changing = None if may_change is None else may_change[tree.order]
     factor = Factor(equations, tree, tolerance, may_change=changing)
