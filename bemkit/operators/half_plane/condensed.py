@@ -19,93 +19,59 @@ from bemkit.operators.steklov_poincare.nodal_conditions import GivenData, NodalC
 from bemkit.operators.steklov_poincare.protocol import CondensedMap
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class CondensedHalfPlane:
-    """A half-plane with unknown forces on its retained and fixed directions.
+    """A half-plane with unknown forces on its retained and fixed directions, together the acting ones.
 
     Parameters
     ----------
     conditions : NodalConditions
     far_motion : FarMotion
     flexibility : (n_dofs, n_dofs) array [1/Pa]
-        In the frames of the nodes.
-    motions : (n_dofs, 3) array
-        Unit far motions, in the frames.
-    strained : (n_dofs,) array [m]
-        Displacements of the far strain.
-    acting, retained : int arrays
-        Indices of the retained and fixed directions, and positions of the retained ones among them.
-    stiffness : (n_acting, n_acting) array [Pa]
-        P above.
-    far_response : (n_acting, n_load_controlled) array
-        ``S R_d (R_d^T S R_d)^-1``: forces on acting directions under unit far loads. Its transpose maps displacements
-        of these directions to the far motion.
-    resistance : (n_load_controlled, n_load_controlled) array
-        ``R_d^T S R_d``.
+        In x and y.
+    points : (n_nodes, 2) array [m]
+    along : (2,) array
+        Tangent of the surface.
     """
 
     conditions: NodalConditions
     far_motion: FarMotion
     flexibility: FloatArray
-    motions: FloatArray
-    strained: FloatArray
-    acting: IntArray
-    retained: IntArray
-    stiffness: FloatArray
-    far_response: FloatArray
-    resistance: FloatArray
+    points: FloatArray
+    along: FloatArray
 
-    @classmethod
-    def of(
-        cls,
-        conditions: NodalConditions,
-        far_motion: FarMotion,
-        flexibility: FloatArray,
-        points: FloatArray,
-        along: FloatArray,
-    ) -> CondensedHalfPlane:
-        """Invert the flexibility (n_dofs, n_dofs) in x and y of nodes at points (n, 2), with the tangent (2,)."""
-        acting = np.flatnonzero(~conditions.is_free)
-        in_frames, frame = rotated(flexibility, conditions.frame), conditions.frame
-        motions = np.einsum("nkc,ncm->nkm", frame, far_motion.motions_at(points)).reshape(-1, 3)
-        strain = far_motion.strain * ((points - np.array(far_motion.centre)) @ along)[:, None] * along
+    def __post_init__(self) -> None:
+        conditions, far_motion, frame = self.conditions, self.far_motion, self.conditions.frame
+        self.acting = acting = np.flatnonzero(~conditions.is_free)
+        self.retained = np.flatnonzero(conditions.is_retained.ravel()[acting])
+        self.in_frames = rotated(self.flexibility, frame)
+        self.motions = np.einsum("nkc,ncm->nkm", frame, far_motion.motions_at(self.points)).reshape(-1, 3)
+        arms = ((self.points - np.array(far_motion.centre)) @ self.along)[:, None] * self.along
+        self.strained = np.einsum("nkc,nc->nk", frame, far_motion.strain * arms).ravel()
         stiffness = np.zeros((0, 0))
         if acting.size:
-            factor = Cholesky(in_frames[np.ix_(acting, acting)], "the flexibility of the half-plane")
+            factor = Cholesky(self.in_frames[np.ix_(acting, acting)], "the flexibility of the half-plane")
             stiffness = factor.solve(np.eye(acting.size))
             stiffness = 0.5 * (stiffness + stiffness.T)
-        load_controlled = motions[acting][:, list(far_motion.load_controlled)]
-        forces = stiffness @ load_controlled  # S R_d
+        forces = stiffness @ self.load_controlled[acting]  # S R_d
         # without acting directions nothing resists the far motion: any resistance will do
-        resistance = load_controlled.T @ forces if acting.size else np.eye(len(far_motion.load_controlled))
-        far_response = np.linalg.solve(resistance, forces.T).T
-        stiffness = stiffness - far_response @ forces.T
-        stiffness = 0.5 * (stiffness + stiffness.T)
-        retained = np.flatnonzero(conditions.is_retained.ravel()[acting])
-        strained = np.einsum("nkc,nc->nk", frame, strain).ravel()
-        return cls(
-            conditions=conditions,
-            far_motion=far_motion,
-            flexibility=in_frames,
-            motions=motions,
-            strained=strained,
-            acting=acting,
-            retained=retained,
-            stiffness=stiffness,
-            far_response=far_response,
-            resistance=resistance,
-        )
+        n_load_controlled = len(far_motion.load_controlled)
+        self.resistance = self.load_controlled[acting].T @ forces if acting.size else np.eye(n_load_controlled)
+        # forces under unit far loads; its transpose maps displacements to the far motion
+        self.far_response = np.linalg.solve(self.resistance, forces.T).T
+        stiffness = stiffness - self.far_response @ forces.T
+        self.stiffness = 0.5 * (stiffness + stiffness.T)  # P above
 
     @property
     def load_controlled(self) -> FloatArray:
         """(n_dofs, n_load_controlled) array: the load-controlled unit motions."""
-        return self.motions[:, list(self.far_motion.load_controlled)]
+        return np.asarray(self.motions[:, list(self.far_motion.load_controlled)])
 
     def under(self, force: FloatArray, displacement: FloatArray) -> CondensedMap:
         """Return the map under nodal forces (n_nodes, 2) in x and y and fixed displacements in the frames."""
         data = GivenData.of(self.conditions, force, displacement)
         given, prescribed = data.force.ravel(), data.displacement.ravel()[self.acting]
-        force_free = self.flexibility @ given + self.motions @ np.array(self.far_motion.motion) + self.strained
+        force_free = self.in_frames @ given + self.motions @ np.array(self.far_motion.motion) + self.strained
         load = self.load_controlled.T @ given + np.array(self.far_motion.load)[list(self.far_motion.load_controlled)]
         forces = self.stiffness @ (prescribed - force_free[self.acting]) - self.far_response @ load
         return _HalfPlaneMap(
@@ -156,7 +122,7 @@ class _HalfPlaneMap(CondensedMap):
     def follow(self, directions: IntArray) -> tuple[FloatArray, FloatArray]:
         """Return response and displacement at rest of free directions."""
         body = self.body
-        responses = body.flexibility[np.ix_(directions, body.acting)] @ body.stiffness
+        responses = body.in_frames[np.ix_(directions, body.acting)] @ body.stiffness
         responses += body.load_controlled[directions] @ body.far_response.T
         return responses[:, body.retained], self._response(self.prescribed)[0][directions]
 
@@ -166,7 +132,7 @@ class _HalfPlaneMap(CondensedMap):
         stretch = acting_displacement - self.force_free[body.acting]
         acting_force = body.stiffness @ stretch - body.far_response @ self.far_load
         amplitudes = body.far_response.T @ stretch + np.linalg.solve(body.resistance, self.far_load)
-        strain_displacement = body.flexibility[:, body.acting] @ acting_force
+        strain_displacement = body.in_frames[:, body.acting] @ acting_force
         displacement = self.force_free + strain_displacement + body.load_controlled @ amplitudes
         force = self.given.copy()
         displacement[body.acting], force[body.acting] = acting_displacement, acting_force

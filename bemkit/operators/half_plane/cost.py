@@ -29,7 +29,7 @@ def strip_cost(case: BodyCase, *, has_tree: bool) -> BodyCost:
     if case.is_condensed:  # both components of the whole surface, and the inverse
         return BodyCost(
             items=items,
-            work=half_plane_work(n, n_acting),
+            work=flexibility_work(n) + inverse_work(n_acting),
             memory=32 * matrix,
             kept=8 * matrix + 2 * square,
             evaluations=4.0 * n**2,
@@ -50,7 +50,7 @@ def strip_cost(case: BodyCase, *, has_tree: bool) -> BodyCost:
     memory = max(4 * matrix, kept)
     return BodyCost(
         items=items,
-        work=half_plane_work(n),
+        work=flexibility_work(n),
         memory=memory,
         kept=kept,
         evaluations=float(n) ** 2,
@@ -75,11 +75,12 @@ def periodic_cost(case: BodyCase) -> BodyCost:
     return BodyCost(items=items, memory=kept, kept=kept, flops=flops, is_matrix_free=True)
 
 
-def half_plane_work(n_elements: int, n_acting: int = 0) -> OperationCounts:
-    """Return the operation counts of a flexibility and of its inverse on `n_acting` retained or fixed directions."""
-    return OperationCounts(
-        element_pairs=n_elements**2,
-        single_layer=Entries.full(n_elements, n_elements),
-        factorisations=(Factorisation(FactorKind.CHOLESKY, n_acting),) if n_acting else (),
-        right_hand_sides=n_acting,
-    )
+def flexibility_work(n_elements: int) -> OperationCounts:
+    """Return the operation counts of a flexibility."""
+    return OperationCounts(element_pairs=n_elements**2, single_layer=Entries.full(n_elements, n_elements))
+
+
+def inverse_work(n_acting: int) -> OperationCounts:
+    """Return the operation counts of the inverse of a flexibility on retained and fixed directions."""
+    factorisations = (Factorisation(FactorKind.CHOLESKY, n_acting),) if n_acting else ()
+    return OperationCounts(factorisations=factorisations, right_hand_sides=n_acting)

@@ -9,7 +9,7 @@ import numpy as np
 
 from bemkit.arrays import ComplexArray, FloatArray
 from bemkit.operators.counts import OperationCounts
-from bemkit.operators.half_plane.cost import half_plane_work, strip_cost
+from bemkit.operators.half_plane.cost import flexibility_work, strip_cost
 from bemkit.operators.half_plane.flexibility import mean_logarithms
 from bemkit.operators.half_plane.surface import SurfaceElasticity
 from bemkit.operators.steklov_poincare.cost import BodyCase, BodyCost
@@ -33,7 +33,7 @@ class HalfPlaneElasticity(SurfaceElasticity):
     @property
     def work(self) -> OperationCounts:
         """Operation counts of the flexibility."""
-        return half_plane_work(self.mesh.n_elements)
+        return flexibility_work(self.mesh.n_elements)
 
     def cost(self, case: BodyCase) -> BodyCost:
         """Return counts, memory and time of the map."""
@@ -41,11 +41,15 @@ class HalfPlaneElasticity(SurfaceElasticity):
 
     def _displaced(self, traction: ComplexArray) -> ComplexArray:
         force = self.mesh.lengths * traction
-        along = self.flexibility @ np.stack([force.real, force.imag], axis=1)
+        along = self._along(np.stack([force.real, force.imag], axis=1))
         # forces before each element minus those behind it
         sums = np.cumsum(force)
         across = 2.0 * sums - force - sums[-1]
         return np.asarray(along[:, 0] + 1j * along[:, 1] - 0.5j * self.material.plane_compressibility * across)
+
+    def _along(self, force: FloatArray) -> FloatArray:
+        """Return the displacements (n_elements, 2) [m] of forces (n_elements, 2) [N/m] along these."""
+        return np.asarray(self.flexibility @ force)
 
     @cached_property
     def full_flexibility(self) -> FloatArray:

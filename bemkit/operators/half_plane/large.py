@@ -8,7 +8,7 @@ from typing import Self
 
 import numpy as np
 
-from bemkit.arrays import ComplexArray
+from bemkit.arrays import FloatArray
 from bemkit.operators.counts import OperationCounts
 from bemkit.operators.half_plane.cost import strip_cost
 from bemkit.operators.half_plane.elasticity import HalfPlaneElasticity
@@ -61,10 +61,7 @@ class LargeHalfPlane(HalfPlaneElasticity):
             other.__dict__["factor"] = self.factor
         return other
 
-    def _displaced(self, traction: ComplexArray) -> ComplexArray:
-        equations, force = self.factor.equations, self.mesh.lengths * traction
-        along = potential_of(self.factor.compression, np.stack([force.real, force.imag], axis=1))
-        sums = np.cumsum(force)
-        across = 2.0 * sums - force - sums[-1]
+    def _along(self, force: FloatArray) -> FloatArray:
+        equations = self.factor.equations
         assert isinstance(equations, HalfPlaneEquations)
-        return np.asarray(equations.along * (along[:, 0] + 1j * along[:, 1]) - 1j * equations.across * across)
+        return np.asarray(equations.along * potential_of(self.factor.compression, force))

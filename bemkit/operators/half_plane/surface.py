@@ -16,7 +16,8 @@ import numpy as np
 from bemkit.arrays import ComplexArray, FloatArray
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.spaces import ConstantSpace, dof_points
-from bemkit.operators.counts import Factorisation, FactorKind, OperationCounts
+from bemkit.operators.counts import OperationCounts
+from bemkit.operators.half_plane.cost import inverse_work
 from bemkit.operators.half_plane.far_motion import FarMotion
 from bemkit.operators.linear_solvers import Tag
 from bemkit.operators.material import Material
@@ -125,21 +126,14 @@ class SurfaceElasticity(BoundaryMap, ABC):
         full = np.einsum("ka,klij,lb->iajb", axes, local, axes, optimize=True).reshape(2 * local.shape[2], -1)
         return np.asarray(0.5 * (full + full.T))
 
-    def condensed_work(self, n_acting: int) -> OperationCounts:
-        """Return the operation counts of the inverse of the flexibility on retained and fixed directions."""
-        return OperationCounts(
-            factorisations=(Factorisation(FactorKind.CHOLESKY, n_acting),) if n_acting else (),
-            right_hand_sides=n_acting,
-        )
-
     def condense(self, conditions: NodalConditions, force: FloatArray) -> CondensedMap:
         """Solve for the forces on retained and fixed directions; see `SteklovPoincare.condense`."""
         from bemkit.operators.half_plane.condensed import CondensedHalfPlane  # only where there are other bodies
 
         points, flexibility = dof_points(self.displacement_space), self.full_flexibility
-        body = CondensedHalfPlane.of(conditions, self.far_motion, flexibility, points, self.mesh.tangents[0])
+        body = CondensedHalfPlane(conditions, self.far_motion, flexibility, points, self.mesh.tangents[0])
         condensed = body.under(force, conditions.displacement)
-        return replace(condensed, work=self.work + self.condensed_work(body.acting.size))
+        return replace(condensed, work=self.work + inverse_work(body.acting.size))
 
     def element_tractions(self, displacement: FloatArray, force: FloatArray) -> FloatArray:
         """Return the tractions (n_elements, 1, 2) [Pa]: forces per length."""
