@@ -148,9 +148,8 @@ class BoundaryStress:
     def _derivative_between_centres(self, elements: IntArray, xi: FloatArray) -> FloatArray:
         """Differentiate the parabola in the arc length through the centre of an element and two others beside it."""
         mesh = self.mesh
-        first, second = _stencils(mesh, elements)
+        (first, s_first), (second, s_second) = _stencils(mesh, elements)
         u = self.displacement[self.space.element_dofs[:, 0]]
-        s_first, s_second = (_distances(mesh, elements, other) for other in (first, second))
         slope_first, slope_second = (
             (u[other] - u[elements]) / np.where(s == 0.0, 1.0, s)[:, None]
             for other, s in ((first, s_first), (second, s_second))
@@ -163,33 +162,27 @@ class BoundaryStress:
         return np.asarray((slope_first - bend * s_first[:, None])[:, None] + 2.0 * s[..., None] * bend[:, None])
 
 
-def _stencils(mesh: BoundaryMesh, elements: IntArray) -> tuple[IntArray, IntArray]:
-    """Return two elements beside each, not beyond corners: the element itself where there is none."""
-    is_corner = corner_nodes(mesh)
-    every = np.arange(mesh.n_elements)
-    before, after = mesh.node_elements[mesh.elements[:, 0], 0], mesh.node_elements[mesh.elements[:, 1], 1]
-    before = np.where(is_corner[mesh.elements[:, 0]], every, before)
-    after = np.where(is_corner[mesh.elements[:, 1]], every, after)
-    e = elements
-    has_before, has_after = before[e] != e, after[e] != e
-    first = np.where(has_before, before[e], after[e])
-    second = np.where(has_before & has_after, after[e], np.where(has_before, before[before[e]], after[after[e]]))
-    return first, second
+def _stencils(mesh: BoundaryMesh, elements: IntArray) -> list[tuple[IntArray, FloatArray]]:
+    """Return two elements (m,) beside each, and the arc lengths (m,) [m] from its centre to theirs, negative before it.
+
+    They do not lie beyond corners; where there is none, it is the element itself.
+    """
+    before, to_before = _beside(mesh, elements, 0)
+    after, to_after = _beside(mesh, elements, 1)
+    (far_before, to_far_before), (far_after, to_far_after) = _beside(mesh, before, 0), _beside(mesh, after, 1)
+    has_before, has_both = before != elements, (before != elements) & (after != elements)
+    first = np.where(has_before, before, after), np.where(has_before, to_before, to_after)
+    second = np.where(has_before, far_before, far_after)
+    to_second = np.where(has_before, to_before + to_far_before, to_after + to_far_after)
+    return [first, (np.where(has_both, after, second), np.where(has_both, to_after, to_second))]
 
 
-def _distances(mesh: BoundaryMesh, elements: IntArray, others: IntArray) -> FloatArray:
-    """Return the signed arc lengths (m,) [m] from centres of elements to those of others, at most two elements away."""
-    lengths = mesh.lengths
-    before, after = mesh.node_elements[mesh.elements[:, 0], 0], mesh.node_elements[mesh.elements[:, 1], 1]
-    result = np.zeros(elements.size)
-    for beside, sign in ((before, -1.0), (after, 1.0)):
-        near, far = beside[elements], beside[beside[elements]]
-        to_near = 0.5 * (lengths[elements] + lengths[near])
-        result = np.where(
-            (others == far) & (far != near), sign * (to_near + 0.5 * (lengths[near] + lengths[far])), result
-        )
-        result = np.where(others == near, sign * to_near, result)
-    return np.where(others == elements, 0.0, result)
+def _beside(mesh: BoundaryMesh, elements: IntArray, way: int) -> tuple[IntArray, FloatArray]:
+    """Return the elements (m,) before or after others, and the arc lengths [m] to their centres; see `_stencils`."""
+    nodes = mesh.elements[elements, way]
+    others = np.where(corner_nodes(mesh)[nodes], elements, mesh.node_elements[nodes, way])
+    distance = (-0.5, 0.5)[way] * (mesh.lengths[elements] + mesh.lengths[others])
+    return others, np.where(others == elements, 0.0, distance)
 
 
 _END = 1e-9
