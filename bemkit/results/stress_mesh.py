@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from scipy.spatial import Delaunay, KDTree
@@ -17,7 +18,6 @@ from bemkit.arrays import BoolArray, FloatArray, IntArray
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.neighbours import corner_nodes
 from bemkit.geometry.vectors import cross, norms
-from bemkit.operators.somigliana.locate import Locator
 from bemkit.operators.somigliana.potentials import PotentialFields
 from bemkit.results.boundary_stress import BoundaryStress
 from bemkit.results.interior import interior_fields
@@ -80,17 +80,14 @@ def stress_mesh(body: SolvedBody, spacing: float, frame: FloatArray) -> StressMe
     mesh = boundary.mesh
     if mesh.surface is not None:
         return _below_surface(boundary, fields, spacing, frame)
-    inner = _inner_points(*_midpoints(boundary, spacing), spacing, frame, mesh.is_exterior)
+    inner = _inner_points(*_midpoints(boundary, spacing)[2:], spacing, frame, mesh.is_exterior)
     inner = inner[fields.is_inside(inner)]
     rings = [_Ring.on(boundary, loop, spacing) for loop in mesh.loops]
     rings, inner, triangles = _fitted(rings, inner)
     on_boundary = [ring.points for ring in rings]
     points = np.concatenate([*on_boundary, inner])
-    corners = points[triangles]
-    doubled_area = cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    is_kept = np.abs(doubled_area) > _FLAT * mesh.diameter**2
-    is_kept[is_kept] = fields.is_inside(corners[is_kept].mean(axis=1))
-    triangles = np.where(doubled_area[:, None] > 0.0, triangles, triangles[:, ::-1])[is_kept]
+    triangles = _anticlockwise(points, triangles, mesh.diameter)
+    triangles = triangles[fields.is_inside(points[triangles].mean(axis=1))]
     stress = np.concatenate([*(ring.mean(boundary.at) for ring in rings), fields.stress(inner)])
     displacement = [*(ring.mean(boundary.displacement_at) for ring in rings), fields.displacement(inner)]
     return StressMesh(points, triangles, stress, np.concatenate(displacement))
@@ -100,8 +97,8 @@ def _below_surface(boundary: BoundaryStress, fields: PotentialFields, spacing: f
     """Fill the rectangle below the strip of a half-plane that has elements, as deep as the frame."""
     mesh = boundary.mesh
     normal, along = mesh.normals[0], mesh.tangents[0]
-    on_surface, normals, lengths = _midpoints(boundary, spacing)
-    inner = _inner_points(on_surface, normals, lengths, spacing, frame, is_exterior=True)
+    middles = _midpoints(boundary, spacing)
+    inner = _inner_points(*middles[2:], spacing, frame, is_exterior=True)
     corners = np.stack(np.meshgrid(*frame), axis=2).reshape(-1, 2)
     start, end = mesh.nodes[mesh.elements[0, 0]], mesh.nodes[mesh.elements[-1, 1]]
     depth, length = -float(((corners - start) @ normal).min()), float(norms(end - start))
@@ -111,21 +108,24 @@ def _below_surface(boundary: BoundaryStress, fields: PotentialFields, spacing: f
     edge = 0.5 * spacing
     inner = inner[(below > 0.0) & (below < depth - edge) & (s > edge) & (s < length - edge)]
     inner = np.concatenate([inner, start + down, end + down, start + down[-1] + across])
-    few = _apart(on_surface, np.maximum(lengths, _SMALLEST * spacing))
-    element = Locator(mesh).locate(on_surface[few])
+    few = _apart(middles.points, np.maximum(middles.lengths, _SMALLEST * spacing))
     places = (
-        np.concatenate([[0], element.element, [mesh.n_elements - 1]]),
-        np.concatenate([[-1.0], element.xi, [1.0]])[:, None],
+        np.concatenate([[0], middles.element[few], [mesh.n_elements - 1]]),
+        np.concatenate([[-1.0], middles.xi[few], [1.0]])[:, None],
     )
     points = np.concatenate([mesh.points(*places)[:, 0], inner])
-    triangles = Delaunay((points - start) / length).simplices.astype(np.intp)
-    first, second, third = np.moveaxis(points[triangles], 1, 0)
-    doubled_area = cross(second - first, third - first)
-    triangles = np.where(doubled_area[:, None] > 0.0, triangles, triangles[:, ::-1])
-    triangles = triangles[np.abs(doubled_area) > _FLAT * length**2]
+    triangles = _anticlockwise(points, Delaunay((points - start) / length).simplices.astype(np.intp), length)
     stress = np.concatenate([boundary.at(*places)[:, 0], fields.stress(inner)])
     moved = np.concatenate([boundary.displacement_at(*places)[:, 0], fields.displacement(inner)])
     return StressMesh(points, triangles, stress, moved)
+
+
+def _anticlockwise(points: FloatArray, triangles: IntArray, size: float) -> IntArray:
+    """Return the triangles of points (n, 2) in anticlockwise order, without those that are flat beside a size [m]."""
+    first, second, third = np.moveaxis(points[triangles], 1, 0)
+    doubled_area = cross(second - first, third - first)
+    ordered = np.where(doubled_area[:, None] > 0.0, triangles, triangles[:, ::-1])
+    return np.asarray(ordered[np.abs(doubled_area) > _FLAT * size**2])
 
 
 @dataclass(frozen=True, eq=False)
@@ -216,8 +216,18 @@ def _fitted(rings: list[_Ring], inner: FloatArray) -> tuple[list[_Ring], FloatAr
     return rings, inner, triangles
 
 
-def _midpoints(boundary: BoundaryStress, spacing: float) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return points (n, 2) of elements from which layers of points start, normals there, and their distances (n,).
+class _Midpoints(NamedTuple):
+    """Points of elements (n,) from which layers of points start: local coordinates, normals, and their distances."""
+
+    element: IntArray
+    xi: FloatArray
+    points: FloatArray
+    normals: FloatArray
+    lengths: FloatArray
+
+
+def _midpoints(boundary: BoundaryStress, spacing: float) -> _Midpoints:
+    """Return the points of all elements from which layers start.
 
     Elements of degree 3 and more carry fields without visible peaks: they count as long as the spacing at most.
     """
@@ -228,9 +238,9 @@ def _midpoints(boundary: BoundaryStress, spacing: float) -> tuple[FloatArray, Fl
         counts = np.maximum(2, np.ceil(2.0 * mesh.lengths / spacing).astype(int))
     element = np.repeat(np.arange(mesh.n_elements), counts)
     number = np.arange(len(element)) - np.repeat(np.cumsum(counts) - counts, counts)
-    xi = ((2.0 * number + 1.0) / counts[element] - 1.0)[:, None]
-    points, normals = mesh.points(element, xi)[:, 0], mesh.normals_at(element, xi)[:, 0]
-    return points, normals, mesh.lengths[element] / counts[element]
+    xi = (2.0 * number + 1.0) / counts[element] - 1.0
+    points, normals = mesh.points(element, xi[:, None])[:, 0], mesh.normals_at(element, xi[:, None])[:, 0]
+    return _Midpoints(element, xi, points, normals, mesh.lengths[element] / counts[element])
 
 
 def _inner_points(
