@@ -62,7 +62,6 @@ def certificate_section(result: Result) -> list[Element]:
 def convergence_section(result: Result) -> list[Element]:
     """Return the history of the solver."""
     columns = history_columns(result.history)
-    columns["worst"] = [record.certificate.worst for record in result.history]
     names = ("step", "linear_solves", "n_separated", "n_stick", "n_slip", "n_changed", "relative_change", "worst")
     rows = [{name: _plain(columns[name][k]) for name in (*names, "message")} for k in range(len(result.history))]
     return [element("p", result.message or result.status.value), _shortened(rows, "Steps of the solver")]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import fields, replace
 from itertools import chain
 from typing import Any
@@ -25,8 +25,11 @@ from bemkit.solvers.base import StepRecord
 from bemkit.table import Column, Table, json_text
 
 TABLES = ("contact", "boundary", "history", "steps", "forces", "pressures")
-CERTIFICATE_ENTRIES = tuple(entry.name for entry in fields(Certificate))
-RECORD_COUNTS = ("step", "linear_solves", "n_separated", "n_stick", "n_slip", "n_changed")
+_HISTORY = (
+    *("step", "linear_solves", "n_separated", "n_stick", "n_slip", "n_changed", "relative_change"),
+    *(entry.name for entry in fields(Certificate)),
+    *("message", "worst"),
+)
 _BOUNDARY = (
     Column("body", "", "name of the body"),
     Column("element", "", "index of the element"),
@@ -115,24 +118,10 @@ def in_units(head: Column, solution: Solution) -> Column:
     return replace(head, unit=inverse + unit_of(QUANTITIES[unit], names)) if unit in QUANTITIES else head
 
 
-def columns_of(
-    rows: Sequence[Mapping[str, Any]],
-    *,
-    texts: Sequence[str] = (),
-    floats: Sequence[str] = (),
-    integers: Sequence[str] = (),
-) -> dict[str, Any]:
-    """Return the columns of these names of a table given by its rows, as `bemkit.hdf5.write_table` takes them."""
-    kinds = [(name, np.int64) for name in integers] + [(name, float) for name in floats]
-    numbers = {name: np.array([row[name] for row in rows], dtype=kind) for name, kind in kinds}
-    return numbers | {name: [row[name] for row in rows] for name in texts}
-
-
-def history_columns(history: Sequence[StepRecord]) -> dict[str, Any]:
-    """Return the convergence history as columns, the certificate's entries among them."""
-    rows = [vars(record) | record.certificate.as_dict() for record in history]
-    floats = ("relative_change", *CERTIFICATE_ENTRIES)
-    return columns_of(rows, texts=("message",), floats=floats, integers=RECORD_COUNTS)
+def history_columns(history: Sequence[StepRecord]) -> dict[str, list[Any]]:
+    """Return the convergence history as columns, the entries of the certificate and the worst of them included."""
+    rows = [vars(record) | vars(record.certificate) | {"worst": record.certificate.worst} for record in history]
+    return {name: [row[name] for row in rows] for name in _HISTORY}
 
 
 def to_json(solution: Solution) -> str:
@@ -165,9 +154,7 @@ def _columns(solution: Solution, table: str) -> dict[str, Any]:
                 raise InputError("the result has no load history: give [[steps]] or several load_factors")
             return {name: [row[name] for row in rows] for name in rows[0]}
         case _:
-            columns = dict(history_columns(solution.history))
-            columns["worst"] = np.array([record.certificate.worst for record in solution.history])
-            return columns
+            return history_columns(solution.history)
 
 
 def _boundary_columns(solution: Solution) -> dict[str, Any]:
