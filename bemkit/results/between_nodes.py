@@ -115,12 +115,6 @@ class MeasuredContact(NamedTuple):
     measure: Callable[[], PointsBetween]
 
 
-def points_at_obstacle(body: SolvedBody, obstacle: Obstacle, elements: IntArray) -> PointsBetween:
-    """Return clearance and tractions at points of elements (m,) that face a rigid obstacle at rest."""
-    sample = sample_at_obstacle(body, obstacle, elements)
-    return sample(np.arange(elements.size), np.full(elements.size, -1.0), np.ones(elements.size))
-
-
 def sample_at_obstacle(
     body: SolvedBody,
     obstacle: Obstacle,

@@ -9,7 +9,7 @@ from bemkit.contact.obstacle import Obstacle
 from bemkit.geometry.neighbours import along_boundary
 from bemkit.geometry.vectors import norms
 from bemkit.model.finite_sliding import is_in_the_plane
-from bemkit.results.between_nodes import Interpolation, points_at_obstacle, points_between
+from bemkit.results.between_nodes import Interpolation, points_between, sample_at_obstacle
 from bemkit.results.solved_body import SolvedBody
 from bemkit.scene.conditions import Contact
 
@@ -41,7 +41,8 @@ def distances_off(body: SolvedBody) -> dict[str, tuple[float, float]]:
 
 
 def _distance_off(body: SolvedBody, obstacle: Obstacle, elements: IntArray) -> float:
-    values = points_at_obstacle(body, obstacle, elements)
+    n = elements.size
+    values = sample_at_obstacle(body, obstacle, elements)(np.arange(n), np.full(n, -1.0), np.ones(n))
     is_pressed = -values.sigma_n > _PRESSED * float(np.maximum(-values.sigma_n, 0.0).max(initial=0.0))
     is_pressed &= np.isfinite(values.clearance)  # round-off where a part does not face its obstacle
     xi = points_between(body.scene.discretisation.displacement_space(body.mesh).degree)

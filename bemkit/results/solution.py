@@ -6,7 +6,7 @@ anticlockwise boundary, traction = stress @ n; a pressed contact has sigma_n <= 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
@@ -206,12 +206,6 @@ class Solution(SolvedScene, Explorable):
         """Largest violations between the nodes of each contact, by its name in the contact table."""
         return violations_between_nodes(self)
 
-    def between_nodes_of(self, names: Collection[str]) -> dict[str, BetweenNodes]:
-        """Return the largest violations between the nodes of some contacts; the others are not measured for it."""
-        if "contacts_between_nodes" in vars(self):
-            return {name: each for name, each in self.contacts_between_nodes.items() if name in names}
-        return violations_between_nodes(self, names) if names else {}
-
     @cached_property
     def missed_contacts(self) -> dict[str, tuple[float, float]]:
         """Points where contact is missed, because no node meets it, by contact; see `bemkit.results.between_nodes`."""
@@ -225,7 +219,10 @@ class Solution(SolvedScene, Explorable):
     @cached_property
     def narrow_contacts_between_nodes(self) -> dict[str, BetweenNodes]:
         """Largest violations between the nodes of contacts with a force at a few nodes at most."""
-        return self.between_nodes_of(narrow_contacts(self.contact))
+        names = narrow_contacts(self.contact)
+        if "contacts_between_nodes" in vars(self):  # measured already
+            return {name: each for name, each in self.contacts_between_nodes.items() if name in names}
+        return violations_between_nodes(self, names) if names else {}
 
     @cached_property
     def warnings(self) -> tuple[ResultWarning, ...]:
