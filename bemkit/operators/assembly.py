@@ -10,7 +10,6 @@ from __future__ import annotations
 import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from threading import Lock
 from typing import TYPE_CHECKING, TypeAlias
 
@@ -24,7 +23,7 @@ from bemkit.geometry.series import columns_of, series
 from bemkit.geometry.spaces import BoundarySpace
 from bemkit.operators.integrals.pairs import Degrees, PairIntegrals
 from bemkit.operators.integrals.sweep import FEW, PairSweep
-from bemkit.operators.pair_form import Functions, PairForm, Term
+from bemkit.operators.pair_form import Functions, PairForm
 from bemkit.operators.threads import for_each_chunk
 from bemkit.stopwatch import assembling
 
@@ -93,11 +92,6 @@ class _Target:
         """Return the zero matrix for the dofs of some elements."""
         test, trial = _dofs_on(form.test, test_elements), _dofs_on(form.trial, trial_elements)
         return cls(form, test, trial, np.zeros((test.size, 2, trial.size, 2)))
-
-    @cached_property
-    def terms(self) -> list[Term]:
-        """The terms of the form."""
-        return self.form.terms()
 
     def by_vector_dofs(self) -> FloatArray:
         """Return the matrix for vector dofs; rows and columns of dofs that vanish by symmetry are zero."""
@@ -172,7 +166,7 @@ class _Sweep:
             tested, n_test = target.form.tested, _n_polynomials(target.form.tested, test)
             if tested not in self.tested:
                 self.tested[tested] = columns_of(self._series(tested, None), mesh.n_elements, test, n_test)
-            for term in target.terms:
+            for term in target.form.terms:
                 n_trial = _n_polynomials(term.trial, trial)
                 highest = n_test - 1, n_trial - 1
                 self.degrees |= Degrees(double=highest) if term.is_double else Degrees(log=highest)
@@ -232,7 +226,7 @@ class _Sweep:
         folded = np.zeros((lengths.size, n_polynomials, 2, target.trial_nodes.size, 2))
         for c, d in np.ndindex(2, 2):
             entries: FloatArray | None = None
-            for term in target.terms:
+            for term in target.form.terms:
                 key = term.trial, term.is_double, self.components[d % len(self.components)]
                 for kernel in np.flatnonzero(term.tensors[:, c, d]).tolist():
                     part = term.tensors[kernel, c, d] * acted[key][:, kernel, :n_polynomials]

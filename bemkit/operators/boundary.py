@@ -19,11 +19,11 @@ from bemkit.errors import InputError
 from bemkit.geometry.spaces import BoundarySpace
 from bemkit.operators.assembly import assemble_block, assemble_together
 from bemkit.operators.forms import (
-    DoubleLayerForm,
-    HypersingularForm,
-    SingleLayerForm,
     definite,
+    double_layer_form,
+    hypersingular_form,
     mass_matrix,
+    single_layer_form,
 )
 from bemkit.operators.linear_solvers import Tag
 from bemkit.operators.material import Material
@@ -195,7 +195,7 @@ def single_layer(trial: BoundarySpace, test: BoundarySpace, material: Material) 
     The logarithm is log(|r| / r0) with the diameter r0 of the mesh. V is then positive definite for a body of any size.
     For tractions in equilibrium, r0 changes V t only by a translation.
     """
-    return PairOperator(SingleLayerForm(trial, test, material))
+    return PairOperator(single_layer_form(trial, test, material))
 
 
 def double_layer(trial: BoundarySpace, test: BoundarySpace, material: Material) -> PairOperator:
@@ -223,7 +223,7 @@ def double_layer(trial: BoundarySpace, test: BoundarySpace, material: Material) 
     -----
     Rigid motions r of a body fulfil (1/2 M + K) r = 0; on the boundary of an exterior, (1/2 M + K) r = M r.
     """
-    return PairOperator(DoubleLayerForm(trial, test, material))
+    return PairOperator(double_layer_form(trial, test, material))
 
 
 def adjoint_double_layer(trial: BoundarySpace, test: BoundarySpace, material: Material) -> Transposed:
@@ -269,7 +269,7 @@ def hypersingular(trial: BoundarySpace, test: BoundarySpace, material: Material)
     GeometryError
         If a space is not continuous.
     """
-    return PairOperator(HypersingularForm(trial, test, material))
+    return PairOperator(hypersingular_form(trial, test, material))
 
 
 def mass(trial: BoundarySpace, test: BoundarySpace) -> Mass:

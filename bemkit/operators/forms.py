@@ -13,7 +13,6 @@ so that all are combinations of the scalar integrals of `integrals`. The forms a
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -23,6 +22,7 @@ from bemkit.geometry.reflection import antisymmetric_dofs
 from bemkit.geometry.series import columns_of, series
 from bemkit.geometry.spaces import BoundarySpace
 from bemkit.operators.linear_solvers import Tag
+from bemkit.operators.material import Material
 from bemkit.operators.pair_form import Functions, PairForm, Term, require_one_mesh
 
 if TYPE_CHECKING:
@@ -36,74 +36,47 @@ _HALF_QUOTIENT = 0.5 * np.array([[[1.0, 0.0], [0.0, -1.0]], [[0.0, 1.0], [1.0, 0
 """Tensors of the real and imaginary part of r / conj(r) in Q - I/2."""
 
 
-@dataclass(frozen=True, eq=False)
-class SingleLayerForm(PairForm):
-    """V: traction -> displacement."""
+def single_layer_form(trial: BoundarySpace, test: BoundarySpace, material: Material) -> PairForm:
+    """Return V: traction -> displacement; the constant part of Q is in the shift.
 
-    @property
-    def tags(self) -> frozenset[Tag]:
-        """Symmetric and definite if both spaces are one; semidefinite for incompressible bodies, where V n = 0."""
-        is_one = self.trial is self.test
-        return definite(self.trial, self.material.effective_poisson_ratio < 0.5) if is_one else frozenset()
-
-    def terms(self) -> list[Term]:
-        """Return the only term of V; the constant part of Q is in the shift."""
-        nu = self.material.effective_poisson_ratio
-        factor = 1.0 / (8.0 * np.pi * self.material.shear_modulus * (1.0 - nu))
-        tensors = factor * np.stack([-(3.0 - 4.0 * nu) * _IDENTITY, *_HALF_QUOTIENT])
-        shift = -float(np.log(self.test.mesh.diameter)) - 0.5 / (3.0 - 4.0 * nu)
-        return [Term(Functions(self.trial), tensors, shift)]
+    It is symmetric and definite if both spaces are one; semidefinite for incompressible bodies, where V n = 0.
+    """
+    nu = material.effective_poisson_ratio
+    factor = 1.0 / (8.0 * np.pi * material.shear_modulus * (1.0 - nu))
+    tensors = factor * np.stack([-(3.0 - 4.0 * nu) * _IDENTITY, *_HALF_QUOTIENT])
+    shift = -float(np.log(test.mesh.diameter)) - 0.5 / (3.0 - 4.0 * nu)
+    tags = definite(trial, nu < 0.5) if trial is test else frozenset[Tag]()
+    return PairForm(trial, test, material, Functions(test), (Term(Functions(trial), tensors, shift),), tags)
 
 
-@dataclass(frozen=True, eq=False)
-class DoubleLayerForm(PairForm):
-    """K: displacement -> displacement, for continuous displacements."""
+def double_layer_form(trial: BoundarySpace, test: BoundarySpace, material: Material) -> PairForm:
+    """Return K: displacement -> displacement, for continuous displacements.
 
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        _require_continuous(self.trial, "double_layer", "trial")
-
-    def terms(self) -> list[Term]:
-        """Return the kernels that act on du/ds, and the scalar double layer of u.
-
-        The constant part of Q is omitted, because the mean of du/ds on a closed curve is zero.
-        """
-        nu = self.material.effective_poisson_ratio
-        factor = 1.0 / (4.0 * np.pi * (1.0 - nu))
-        tensors = factor * _TURN @ np.stack([(1.0 - 2.0 * nu) * _IDENTITY, *_HALF_QUOTIENT])
-        return [
-            Term(Functions(self.trial, derivative=True), tensors),
-            Term(Functions(self.trial), _IDENTITY[None]),
-        ]
+    It has the kernels that act on du/ds, and the scalar double layer of u. The constant part of Q is omitted, because
+    the mean of du/ds on a closed curve is zero.
+    """
+    _require_continuous(trial, "double_layer", "trial")
+    nu = material.effective_poisson_ratio
+    factor = 1.0 / (4.0 * np.pi * (1.0 - nu))
+    tensors = factor * _TURN @ np.stack([(1.0 - 2.0 * nu) * _IDENTITY, *_HALF_QUOTIENT])
+    terms = Term(Functions(trial, derivative=True), tensors), Term(Functions(trial), _IDENTITY[None])
+    return PairForm(trial, test, material, Functions(test), terms, frozenset())
 
 
-@dataclass(frozen=True, eq=False)
-class HypersingularForm(PairForm):
-    """W: displacement -> traction, for continuous displacements."""
+def hypersingular_form(trial: BoundarySpace, test: BoundarySpace, material: Material) -> PairForm:
+    """Return W: displacement -> traction, for continuous displacements.
 
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        _require_continuous(self.trial, "hypersingular", "trial")
-        _require_continuous(self.test, "hypersingular", "test")
-
-    @property
-    def tags(self) -> frozenset[Tag]:
-        """Symmetric and semidefinite if both spaces are one; a space on curved elements does not contain rotations."""
-        is_straight = bool(self.trial.mesh.is_straight.all())
-        kernel = Tag.KILLS_RIGID_MOTIONS if is_straight else Tag.KILLS_TRANSLATIONS
-        symmetric = {Tag.SYMMETRIC, Tag.POSITIVE_SEMIDEFINITE} if self.trial is self.test else set[Tag]()
-        return frozenset(symmetric | {kernel})
-
-    @property
-    def tested(self) -> Functions:
-        """dv/ds."""
-        return Functions(self.test, derivative=True)
-
-    def terms(self) -> list[Term]:
-        """Return the only term of W; the constant part of Q is omitted, because the means of du/ds and dv/ds vanish."""
-        factor = self.material.shear_modulus / (2.0 * np.pi * (1.0 - self.material.effective_poisson_ratio))
-        tensors = factor * np.stack([-_IDENTITY, *_HALF_QUOTIENT])
-        return [Term(Functions(self.trial, derivative=True), tensors)]
+    The constant part of Q is omitted, because the means of du/ds and dv/ds vanish. W is symmetric and semidefinite if
+    both spaces are one; a space on curved elements does not contain rotations.
+    """
+    _require_continuous(trial, "hypersingular", "trial")
+    _require_continuous(test, "hypersingular", "test")
+    factor = material.shear_modulus / (2.0 * np.pi * (1.0 - material.effective_poisson_ratio))
+    terms = (Term(Functions(trial, derivative=True), factor * np.stack([-_IDENTITY, *_HALF_QUOTIENT])),)
+    is_straight = bool(trial.mesh.is_straight.all())
+    kernel = Tag.KILLS_RIGID_MOTIONS if is_straight else Tag.KILLS_TRANSLATIONS
+    symmetric = {Tag.SYMMETRIC, Tag.POSITIVE_SEMIDEFINITE} if trial is test else set[Tag]()
+    return PairForm(trial, test, material, Functions(test, derivative=True), terms, frozenset(symmetric | {kernel}))
 
 
 def definite(space: BoundarySpace, is_positive: bool = True) -> frozenset[Tag]:

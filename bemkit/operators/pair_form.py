@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -51,7 +50,7 @@ class Term:
 
 
 @dataclass(frozen=True, eq=False)
-class PairForm(ABC):
+class PairForm:
     """A bilinear form <A trial, test> of integrals over pairs of elements.
 
     Parameters
@@ -59,6 +58,12 @@ class PairForm(ABC):
     trial, test : BoundarySpace
         Spaces of the argument and of the test functions.
     material : Material
+    tested : Functions
+        v, at the points x: functions of the test space.
+    terms : tuple of Term
+        Their sum is the form.
+    tags : frozenset of Tag
+        Properties of the matrix.
 
     Raises
     ------
@@ -69,23 +74,12 @@ class PairForm(ABC):
     trial: BoundarySpace
     test: BoundarySpace
     material: Material
+    tested: Functions
+    terms: tuple[Term, ...]
+    tags: frozenset[Tag]
 
     def __post_init__(self) -> None:
         require_one_mesh(self.trial, self.test)
-
-    @property
-    def tags(self) -> frozenset[Tag]:
-        """Properties of the matrix."""
-        return frozenset()
-
-    @property
-    def tested(self) -> Functions:
-        """v, at the points x: functions of the test space."""
-        return Functions(self.test)
-
-    @abstractmethod
-    def terms(self) -> list[Term]:
-        """Return the terms, whose sum is the form."""
 
 
 def require_one_mesh(trial: BoundarySpace, test: BoundarySpace) -> None:

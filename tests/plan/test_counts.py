@@ -110,8 +110,7 @@ def test_the_counts_of_the_papers_first_example() -> None:
 
 LEFT_OUT = {
     "constant": (
-        "operators.forms.HypersingularForm.terms",
-        "operators.forms.DoubleLayerForm.terms",
+        "operators.pair_form.PairForm.__init__",
         "operators.linear_solvers.Cholesky.__init__",
         "operators.integrals.inner.far_inner",
         "operators.integrals.curved_geometry.fit",
@@ -125,10 +124,10 @@ LEFT_OUT = {
     "no contact": (
         "contact.dense_body.DenseBody.__init__",
         "solvers.base._Run.finish",
-        "operators.forms.HypersingularForm.terms",
+        "operators.pair_form.PairForm.__init__",
     ),
-    "curved": ("operators.forms.HypersingularForm.terms", "operators.forms.SingleLayerForm.terms"),
-    "exterior": ("contact.dense_body.DenseBody.__init__", "operators.forms.SingleLayerForm.terms"),
+    "curved": ("operators.pair_form.PairForm.__init__",),
+    "exterior": ("contact.dense_body.DenseBody.__init__", "operators.pair_form.PairForm.__init__"),
 }
 
 

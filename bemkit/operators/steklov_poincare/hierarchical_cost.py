@@ -7,7 +7,7 @@ on the shape.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -35,32 +35,13 @@ _FLOPS_OF_LARGE = 0.2
 """Time of a flop in the factorisation of a large matrix relative to one on small blocks."""
 
 
-@dataclass(frozen=True)
-class _Costs:
-    """Costs of an element at the tolerance 1e-10.
-
-    Parameters
-    ----------
-    evaluations, compiled : float
-        Evaluations of integrals in numpy, and their equivalent with compiled kernels.
-    flops, of_step : float
-        Flops of the first factorisation, and of a contact step.
-    n_bytes, of_contact : float
-        Memory, and additional memory of an element in contact.
-    of_top : float
-        Additional memory of the largest clusters, whose ranks hardly depend on the number of elements.
-    """
-
-    evaluations: float
-    compiled: float
-    flops: float
-    of_step: float
-    n_bytes: float
-    of_contact: float
-    of_top: float
-
-
-_COLLOCATION = _Costs(14e3, 3e3, 0.4e6, 25e3, 8.6e3, 3.5e3, 9e6)
+_EVALUATIONS, _COMPILED = 14e3, 3e3
+"""Evaluations of integrals for an element at the tolerance 1e-10, in numpy, and their equivalent if compiled."""
+_FLOPS, _FLOPS_OF_ELEMENT_IN_STEP = 0.4e6, 25e3
+"""Flops of an element in the first factorisation, and in a contact step."""
+_BYTES, _BYTES_OF_CONTACT, _BYTES_OF_TOP = 8.6e3, 3.5e3, 9e6
+"""Memory of an element, additional memory of one in contact, and that of the largest clusters, whose ranks hardly
+depend on the number of elements."""
 _FLOPS_OF_STEP = 2e8
 """Flops of a contact step that do not grow with the mesh."""
 _BYTES_OF_STATE, _FLOPS_OF_STATE = 40.0, 2e3
@@ -115,18 +96,17 @@ def _tree_items(case: BodyCase, options: Hierarchical) -> tuple[PlanItem, PlanIt
 
 
 def _cost(case: BodyCase, options: Hierarchical, *, is_compiled: bool | None = None) -> BodyCost:
-    costs = _COLLOCATION
     n, digits = case.mesh.n_elements, -math.log10(options.tolerance) / _DIGITS
     n_both = int(np.count_nonzero(case.conditions.is_retained.any(axis=1)))
     if is_compiled is None:
         from bemkit.operators.collocation import compiled
 
         is_compiled, _ = compiled.expected(n)
-    memory = int(digits * (costs.of_top + costs.n_bytes * n + costs.of_contact * n_both))
-    evaluations = digits * n * (costs.compiled if is_compiled else costs.evaluations)
-    flops = costs.flops * n
+    memory = int(digits * (_BYTES_OF_TOP + _BYTES * n + _BYTES_OF_CONTACT * n_both))
+    evaluations = digits * n * (_COMPILED if is_compiled else _EVALUATIONS)
+    flops = _FLOPS * n
     if n_both:
-        flops += CONTACT_STEPS * len(case.loads) * (_FLOPS_OF_STEP + costs.of_step * n)
+        flops += CONTACT_STEPS * len(case.loads) * (_FLOPS_OF_STEP + _FLOPS_OF_ELEMENT_IN_STEP * n)
     flops *= digits
     if case.is_condensed:
         memory += int(_BYTES_OF_STATE * case.n_retained**2)

@@ -12,10 +12,10 @@ from bemkit.geometry.spaces import BoundarySpace, dof_points
 from bemkit.operators.assembly import assemble_together
 from bemkit.operators.counts import Entries, OperationCounts
 from bemkit.operators.forms import (
-    DoubleLayerForm,
-    HypersingularForm,
-    SingleLayerForm,
+    double_layer_form,
+    hypersingular_form,
     mass_matrix,
+    single_layer_form,
 )
 from bemkit.operators.linear_solvers import Cholesky, multiply, subtract_product
 from bemkit.operators.material import Material
@@ -66,8 +66,10 @@ def galerkin_factors(
         body with normals n; n are the tractions of its dilatation.
     """
     u, t, mesh = displacements, tractions, displacements.mesh
-    single = SingleLayerForm(t, t, material)
-    (v, k, w), n_pairs = assemble_together([single, DoubleLayerForm(u, t, material), HypersingularForm(u, u, material)])
+    single = single_layer_form(t, t, material)
+    (v, k, w), n_pairs = assemble_together(
+        [single, double_layer_form(u, t, material), hypersingular_form(u, u, material)]
+    )
     work = OperationCounts(
         element_pairs=n_pairs,
         single_layer=Entries.full(t.n_dofs, t.n_dofs),
