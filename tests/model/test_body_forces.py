@@ -260,7 +260,7 @@ def test_a_ring_that_cools_shrinks_onto_its_shaft(plane: Plane) -> None:
 @pytest.mark.parametrize(("distance", "rtol"), [(0.4, 1e-9), (1e3, 1e-6)])
 def test_results_do_not_depend_on_place_and_units(distance: float, rtol: float) -> None:
     """A million diameters away coordinates, and so temperatures that depend on them, hold ten digits."""
-    from bemkit.scene.transform import AffineMap, transformed_scene
+    from bemkit.studies.stability.transform import AffineMap, transformed_scene
 
     forces = (WEIGHT, bk.Rotation(1.0, 0.3, (0.2, 0.7)), bk.Heating(0.1, bk.Expression("1 + x * y")))
     here = block(body_forces=forces, law=bk.Coulomb(0.2), parts=(FLOOR,))

@@ -15,7 +15,7 @@ from bemkit.errors import InputError
 from bemkit.scene.load_history import load_steps
 from bemkit.scene.symmetry import find_symmetry
 from bemkit.scene.toml import SceneError, scene_from_toml, scene_to_toml
-from bemkit.scene.transform import AffineMap, transformed_scene, with_turned_loads
+from bemkit.studies.stability.transform import AffineMap, transformed_scene, with_turned_loads
 
 FORCES = (
     bk.Gravity(2400.0, is_constant=True),

@@ -10,7 +10,7 @@ import pytest
 
 import bemkit as bk
 from bemkit.scene.load_history import with_scaled_loads
-from bemkit.scene.transform import with_turned_loads
+from bemkit.studies.stability.transform import with_turned_loads
 
 STEEL = bk.Material(1e4, 0.3)
 BASE = bk.Part("base", bk.Clamped(), ("bottom",))

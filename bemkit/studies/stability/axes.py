@@ -29,12 +29,12 @@ from bemkit.scene.discretisation import MeshOptions
 from bemkit.scene.load_history import with_changed_steps
 from bemkit.scene.plane_motion import FarField
 from bemkit.scene.scene import Scene
-from bemkit.scene.transform import AffineMap, transformed_scene, with_gap_offset, with_turned_loads
 from bemkit.solvers.alm import AugmentedLagrangian
 from bemkit.solvers.base import ContactSolver
 from bemkit.solvers.ssn import SemismoothNewton
 from bemkit.studies.stability.case import PRECISION, Case, precision_elsewhere, with_friction
 from bemkit.studies.stability.similarity import Similarity
+from bemkit.studies.stability.transform import AffineMap, transformed_scene, with_gap_offset, with_turned_loads
 
 
 @dataclass(frozen=True)

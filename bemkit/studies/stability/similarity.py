@@ -23,7 +23,7 @@ from bemkit.scene.copies import CircleCopies, Copies, GridCopies, ListedCopies
 from bemkit.scene.load_history import with_changed_steps
 from bemkit.scene.plane_motion import RigidBody
 from bemkit.scene.scene import Scene
-from bemkit.scene.transform import AffineMap, TransformedRegion, transformed_scene
+from bemkit.studies.stability.transform import AffineMap, TransformedRegion, transformed_scene
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ from bemkit.model.prepared import prepare
 from bemkit.operators.half_plane.flexibility import mean_logarithms
 from bemkit.operators.half_plane.periodic import PeriodicElasticity, wave_flexibility
 from bemkit.operators.material import Material, Plane
-from bemkit.scene.transform import with_gap_offset
+from bemkit.studies.stability.transform import with_gap_offset
 from bemkit.testing import check_body
 from tests.slow import slow_except
 

@@ -13,7 +13,7 @@ from bemkit.cli.console import print_summary
 from bemkit.pictures import draw_deformation
 from bemkit.pictures.shown import at_mesh_nodes, shown
 from bemkit.scene.toml import scene_from_toml, scene_to_toml
-from bemkit.scene.transform import AffineMap, transformed_scene
+from bemkit.studies.stability.transform import AffineMap, transformed_scene
 from bemkit.testing.independent_check import violations_of
 from tests.scenes import DISCRETISATIONS, square, squeezed, whole_mesh
 from tests.slow import slow_except

@@ -9,11 +9,11 @@ import pytest
 
 import bemkit as bk
 from bemkit.geometry.meshing.discretise import discretise
-from bemkit.scene.transform import AffineMap, transformed_scene, with_gap_offset, with_turned_loads
 from bemkit.studies.stability.axes import degenerate_diameters
 from bemkit.studies.stability.case import Case
 from bemkit.studies.stability.similarity import Similarity
 from bemkit.studies.stability.sweep import difference
+from bemkit.studies.stability.transform import AffineMap, transformed_scene, with_gap_offset, with_turned_loads
 from tests.scenes import FLOOR, block, small_paper_scene
 
 SIMILARITY = Similarity(length=3.0, modulus=70.0, stress=11.0, shift=(5.0, -7.0))

@@ -11,10 +11,10 @@ import pytest
 import bemkit as bk
 from bemkit.geometry.meshing.discretise import Geometric
 from bemkit.operators.half_plane.flexibility import mean_logarithms
-from bemkit.scene.transform import with_turned_loads
 from bemkit.studies.stability.axes import AXES, find_axes
 from bemkit.studies.stability.similarity import Similarity
 from bemkit.studies.stability.sweep import TWIN, StabilityError, difference, solve_and_judge, sweep
+from bemkit.studies.stability.transform import with_turned_loads
 from bemkit.testing.independent_check import Violations, violations_of
 from bemkit.testing.independent_check.bodies import bodies_of
 from bemkit.testing.independent_check.half_plane import Surface
