@@ -15,7 +15,6 @@ from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.neighbours import along_boundary
 from bemkit.geometry.spaces import BoundarySpace, dof_points, element_nodes
 from bemkit.scene.body_scene import BodyScene
-from bemkit.scene.conditions import Contact
 
 SMOOTH_SIDE_COSINE = 0.866
 """Cosine of 30 degrees. Directions of contact at one node that differ by less belong to one smooth side."""
@@ -95,9 +94,9 @@ def find_contact(
     of mortar methods [Wohlmuth2000].
     """
     parts = [
-        FacingPart(part.name, part.name, part.condition.obstacle, scene.laws[part.name].is_frictionless)
-        for part in scene.parts
-        if isinstance(part.condition, Contact) and mesh.part(part.name).size  # none beyond a symmetry line
+        FacingPart(part, part, obstacle, scene.laws[part].is_frictionless)
+        for part, obstacle in scene.obstacles.items()
+        if mesh.part(part).size  # none beyond a symmetry line
     ]
     parts += further
     if not parts:

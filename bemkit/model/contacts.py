@@ -144,7 +144,7 @@ class ContactInterface:
 
 def may_overlap(scene: Scene, bodies: Sequence[BodyScene]) -> bool:
     """Whether there are other bodies, or obstacles of finite size, that a body may overlap beside its contacts."""
-    is_finite = any(not isinstance(obstacle, RigidHalfPlane) for body in bodies for obstacle in body.obstacles)
+    is_finite = any(not isinstance(obstacle, RigidHalfPlane) for body in bodies for obstacle in body.obstacles.values())
     return len(bodies) > 1 or bool(scene.rigid) or is_finite
 
 

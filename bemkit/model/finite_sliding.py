@@ -20,7 +20,6 @@ from bemkit.geometry.vectors import norms, turned_left
 from bemkit.model.contacts import ContactInterface
 from bemkit.model.placed import PlacedBody
 from bemkit.model.prepared import Prepared
-from bemkit.scene.conditions import Contact
 from bemkit.scene.unit_names import amount
 
 _OFF = 0.2
@@ -101,7 +100,8 @@ def _is_off_obstacle(
 ) -> bool:
     """Whether nodes have moved to places where the obstacle has another distance or direction, or is inside."""
     number = rows.other - len(prepared.bodies)
-    obstacle = _fixed_obstacle(prepared, rows) if number < 0 else prepared.scene.rigid[number].obstacle
+    fixed = prepared.bodies[rows.body].scene.obstacles
+    obstacle = fixed[rows.part] if number < 0 else prepared.scene.rigid[number].obstacle
     if not is_in_the_plane(obstacle):
         return False
     points, normals = rows.points, rows.frame[:, 0]
@@ -141,13 +141,6 @@ def _is_oblique(body: PlacedBody, rows: ContactInterface, is_pressed: BoolArray)
     facing = np.full(len(towards), -1.0)
     np.maximum.at(facing, space.element_dofs[elements], np.sum(normals * towards[space.element_dofs[elements]], axis=2))
     return bool((facing[rows.nodes[is_pressed]] < _LEAST_FACING).any())
-
-
-def _fixed_obstacle(prepared: Prepared, rows: ContactInterface) -> Obstacle:
-    """Return the fixed obstacle of a contact."""
-    parts = prepared.bodies[rows.body].scene.parts
-    stated = {part.name: part.condition for part in parts if isinstance(part.condition, Contact)}
-    return stated[rows.part].obstacle
 
 
 def is_in_the_plane(obstacle: Obstacle) -> TypeGuard[DirectedObstacle]:

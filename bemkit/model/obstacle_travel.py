@@ -13,7 +13,6 @@ from bemkit.contact.signed_distance import SignedDistance
 from bemkit.contact.spline import RigidSpline
 from bemkit.errors import InputError
 from bemkit.model.prepared import Prepared
-from bemkit.scene.conditions import Contact
 
 _ROUND_OFF = 1e-12
 """Largest difference of a shifted obstacle from another one, relative to the coordinates."""
@@ -31,7 +30,7 @@ def obstacle_travel(before: Prepared, after: Prepared) -> FloatArray:
     for rows in after.rows:
         travel = np.zeros(rows.n_contact)
         if rows.other < 0 and not rows.law.is_frictionless:
-            one, two = (_obstacle(prepared, rows.body, rows.part) for prepared in (before, after))
+            one, two = (step.bodies[rows.body].scene.obstacles[rows.part] for step in (before, after))
             shift = shift_between(one, two)
             if shift is None:
                 raise InputError(
@@ -73,8 +72,3 @@ def _common_shift(before: FloatArray, after: FloatArray) -> FloatArray | None:
     shifts = after - before
     size = float(np.abs([before, after]).max())
     return np.asarray(shifts[0]) if np.ptp(shifts, axis=0).max() <= _ROUND_OFF * size else None
-
-
-def _obstacle(prepared: Prepared, body: int, part: str) -> Obstacle:
-    parts = prepared.bodies[body].scene.parts
-    return {each.name: each.condition for each in parts if isinstance(each.condition, Contact)}[part].obstacle

@@ -73,13 +73,13 @@ def is_finite(obstacle: Obstacle) -> bool:
 def finite_obstacles(scene: BodyScene) -> list[tuple[Obstacle, list[str]]]:
     """Return the different fixed obstacles of finite size of a body, each with the parts that may touch it."""
     found: list[tuple[Obstacle, list[str]]] = []
-    for part, obstacle in zip(scene.contact_parts, scene.obstacles, strict=True):
+    for part, obstacle in scene.obstacles.items():
         if is_finite(obstacle):
             parts = next((known for other, known in found if other == obstacle), None)
             if parts is None:
-                found.append((obstacle, [part.name]))
+                found.append((obstacle, [part]))
             else:
-                parts.append(part.name)
+                parts.append(part)
     return found
 
 

@@ -25,7 +25,7 @@ from bemkit.model.placed import PlacedBody, with_found_contacts
 from bemkit.operators.rigid_modes import rigid_motions
 from bemkit.operators.steklov_poincare.forces_inside import ForcesInside
 from bemkit.operators.steklov_poincare.nodal_conditions import free_modes
-from bemkit.scene.conditions import Contact, name_at_obstacle
+from bemkit.scene.conditions import name_at_obstacle
 from bemkit.scene.contacts import ContactPair
 from bemkit.scene.scene import Scene
 
@@ -214,11 +214,9 @@ def joints_of(scene: Scene, bodies: Sequence[PlacedBody]) -> Iterator[Joint]:
             obstacle, partner = scene.rigid_body_of(pair).obstacle, names.index(pair.rigid_body)
             yield from _on_obstacle(pair.name, bodies[parts[0][0]], parts[0], partner, obstacle, scene.law_of(pair))
     for number, body in enumerate(bodies):
-        for part in body.scene.parts:
-            if isinstance(part.condition, Contact):
-                law = body.scene.laws[part.name]
-                name = name_at_obstacle(body.name, part.name)
-                yield from _on_obstacle(name, body, (number, part.name), -1, part.condition.obstacle, law)
+        for part, obstacle in body.scene.obstacles.items():
+            name, law = name_at_obstacle(body.name, part), body.scene.laws[part]
+            yield from _on_obstacle(name, body, (number, part), -1, obstacle, law)
 
 
 def _joint_of_sides(

@@ -21,7 +21,7 @@ from bemkit.results.between_nodes import (
 )
 from bemkit.results.least_clearance import Sample, nearest_only, with_least_clearances
 from bemkit.results.part_forces import RigidResult
-from bemkit.scene.conditions import Contact, name_at_obstacle
+from bemkit.scene.conditions import name_at_obstacle
 
 if TYPE_CHECKING:
     from bemkit.results.solved_scene import SolvedScene
@@ -102,13 +102,11 @@ def _at_obstacles(solution: SolvedScene) -> Iterator[MeasuredContact]:
     for owner, body in solution.bodies.items():
         scene, mesh = body.scene, body.mesh
         facing: dict[str, list[tuple[str, FrictionLaw, Sample]]] = {}
-        for part in scene.parts:
-            elements = mesh.part(part.name)
-            if isinstance(part.condition, Contact) and elements.size:  # none beyond a symmetry line
-                sample = sample_at_obstacle(body, part.condition.obstacle, elements)
-                facing.setdefault(part.name, []).append(
-                    (name_at_obstacle(body.name, part.name), scene.laws[part.name], sample)
-                )
+        for part_name, obstacle in scene.obstacles.items():
+            elements = mesh.part(part_name)
+            if elements.size:  # none beyond a symmetry line
+                sample = sample_at_obstacle(body, obstacle, elements)
+                facing[part_name] = [(name_at_obstacle(body.name, part_name), scene.laws[part_name], sample)]
         for pair in moving.get(owner, ()):
             part_name = pair.elastic_parts[0][1]
             rigid = stated.rigid_body_of(pair)

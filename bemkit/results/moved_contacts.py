@@ -11,7 +11,6 @@ from bemkit.geometry.vectors import norms
 from bemkit.model.finite_sliding import is_in_the_plane
 from bemkit.results.between_nodes import Interpolation, points_between, sample_at_obstacle
 from bemkit.results.solved_body import SolvedBody
-from bemkit.scene.conditions import Contact
 
 _PRESSED = 0.01
 """Least pressure that counts, relative to the largest."""
@@ -30,13 +29,13 @@ def distances_off(body: SolvedBody) -> dict[str, tuple[float, float]]:
         displacement that its contact force causes, force / E'. Parts without contact force are excluded.
     """
     found = {}
-    for part in body.scene.parts:
-        if isinstance(part.condition, Contact) and is_in_the_plane(part.condition.obstacle):
-            elements = along_boundary(body.mesh, body.mesh.part(part.name))
+    for part, obstacle in body.scene.obstacles.items():
+        if is_in_the_plane(obstacle):
+            elements = along_boundary(body.mesh, body.mesh.part(part))
             force = float(body.mesh.lengths[elements] @ norms(body.boundary.traction[elements]))
             if force > 0.0:
-                off = _distance_off(body, part.condition.obstacle, elements)
-                found[part.name] = off, force / body.scene.material.plane_modulus
+                off = _distance_off(body, obstacle, elements)
+                found[part] = off, force / body.scene.material.plane_modulus
     return found
 
 

@@ -230,7 +230,7 @@ def _large_strains(body: SolvedBody) -> Iterator[ResultWarning]:
 
 def _moved_contacts(body: SolvedBody, units: UnitNames | None) -> Iterator[ResultWarning]:
     """Warn of bodies that move so far along obstacles that their gaps change."""
-    if all(isinstance(obstacle, RigidHalfPlane) for obstacle in body.scene.obstacles):
+    if all(isinstance(obstacle, RigidHalfPlane) for obstacle in body.scene.obstacles.values()):
         return  # the distance from a plane is linear in the displacement
     from bemkit.results.moved_contacts import distances_off
 

@@ -151,14 +151,14 @@ class BodyScene:
         return tuple(part for part in self.parts if isinstance(part.condition, Contact))
 
     @property
-    def obstacles(self) -> tuple[Obstacle, ...]:
-        """The obstacles of these parts."""
-        return tuple(part.condition.obstacle for part in self.parts if isinstance(part.condition, Contact))
+    def obstacles(self) -> dict[str, Obstacle]:
+        """The obstacles of these parts, by their names."""
+        return {part.name: part.condition.obstacle for part in self.parts if isinstance(part.condition, Contact)}
 
     @property
     def may_touch_profiles(self) -> bool:
         """Whether an obstacle may be a measured profile; only such scenes load the module of profiles."""
-        return not all(isinstance(obstacle, SIMPLE_OBSTACLES) for obstacle in self.obstacles)
+        return not all(isinstance(obstacle, SIMPLE_OBSTACLES) for obstacle in self.obstacles.values())
 
     @property
     def cannot_turn(self) -> bool:
