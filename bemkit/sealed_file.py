@@ -118,12 +118,6 @@ def created(target: Path) -> Iterator[h5py.File]:
         growing.finish()
 
 
-def seal(path: Path) -> None:
-    """Write the mark, the checksum and the length of the HDF5 content of a file into the user block before it."""
-    content = path.read_bytes()[USER_BLOCK:]
-    path.write_bytes(user_block(content) + content)
-
-
 def user_block(content: bytes) -> bytes:
     """Return the block before HDF5 content."""
     digest = hashlib.sha256(content).hexdigest()

@@ -22,8 +22,7 @@ from bemkit.operators.steklov_poincare.cost import (
     physical_memory,
     seconds_of,
 )
-from bemkit.plan.items import Sizes as Sizes
-from bemkit.plan.items import find_sizes, items_of_one, items_of_several
+from bemkit.plan.items import Sizes, find_sizes, items_of_one, items_of_several
 from bemkit.scene.scene import Scene
 from bemkit.stopwatch import announce
 
@@ -40,7 +39,7 @@ LEAST_SECONDS = 0.1
 _MANY = 10_000
 """Elements that are divided and planned in a moment, whether they fit or not."""
 _FEW = 4_000
-"""Elements of the mesh from whose plan larger ones are extrapolated."""
+"""Elements of the mesh from whose plan larger ones are extrapolated, but no fewer than its sides need."""
 _OF_SIDE = 4
 """Elements of a side on a coarse mesh; no mesh has less than one between two ends of sides and parts."""
 _FILL = 6.0
@@ -217,19 +216,11 @@ def check_memory(plan: Plan) -> None:
     _check(plan.sizes.n_elements, plan.memory, plan.is_compressed)
 
 
-def check_elements(scene: Scene, *, few: int = _FEW, many: int = _MANY) -> None:
+def check_elements(scene: Scene) -> None:
     """Check, before the mesh is made, that the matrices for a number of elements fit into this computer.
 
     Memory grows with the square of that number, or linearly where the equations are compressed: the plans for small
     meshes predict the cost of a large one. Half-planes of many elements have no matrices.
-
-    Parameters
-    ----------
-    scene : Scene
-    few : int
-        Elements of the mesh from whose plan larger ones are extrapolated, but no fewer than its sides need.
-    many : int
-        Elements that are divided and planned in a moment, whether they fit or not.
 
     Raises
     ------
@@ -239,8 +230,8 @@ def check_elements(scene: Scene, *, few: int = _FEW, many: int = _MANY) -> None:
     if len(scene.placed_bodies) > 1:
         return
     n_elements, outline = scene.only.mesh.elements, scene.only.shape.outline()
-    few = max(few, few_on(outline))
-    if n_elements is None or n_elements <= max(many, few) or outline.surface is not None:
+    few = max(_FEW, few_on(outline))
+    if n_elements is None or n_elements <= max(_MANY, few) or outline.surface is not None:
         return
     plan, growth = _plan_of(scene, few), n_elements / few
     if plan.is_compressed:  # on meshes where what does not grow is all there

@@ -156,7 +156,7 @@ def _in_turn(
     return SolvedSteps(solved_history(scenes, mesh, callback, guess=guess, executor=executor)[1])
 
 
-def cascade_of(scene: Scene, *, coarsest: int = _COARSEST, large: int = _LARGE) -> tuple[int, int] | None:
+def cascade_of(scene: Scene) -> tuple[int, int] | None:
     """Return elements of the coarsest mesh and the ratio of a cascade, None if a scene is solved on its mesh at once.
 
     A cascade pays where a contact step costs about as much as the assembly: for half-planes, of which only closed nodes
@@ -166,16 +166,16 @@ def cascade_of(scene: Scene, *, coarsest: int = _COARSEST, large: int = _LARGE) 
         return None
     outline, n_elements = scene.only.shape.outline(), scene.only.mesh.n_elements
     if outline.surface is None:
-        coarsest, ratio = max(coarsest, few_on(outline)), _RATIO
+        coarsest, ratio = max(_COARSEST, few_on(outline)), _RATIO
     elif outline.surface.is_periodic:
-        ratio = 2
+        coarsest, ratio = _COARSEST, 2
     else:
-        coarsest, ratio = _COARSEST_STRIP, _RATIO if n_elements > large else 4
+        coarsest, ratio = _COARSEST_STRIP, _RATIO if n_elements > _LARGE else 4
     if n_elements < ratio * coarsest:
         return None
     if outline.surface is not None:
         return coarsest, ratio
-    smaller = replace(scene, mesh=replace(scene.mesh, elements=max(large, few_on(outline))))
+    smaller = replace(scene, mesh=replace(scene.mesh, elements=max(_LARGE, few_on(outline))))
     return (coarsest, ratio) if make_plan(smaller).is_compressed else None
 
 

@@ -22,6 +22,9 @@ far in few steps, but cost digits."""
 _ROUND_OFF = 1e-11
 """Largest tableau entry, relative to the largest of its column, that is round-off of eliminations."""
 
+_MOST_PIVOTS = 50
+"""Largest number of pivots for each unknown."""
+
 
 @dataclass(frozen=True)
 class LemkePivoting:
@@ -102,15 +105,13 @@ class LemkePivoting:
         return Iterate(state=state, linear_solves=spent, message=f"{n_pivots} pivots")
 
 
-def lemke(matrix: FloatArray, vector: FloatArray, max_pivots: int | None = None) -> tuple[FloatArray | None, int]:
+def lemke(matrix: FloatArray, vector: FloatArray) -> tuple[FloatArray | None, int]:
     """Return z with ``z >= 0``, ``w = matrix z + vector >= 0``, ``z w = 0``, by Lemke's algorithm.
 
     Parameters
     ----------
     matrix : (n, n) array
     vector : (n,) array
-    max_pivots : int, optional
-        ``50 n`` by default.
 
     Returns
     -------
@@ -119,7 +120,7 @@ def lemke(matrix: FloatArray, vector: FloatArray, max_pivots: int | None = None)
     n_pivots : int
     """
     n = len(vector)
-    limit = 50 * n if max_pivots is None else max_pivots
+    limit = _MOST_PIVOTS * n
     if vector.min() >= 0.0:
         return np.zeros(n), 0
     # columns: w (n), z (n), artificial variable, right-hand side; the covering vector is uneven to avoid ties

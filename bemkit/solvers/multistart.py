@@ -11,13 +11,7 @@ from bemkit.errors import InputError
 from bemkit.solvers.base import ContactSolution, ContactSolver, solve
 
 
-def probe(
-    problem: ContactProblem,
-    solver: ContactSolver,
-    *,
-    n_starts: int = 8,
-    starts: Sequence[ContactState] = (),
-) -> tuple[ContactSolution, ...]:
+def probe(problem: ContactProblem, solver: ContactSolver, *, n_starts: int = 8) -> tuple[ContactSolution, ...]:
     """Solve from several starts and return the distinct certified solutions.
 
     With Coulomb friction a problem may have several solutions; the start selects one of them.
@@ -27,10 +21,8 @@ def probe(
     problem : ContactProblem
     solver : ContactSolver
     n_starts : int
-        Number of generated starts: all nodes sticking, open, slipping forward, slipping backward, then random statuses
-        with a fixed seed.
-    starts : sequence of ContactState
-        Further starts, used first.
+        Number of starts: all nodes sticking, open, slipping forward, slipping backward, then random statuses with a
+        fixed seed.
 
     Returns
     -------
@@ -49,8 +41,8 @@ def probe(
     choices = [np.full(problem.n_contact, status) for status in uniform[:n_starts]]
     choices += [random.integers(0, 4, problem.n_contact) for _ in range(n_starts - len(choices))]
     distinct: list[ContactSolution] = []
-    for start in [*starts, *(start_with(problem, choice) for choice in choices)]:
-        solution = solve(problem, solver, start=start, throw=False)
+    for choice in choices:
+        solution = solve(problem, solver, start=start_with(problem, choice), throw=False)
         if solution.is_converged and not any(_is_same(problem, solution.state, other.state) for other in distinct):
             distinct.append(solution)
     return tuple(distinct)

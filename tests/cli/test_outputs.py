@@ -12,7 +12,7 @@ import pytest
 import bemkit as bk
 from bemkit.cli.main import main
 from bemkit.reference import find_reference
-from bemkit.sealed_file import seal
+from tests.sealed import seal
 
 pytestmark = pytest.mark.usefixtures("here")
 SMALL = ("--elements", "24", "--discretisation", "linear")

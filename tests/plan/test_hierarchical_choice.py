@@ -15,7 +15,7 @@ import bemkit as bk
 from bemkit.model.prepared import prepare
 from bemkit.operators.linear_solvers import ChosenLinearSolver, DenseCholesky
 from bemkit.operators.steklov_poincare.galerkin import GalerkinElasticity
-from bemkit.plan import check_elements
+from bemkit.plan import check_elements, plan
 from bemkit.results.solved_steps import with_times
 from bemkit.runs.nested import run_nested
 from tests.scenes import Perforated, paper, squeezed
@@ -168,16 +168,18 @@ def test_a_ratio_of_meshes_below_two_is_refused() -> None:
         run_nested(scene_of(400), ratio=1)
 
 
-def test_a_body_of_many_sides_takes_no_mesh_that_is_too_coarse_for_it() -> None:
+def test_a_body_of_many_sides_takes_no_mesh_that_is_too_coarse_for_it(monkeypatch: pytest.MonkeyPatch) -> None:
     """A plate with 40 holes in place of one with 1000, whose 2004 sides are more than 20000 elements divided by 16."""
+    for module, name, value in ((plan, "_FEW", 50), (plan, "_MANY", 100), (run, "_COARSEST", 40), (run, "_LARGE", 50)):
+        monkeypatch.setattr(module, name, value)
     parts = (
         bk.Part("floor", bk.Contact(bk.RigidHalfPlane((0.0, -1.0), (0.0, 1.0))), sides=("bottom",)),
         bk.Part("press", bk.Pressure(0.1), sides=("top",)),
     )
     scene = scene_of(900, shape=Perforated(8, 5), parts=parts, linear_solver=bk.Hierarchical())
-    check_elements(scene, few=50, many=100)
-    assert not run.cascade_of(scene, coarsest=40, large=50)
-    cascade = run.cascade_of(replace(scene, mesh=replace(scene.mesh, elements=6000)), coarsest=40, large=50)
+    check_elements(scene)
+    assert not run.cascade_of(scene)
+    cascade = run.cascade_of(replace(scene, mesh=replace(scene.mesh, elements=6000)))
     assert cascade is not None
     assert cascade[1] == 16
 

@@ -19,7 +19,7 @@ from bemkit.plan import make_plan
 from bemkit.results.solution import Solution
 from bemkit.results.tables import to_csv, to_json
 from bemkit.scene.toml import with_overrides
-from bemkit.sealed_file import seal
+from tests.sealed import seal
 
 pytest.importorskip("matplotlib")
 

@@ -23,8 +23,8 @@ from bemkit.results.solution import Solution
 from bemkit.runs.run import run
 from bemkit.scene.conditions import Part, Traction
 from bemkit.scene.toml import SceneError, load_scene, scene_from_toml, scene_to_toml, with_overrides
-from bemkit.sealed_file import seal
 from bemkit.solvers.base import Status
+from tests.sealed import seal
 
 DISC = """
 title = "Disc between plates"

@@ -51,8 +51,6 @@ def test_probe_finds_all_three_and_tells_them_apart():
     assert {NodeStatus(int(solution.node_status[0])) for solution in found} == set(THREE_ANSWERS)
     assert len(found) == 3
     assert len(probe(THREE, SemismoothNewton(), n_starts=1)) == 1
-    given = probe(THREE, SemismoothNewton(), n_starts=0, starts=[start_with(THREE, [NodeStatus.SEPARATED])])
-    assert [solution.node_status[0] for solution in given] == [NodeStatus.SEPARATED]
     with pytest.raises(ValueError, match="n_starts = -1"):
         probe(THREE, SemismoothNewton(), n_starts=-1)
 

@@ -113,14 +113,12 @@ def find_facing(
     return found
 
 
-def is_non_mortar(one: ContactSide, two: ContactSide, distance: float = np.inf, *, has_friction: bool = False) -> bool:
+def is_non_mortar(one: ContactSide, two: ContactSide, *, has_friction: bool = False) -> bool:
     """Decide whether the first of two sides carries the multipliers.
 
     Parameters
     ----------
     one, two : ContactSide
-    distance : float [m]
-        Largest distance of facing elements.
     has_friction : bool
         Whether friction acts between them.
 
@@ -142,7 +140,7 @@ def is_non_mortar(one: ContactSide, two: ContactSide, distance: float = np.inf, 
     longer elements is uniform to 1e-5 instead of 2e-2. Without friction a disc with a clearance would rotate nearly
     freely.
     """
-    _, _, cover, _ = _facing_elements(_Elements.of([one, two], [0, 1]), distance)
+    _, _, cover, _ = _facing_elements(_Elements.of([one, two], [0, 1]), np.inf)
     return _is_first_non_mortar(one, two, float(cover.sum()), has_friction=has_friction)
 
 

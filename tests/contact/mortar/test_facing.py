@@ -48,7 +48,7 @@ def test_a_wall_in_running_bond() -> None:
     assert sorted(map(sorted, pairs)) == [sorted(pair) for pair in pairs]  # in the order of the sides
     length = sum(couple(sides[one], sides[two], reach=1e-3).weights.sum() for one, two in pairs)
     assert length == pytest.approx(rows * (columns - 1) * 1.0 + (rows - 1) * (2 * columns - 1) * 1.0, rel=1e-13)
-    assert all(is_non_mortar(sides[one], sides[two], 1e-3) for one, two in pairs)
+    assert all(is_non_mortar(sides[one], sides[two]) for one, two in pairs)
 
 
 def test_sizes_may_differ_by_far() -> None:
