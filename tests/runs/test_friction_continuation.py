@@ -51,6 +51,7 @@ def test_example_1_is_solved_at_any_friction(discretisation):
         assert solved(replace(scene, law=bk.Coulomb(friction_coefficient))).linear_solves <= MOST_SOLVES
 
 
+@pytest.mark.slow
 def test_a_bonded_punch_is_solved_by_the_whole_path():
     """Newton's method wanders and the path from its statuses ends on a ray; two linear solves a segment remain."""
     solution = solved(bonded_punch(bk.ConstantCollocation(), 10.0))

@@ -42,8 +42,8 @@ def check_up_to_collapse(assembly: bk.Scene, expected: float, moved: str, weight
 
 
 def test_a_wall_is_pushed_up_to_its_collapse() -> None:
-    """Friction under the uppermost course, of weight 8, holds the push."""
-    check_up_to_collapse(wall(2, 3, push=True), FRICTION * 6.0, "block 1-0", 12.0)
+    """Friction under the uppermost course, of weight 4, holds the push."""
+    check_up_to_collapse(wall(2, 2, push=True), FRICTION * 4.0, "block 1-0", 8.0)
 
 
 @pytest.mark.slow
@@ -57,19 +57,18 @@ def test_a_wall_of_200_blocks_is_pushed_up_to_its_collapse() -> None:
 
 
 def test_a_load_history_is_one_scene_and_one_result(tmp_path) -> None:  # type: ignore[no-untyped-def]
-    factors = (0.0, 2.0, 4.0)
-    assembly = replace(wall(2, 2, push=True), load_factors=tuple(0.5 * factor for factor in factors))
+    assembly = replace(wall(2, 2, push=True), load_factors=(1.0, 2.0))
     assert bk.scene_from_toml(bk.scene_to_toml(assembly)) == assembly
     steps = bk.run([assembly])
     solution = bk.run(assembly)
     assert solution.is_converged
-    assert solution.message.startswith("load step 3 of 3: ")
+    assert solution.message.startswith("load step 2 of 2: ")
     assert solution.linear_solves == sum(step.linear_solves for step in steps)
     assert [
         record.message.split(";")[0] for record in solution.history if record.step in (0, len(solution.history) - 1)
     ] == [
-        "load step 1 of 3",
-        "load step 3 of 3",
+        "load step 1 of 2",
+        "load step 2 of 2",
     ]
     np.testing.assert_array_equal(solution.contact.sigma_t, steps[-1].contact.sigma_t)
     assert solution.stated == assembly
@@ -213,6 +212,7 @@ def test_increments_are_announced_with_their_load_factors(halved: tuple[bk.Solve
     assert words[-1] == "load step 2 of 2 finished"
 
 
+@pytest.mark.slow
 def test_an_increment_grows_only_where_the_solver_took_few_steps(
     halved: tuple[bk.SolvedSteps, list[str]], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -230,6 +230,7 @@ def test_an_increment_grows_only_where_the_solver_took_few_steps(
     assert slow[1] - slow[0] == pytest.approx(0.5 * slow[0])
 
 
+@pytest.mark.slow
 def test_the_whole_path_is_followed_once_in_a_load_step() -> None:
     class Counting(SolutionPath):
         n_paths = 0

@@ -12,6 +12,7 @@ import pytest
 
 import bemkit as bk
 from bemkit.arrays import FloatArray
+from tests.slow import slow_only
 
 CLOSE = 1e-12
 COARSE = bk.MeshOptions(elements=48)
@@ -115,7 +116,9 @@ def boundary_of(solution: Any) -> Iterator[FloatArray]:
     yield from (table.u_n, table.u_t, table.sigma_n, table.sigma_t)
 
 
-@pytest.mark.parametrize("feature", FEATURES)
+@pytest.mark.parametrize(
+    "feature", slow_only(FEATURES, "single load", "start values", "probe", "scenes in turn", "load factors", "accuracy")
+)
 def test_both_forms_have_one_answer(feature: str) -> None:
     scene, solve = FEATURES[feature]
     one, several = solve(scene), solve(as_bodies(scene))

@@ -8,6 +8,7 @@ import pytest
 
 import bemkit as bk
 from tests.runs.packing import packing
+from tests.slow import slow_except
 
 
 def check_packing(assembly: bk.Scene, statuses: tuple[bk.Status, ...] = (bk.Status.CONVERGED,)) -> None:
@@ -20,8 +21,9 @@ def check_packing(assembly: bk.Scene, statuses: tuple[bk.Status, ...] = (bk.Stat
     assert sum(one.force_x for one in walls) == pytest.approx(0.0, abs=1e-9 * weight)
 
 
-def test_a_packing_of_twelve_discs_rests() -> None:
-    check_packing(packing(12, 5.0))
+@pytest.mark.parametrize(("n", "width"), slow_except([(4, 3.0), (12, 5.0)], (4, 3.0)))
+def test_a_packing_of_a_few_discs_rests(n: int, width: float) -> None:
+    check_packing(packing(n, width))
 
 
 @pytest.mark.slow

@@ -67,9 +67,7 @@ def test_the_second_of_two_runs_into_one_file_is_refused_before_it_computes(
 
 @pytest.mark.parametrize(
     ("end", "is_at_work"),
-    slow_except(
-        product((signal.SIGKILL, signal.SIGTERM), (False, True)), (signal.SIGKILL, True), (signal.SIGTERM, False)
-    ),
+    slow_except(product((signal.SIGKILL, signal.SIGTERM), (False, True)), (signal.SIGKILL, True)),
 )
 def test_workers_end_with_a_study_that_is_killed(tmp_path: Path, end: signal.Signals, is_at_work: bool) -> None:
     """Workers look for work in a queue of which they hold both ends: they would wait for more for ever."""

@@ -143,6 +143,7 @@ def test_an_accuracy_out_of_reach_ends_at_the_budget(budget: dict[str, float], r
     assert f"estimated error {best.estimated_error:.1e}" in best.message
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("size", slow_except([1e-9, 1e9], 1e9))
 def test_meshes_do_not_depend_on_units(size: float) -> None:
     scene = paper(2, mesh=bk.MeshOptions(accuracy=3e-3))

@@ -25,7 +25,7 @@ def stack(ratio: float, law: bk.FrictionLaw) -> bk.Scene:
 
 
 @pytest.mark.parametrize("law", [bk.Frictionless(), bk.Coulomb(0.3)], ids=["frictionless", "coulomb"])
-@pytest.mark.parametrize("ratio", [1e4, 1e8])
+@pytest.mark.parametrize("ratio", [pytest.param(1e4, marks=pytest.mark.slow), 1e8])
 def test_stiff_bodies_between_soft_ones_are_certified(ratio, law):
     solution = bk.run(stack(ratio, law))
     assert solution.is_converged, solution.message
@@ -35,6 +35,7 @@ def test_stiff_bodies_between_soft_ones_are_certified(ratio, law):
     assert solution.certificate.force_imbalance < 1e-14 * ratio + 1e-10
 
 
+@pytest.mark.slow
 def test_the_motion_of_stiff_bodies_is_that_of_the_soft_ones():
     few, many = (bk.run(stack(ratio, bk.Coulomb(0.3))) for ratio in (1e6, 1e8))
     for name in ("slab 0", "slab 3"):
