@@ -20,6 +20,7 @@ from bemkit.results.solution import Solution
 from bemkit.results.tables import to_csv, to_json
 from bemkit.scene.toml import with_overrides
 from tests.sealed import seal
+from tests.slow import slow_except
 
 pytest.importorskip("matplotlib")
 
@@ -45,7 +46,7 @@ def call(*arguments: str) -> int:
     return int(caught.value.code or 0)
 
 
-@pytest.mark.parametrize("name", ["solution", "arch"])
+@pytest.mark.parametrize("name", slow_except(["solution", "arch"], "solution"))
 def test_a_file_gives_everything_back(name: str, tmp_path: Path, request: pytest.FixtureRequest) -> None:
     solution: Solution = request.getfixturevalue(name)
     bk.write_result(tmp_path / "r.h5", solution)

@@ -24,7 +24,7 @@ from bemkit.results.stress_mesh import stress_mesh
 from bemkit.scene.toml import with_overrides
 from bemkit.scene.unit_names import amount
 from tests.perforated_plate import NOMINAL, plate
-from tests.slow import slow_only
+from tests.slow import slow_except, slow_only
 
 
 @pytest.fixture(scope="module")
@@ -119,19 +119,19 @@ def test_triangles_end_at_the_boundary_and_hold_the_largest_stress(is_biaxial: b
     meshio = pytest.importorskip("meshio")
     scene = plate(
         is_biaxial=is_biaxial,
-        mesh=bk.MeshOptions(accuracy=1e-7, rising_degrees=True),
+        mesh=bk.MeshOptions(accuracy=1e-4, rising_degrees=True),
         discretisation=bk.Galerkin(2),
     )
     solution = bk.run(scene)
-    export_result(tmp_path / "r.vtu", solution, inside=49)
+    export_result(tmp_path / "r.vtu", solution, inside=25)
     mesh = meshio.read(tmp_path / "r.vtu")
     for name, values in mesh.point_data.items():
         assert np.isfinite(values).all(), name
     largest = (2.0 if is_biaxial else 3.0) * NOMINAL
-    assert mesh.point_data["von_mises"].max() == pytest.approx(largest, rel=1e-6)
+    assert mesh.point_data["von_mises"].max() == pytest.approx(largest, rel=1e-4)
     # the picture draws the same triangles and values
     size = np.ptp(solution.mesh.whole.nodes, axis=0).max()
-    drawn = stress_mesh(solution.body, float(size) / 48, shown(solution).frame)
+    drawn = stress_mesh(solution.body, float(size) / 24, shown(solution).frame)
     assert draw_stress(solution).get_title().startswith(f"Stress up to {amount(largest, 'stress', None)}\n")
     if find_spec("pyvista"):
         import pyvista
@@ -146,10 +146,10 @@ def test_triangles_end_at_the_boundary_and_hold_the_largest_stress(is_biaxial: b
     first, second = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     area = 0.5 * (first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0])
     assert area.min() > 0.0
-    assert area.sum() == pytest.approx(solution.mesh.area, rel=2e-4)  # chords of the circles
+    assert area.sum() == pytest.approx(solution.mesh.area, rel=1e-3)  # chords of the circles
 
 
-@pytest.mark.parametrize("name", slow_only(["pin-in-plate", "clamped-angle", "two-cylinders"], "two-cylinders"))
+@pytest.mark.parametrize("name", slow_except(["pin-in-plate", "clamped-angle", "two-cylinders"], "clamped-angle"))
 def test_triangles_fill_every_body(name: str) -> None:
     solution = bk.run(bk.load_scene(name))
     for body in solution.bodies.values():

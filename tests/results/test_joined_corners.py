@@ -54,7 +54,7 @@ def solved(friction: float, accuracy: float) -> Solution:
 
 
 @pytest.mark.parametrize(("friction", "contact"), slow_except([(0.6, HELD), (0.48, SLIDES)], (0.48, SLIDES)))
-@pytest.mark.parametrize("accuracy", slow_except([1e-2, 1e-3, 1e-4], 1e-3))
+@pytest.mark.parametrize("accuracy", slow_except([1e-2, 1e-3, 1e-4], 1e-2))
 def test_the_accuracy_is_reached_and_both_corners_are_named(
     friction: float, contact: WedgeSide, accuracy: float
 ) -> None:
@@ -77,7 +77,7 @@ def test_the_accuracy_is_reached_and_both_corners_are_named(
 
 def test_above_the_critical_friction_only_the_last_node_may_slip() -> None:
     """From 0.5430756 on complete contact of equal materials sticks; see `tests/results/test_wedge.py`."""
-    table = solved(0.6, 1e-3).contact
+    table = solved(0.6, 1e-2).contact
     assert np.all(np.isin(table.status[1:-1], NodeStatus.STICK))
 
 

@@ -16,7 +16,7 @@ from bemkit.results.solution import Solution
 from bemkit.results.wedge import FREE, HELD, ROLLER, JoinedWedge, WedgeSide, joined_exponent, leading_exponent
 from bemkit.solvers.active_sets import NodeStatus
 from tests.scenes import paper
-from tests.slow import slow_except
+from tests.slow import slow_except, slow_only
 
 BLOCK = bk.Scene(
     title="block",
@@ -51,7 +51,9 @@ def with_part(name: str, part: bk.Part, scene: bk.Scene = BLOCK) -> bk.Scene:
     return replace(scene, parts=(*(each for each in scene.parts if each.name != name), part))
 
 
-@pytest.mark.parametrize("elements", [bk.ConstantCollocation(), bk.Galerkin(2), bk.Galerkin(4)])
+@pytest.mark.parametrize(
+    "elements", slow_only([bk.ConstantCollocation(), bk.Galerkin(2), bk.Galerkin(4)], bk.Galerkin(4))
+)
 def test_corners_of_a_block_that_slides_or_sticks(elements: bk.ConstantCollocation | bk.Galerkin) -> None:
     """At both of them the block slides outwards, as far as elements are short enough to tell; or it sticks."""
     scene = replace(BLOCK, discretisation=elements, mesh=bk.MeshOptions(elements=160))
@@ -119,6 +121,7 @@ def pressures(solution: bk.Solution, s: FloatArray) -> FloatArray:
     return sampled_fields(solution, [SamplePoints("floor", s, np.ones_like(s))]).sigma_n
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("coefficient", slow_except([0.3, 2.0], 0.3))
 def test_pressures_grow_as_the_exponents_say(coefficient: float) -> None:
     """Over two decades, to a thousandth: further in are the last elements, further out other terms matter."""
@@ -144,10 +147,10 @@ def l2_errors(solution: bk.Solution, exact: bk.Solution) -> tuple[float, float]:
     return float(np.sqrt(squared[counts[element]].sum() / size)), float(np.sqrt(squared.sum() / size))
 
 
-@pytest.mark.parametrize("accuracy", slow_except([1e-2, 1e-3, 1e-4, 1e-5], 1e-3))
+@pytest.mark.parametrize("accuracy", slow_except([1e-2, 1e-3, 1e-4, 1e-5], 1e-2))
 def test_what_is_asked_for_is_reached_but_at_the_corners(accuracy: float) -> None:
     """The estimate holds to a factor of 2.5; at the corners errors in L2 stay above a few per mille."""
-    solution, exact = solved(accuracy), solved(1e-6)
+    solution, exact = solved(accuracy), solved(0.05 * accuracy)
     counted, everywhere = l2_errors(solution, exact)
     assert solution.is_converged
     assert solution.estimated_traction_error is not None

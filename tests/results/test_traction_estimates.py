@@ -28,10 +28,10 @@ def solved(name: str, degree: int, mesh: bk.MeshOptions) -> Solution:
 
 @pytest.fixture(scope="module")
 def reference() -> Solution:
-    return solved("pin-in-plate", 2, bk.MeshOptions(accuracy=5e-3, rising_degrees=True))  # a tenth of what is judged
+    return solved("pin-in-plate", 2, bk.MeshOptions(accuracy=1e-2, rising_degrees=True))  # a fifth of what is judged
 
 
-@pytest.mark.parametrize("n_elements", slow_except((80, 120, 160, 240), 120))
+@pytest.mark.parametrize("n_elements", slow_except((80, 120, 160, 240), 80))
 @pytest.mark.parametrize("degree", slow_only([1, 2], 2))
 def test_the_estimates_are_near_the_errors(degree: int, n_elements: int, reference: Solution) -> None:
     solution = solved("pin-in-plate", degree, bk.MeshOptions(elements=n_elements))
@@ -111,6 +111,7 @@ def test_estimates_of_linear_elements_exclude_the_neighbours_of_a_singular_corne
     assert 0.5 < coarse.estimated_traction_error / tractions < 2.0  # 3.6 with that node
 
 
+@pytest.mark.slow
 def test_ends_of_contact_inside_elements_count_in_the_energy() -> None:
     """A single element of degree 6 touches, where pressures vanish like a root."""
     parts = (
