@@ -41,7 +41,7 @@ SCENES = {
 }
 
 
-@pytest.mark.parametrize("name", slow_except(SCENES, "loose block", "incompressible", "weight"))
+@pytest.mark.parametrize("name", slow_except(SCENES, "loose block", "weight"))
 def test_solutions_are_those_of_dense_equations(name: str) -> None:
     own, dense = (bk.run(with_solver(SCENES[name], 200, each)) for each in (MatrixFree(1e-10), DenseCholesky()))
     assert is_iterated(own)  # fewer elements are dense
@@ -55,12 +55,14 @@ def test_solutions_are_those_of_dense_equations(name: str) -> None:
     assert own.certificate.worst < 1e-8
 
 
+@pytest.mark.slow
 def test_the_default_tolerance_is_enough_for_certificates() -> None:
     solution = bk.run(with_solver(paper(1), 320, MatrixFree()))
     assert is_iterated(solution)
     assert solution.is_converged  # 1e-9 leaves 1.8e-9
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("tolerance", slow_only([1e-10, 3e-10], 3e-10))
 def test_every_equation_is_solved_as_well_as_the_mean_of_all(tolerance: float) -> None:
     """The weight of a column leaves 14 times the tolerance on a few elements where the mean is below it."""

@@ -86,6 +86,7 @@ def test_a_profile_from_a_file_has_the_statistics_of_its_waves(tmp_path: Path) -
     assert bk.Profile(str(tmp_path / "p.txt"), period=1.0, longest_wavelength=0.1).rms_height < 0.5 * 2e-3
 
 
+@pytest.mark.slow
 def test_an_instrument_file_is_read_in_metres(tmp_path: Path) -> None:
     topography = pytest.importorskip("SurfaceTopography")
     scan = topography.UniformLineScan(wave(0.25), 1000.0, unit="um")

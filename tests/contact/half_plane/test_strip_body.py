@@ -46,7 +46,16 @@ def body_of(far: bk.FarField | None, *parts: bk.Part, towards: tuple[str, str] =
     return body
 
 
-@pytest.mark.parametrize("parts", [(), (LOAD,), (LOAD, *HELD), (HELD[1],)], ids=["free", "loaded", "held", "rolling"])
+@pytest.mark.parametrize(
+    "parts",
+    [
+        pytest.param((), marks=pytest.mark.slow),
+        (LOAD,),
+        (LOAD, *HELD),
+        pytest.param((HELD[1],), marks=pytest.mark.slow),
+    ],
+    ids=["free", "loaded", "held", "rolling"],
+)
 @pytest.mark.parametrize("drive", DRIVES)
 def test_it_keeps_the_promises_of_a_body(drive: str, parts: tuple[bk.Part, ...]) -> None:
     body = body_of(DRIVES[drive], *parts)
