@@ -97,6 +97,7 @@ INTEGRANDS = (  # of the vector d from the arc to the point, and the direction o
 )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("n_elements", slow_except((4, 64), 64))
 def test_inner_integrals_against_extended_precision(n_elements: int) -> None:
     geometry = ElementGeometry(discretise(Disk(1.3).outline(), n_elements=n_elements))

@@ -33,7 +33,7 @@ def worst(computed: list[ComplexArray], expected: list[mpmath.mpc]) -> float:
 
 
 @pytest.mark.parametrize("end", slow_except((-1, 1), 1))
-@pytest.mark.parametrize("distance", DISTANCES)
+@pytest.mark.parametrize("distance", slow_except(DISTANCES, 1e-14, 1e-3, 0.1, 1.0, 5.9, 6.1, 1e3))
 def test_near_integrals_hold_at_every_distance_from_an_end_point(distance: float, end: int) -> None:
     for angle in np.linspace(0.05, 6.25, 11):
         with mpmath.workdps(200):

@@ -17,6 +17,7 @@ from bemkit.operators.collocation.layers import Constants, Layer, Unknowns, stra
 from bemkit.operators.element_geometry import ElementGeometry
 from bemkit.operators.material import Material
 from tests.operators.collocation_matrices import collocation_matrices
+from tests.slow import slow_except
 
 MATERIAL = Material(2.0, 0.3)
 
@@ -83,7 +84,7 @@ def test_columns_are_those_of_collocation(shape: Rectangle | PlateWithHole, is_c
 
 @pytest.mark.parametrize("symmetry", [Symmetry(x=1.0), Symmetry(y=0.75), Symmetry(x=1.0, y=0.75)], ids=str)
 @pytest.mark.parametrize("shape", [Rectangle(2.0, 1.5), PlateWithHole(2.0, 1.5, 0.4)], ids=["rectangle", "hole"])
-@pytest.mark.parametrize("slopes", [True, False], ids=["slopes", "constant"])
+@pytest.mark.parametrize("slopes", slow_except([True, False], True), ids=["slopes", "constant"])
 def test_columns_of_symmetric_bodies_are_those_of_collocation(
     shape: Rectangle | PlateWithHole, symmetry: Symmetry, slopes: bool
 ) -> None:

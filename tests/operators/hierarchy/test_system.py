@@ -232,6 +232,7 @@ def test_clusters_that_do_not_change_keep_no_scattering_matrices_and_may_change_
     assert every.factor.n_factored <= 2 < nowhere_else[-1] < n_leaves
 
 
+@pytest.mark.slow
 def test_loads_that_are_expected_and_their_sums_factor_nothing() -> None:
     """Two loads are few enough to be solved for at once, nine are too many."""
     mesh = mesh_of("rectangle", 700)

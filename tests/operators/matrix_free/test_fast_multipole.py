@@ -48,7 +48,7 @@ def test_material_and_slopes(poisson_ratio: float) -> None:
     assert error_of(multipole_of(mesh_of("hole", 400), takes_slopes=False, poisson_ratio=poisson_ratio)) < TINY
 
 
-@pytest.mark.parametrize("power", [3.0, 6.0])
+@pytest.mark.parametrize("power", [pytest.param(3.0, marks=pytest.mark.slow), 6.0])
 def test_graded_meshes(power: float) -> None:
     # elements as long as their cluster beside others that are 1e10 times shorter
     assert error_of(multipole_of(graded(200, power))) < TINY

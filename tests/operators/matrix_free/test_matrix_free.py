@@ -59,7 +59,7 @@ def solved(system: HierarchicalSystem, conditions: NodeConditions) -> tuple[Floa
 @pytest.mark.parametrize("slopes", slow_except([True, False], True))
 @pytest.mark.parametrize("name", slow_except(SHAPES, "hole"))
 def test_answers_are_those_of_the_direct_solver(name: str, slopes: bool) -> None:
-    mesh = mesh_of(name, 400)
+    mesh = mesh_of(name, 240)
     frame = conditions_of(mesh, 1)[0].frame
     system, _ = iterated(mesh, frame, slopes=slopes)
     answers = solved(system, held(mesh)), solved(system_of(mesh, frame, slopes, 1e-12), held(mesh))
@@ -68,11 +68,12 @@ def test_answers_are_those_of_the_direct_solver(name: str, slopes: bool) -> None
     for own, exact, unit in zip(*answers, (MATERIAL.plane_modulus, 1.0), strict=True):
         # a hundred times the tolerance, as `MatrixFree.accuracy` says
         assert np.abs(own - exact).max() < 1e-8 * size * unit
-    places = np.arange(0, 400, 7)
+    places = np.arange(0, 240, 7)
     assert np.abs(system.residual(places, *answers[0])).max() < 1e-9 * size
     assert np.abs(system.residual(places, 1.01 * answers[0][0], answers[0][1])).max() > 1e-6 * size
 
 
+@pytest.mark.slow
 def test_graded_meshes() -> None:
     mesh = graded(120, 4.0)
     frame = np.tile(np.eye(2), (mesh.n_elements, 1, 1))
@@ -101,7 +102,7 @@ def test_springs_and_friction(stiffness: float) -> None:
     assert factor.steps[0] < 25
 
 
-@pytest.mark.parametrize("most", slow_except((1600, 6400), 1600))
+@pytest.mark.parametrize("most", slow_except((800, 1600, 6400), 800))
 def test_steps_do_not_grow_with_the_number_of_elements(most: int) -> None:
     steps = []
     for n in (400, most):
