@@ -119,6 +119,7 @@ def test_finished_rows_are_handed_on() -> None:
         error_tasks(runs, reference(), 0)
 
 
+@pytest.mark.slow
 def test_an_executor_finds_the_same_errors_without_times() -> None:
     runs = paper_runs(uniform((20, 40)), elements=(CONSTANT, LINEAR))
     timed = {row.key: row for row in compute(error_tasks(runs, reference(), 1))}

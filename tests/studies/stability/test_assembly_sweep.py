@@ -45,7 +45,7 @@ def test_every_axis_is_tested_here(pin):
         list(sweep(load_scene("paper-1"), find_axes(["turn"])))
 
 
-@pytest.mark.parametrize("name", slow_except(EXTREMES, "turn", "elements"))
+@pytest.mark.parametrize("name", slow_except(EXTREMES, "turn"))
 def test_the_ends_of_every_axis_are_right_or_named(pin, name):
     (axis,) = find_axes([name])
     for row in sweep(pin, [dataclasses.replace(axis, values=EXTREMES[name])]):
@@ -56,6 +56,7 @@ def test_the_ends_of_every_axis_are_right_or_named(pin, name):
             assert row.deviation < 1e-10  # 1e-12 found: round-off of coordinates
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", slow_except(SIMILAR, "turn"))
 def test_parts_chosen_by_a_region_follow_the_body(name):
     cylinders = with_overrides(load_scene("two-cylinders"), elements=40)
@@ -67,6 +68,7 @@ def test_parts_chosen_by_a_region_follow_the_body(name):
     assert row.deviation < 1e-10
 
 
+@pytest.mark.slow
 def test_curved_bodies_far_away_are_what_they_are_at_home():
     cylinders = with_overrides(load_scene("two-cylinders"), elements=40)
     (axis,) = find_axes(["position"])

@@ -32,7 +32,7 @@ from tests.studies.sweep.tables import equal_results
 FRICTION = "law.friction_coefficient"
 FAST = ("sweep", "paper-1", "--elements", "32")
 SCENE = replace(bk.load_scene("paper-1"), mesh=bk.MeshOptions(elements=32))
-MANY = (*FAST, "--vary", f"{FRICTION}=0:0.7:8", "--vary", "material.poisson_ratio=0,0.2,0.4", "-q")
+MANY = (*FAST, "--vary", f"{FRICTION}=0:0.7:8", "--vary", "material.poisson_ratio=0,0.4", "-q")
 KILLED = f"""
 import sys
 from bemkit.cli.main import main
@@ -83,11 +83,11 @@ def test_a_killed_sweep_goes_on_and_ends_with_the_same_table(tmp_path: Path) -> 
     process.send_signal(signal.SIGKILL)
     process.wait()
     finished = FILE.read(path)[1]
-    assert 0 < len(finished) < 24
+    assert 0 < len(finished) < 16
     assert call(*MANY, "-o", path).return_value == 0
     assert repr(FILE.read(path)[1][: len(finished)]) == repr(finished)  # run times too: not computed again
     assert call(*MANY, "-o", whole).return_value == 0
-    assert len(Sweep.read(whole).rows) == 24
+    assert len(Sweep.read(whole).rows) == 16
     assert equal_results(Sweep.read(path).rows, Sweep.read(whole).rows)
 
 

@@ -62,13 +62,13 @@ def bodies_made(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     ("vary", "n_bodies"),
     [
         ({FRICTION: [0.0, 0.1, 0.5, 2.0]}, 1),
-        ({"parts.top-load.condition.y": [-1e-3, -1.0, -1e4]}, 1),
-        ({"parts.foundation.condition.obstacle.point[1]": [0.0, -1e-5]}, 1),
+        pytest.param({"parts.top-load.condition.y": [-1e-3, -1.0, -1e4]}, 1, marks=pytest.mark.slow),
+        pytest.param({"parts.foundation.condition.obstacle.point[1]": [0.0, -1e-5]}, 1, marks=pytest.mark.slow),
         # the obstacle turns: the body is condensed anew, not assembled
         ({"parts.foundation.condition.obstacle.normal[0]": [0.0, 1e-4], FRICTION: [0.2, 0.4]}, 1),
         ({"load_factors[0]": [0.5, 3.0]}, 1),
-        ({FRICTION: [0.2, 0.4], "material.poisson_ratio": [0.0, 0.3, 0.5]}, 3),
-        ({"mesh.elements": [32, 48]}, 0),
+        pytest.param({FRICTION: [0.2, 0.4], "material.poisson_ratio": [0.0, 0.3, 0.5]}, 3, marks=pytest.mark.slow),
+        pytest.param({"mesh.elements": [32, 48]}, 0, marks=pytest.mark.slow),
         ({"shape.height": [1.0, 1.5], FRICTION: [0.2, 0.4]}, 2),
         ({"solver.max_steps": [50, 60]}, 1),
     ],
@@ -101,7 +101,7 @@ def test_weight_changes_with_the_rows(bodies_made: list[str]) -> None:
     [
         ({FRICTION: [0.3], "bodies.upper.parts.pushed.condition.y": [-0.0022, -0.004]}, 1),
         pytest.param({"contacts[0].gap": [0.0, -0.001]}, 1, marks=pytest.mark.slow),
-        ({"bodies.lower.material.youngs_modulus": [0.91, 9.1]}, 0),
+        pytest.param({"bodies.lower.material.youngs_modulus": [0.91, 9.1]}, 0, marks=pytest.mark.slow),
     ],
     ids=["loads", "gaps", "bodies"],
 )
