@@ -13,7 +13,7 @@ from hypothesis import HealthCheck, settings
 # quick runs repeat the same few examples everywhere, runs of slow tests too repeat more;
 # BEMKIT_HYPOTHESIS=thorough searches ten times as many new ones
 COMMON = settings(deadline=None, suppress_health_check=[HealthCheck.too_slow])
-settings.register_profile("quick", COMMON, derandomize=True, max_examples=24)
+settings.register_profile("quick", COMMON, derandomize=True, max_examples=12)
 settings.register_profile("full", COMMON, derandomize=True, max_examples=100)
 settings.register_profile("thorough", COMMON, max_examples=1000)
 

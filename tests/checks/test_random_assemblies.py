@@ -94,6 +94,7 @@ def test_every_kind_is_drawn() -> None:
     assert max(moduli) / min(moduli) > 1e10
 
 
+@pytest.mark.slow
 def test_results_survive_a_file_and_plans_count_what_is_done(tmp_path: Path) -> None:
     n_solved = 0
     for index in (6, 8):

@@ -33,10 +33,10 @@ def outcome_of(name: str) -> tuple[Outcome, str]:
         pytest.param("no-shear", RIGHT, marks=SLOW),
         ("carried-along", RIGHT),
         # whether a node touches at all is decided by round-off; its overlap between nodes is warned of or named
-        ("contact-between-nodes", [Outcome.WARNED, Outcome.NAMED]),
+        pytest.param("contact-between-nodes", [Outcome.WARNED, Outcome.NAMED], marks=SLOW),
         ("far-fall-far-away", [Outcome.NAMED]),  # along a circle, by a fifth of the size of the plate
         # a half-plane 161 wide, whose gaps are zero but for -4e-15, after a motion of 1e-4 without contact
-        ("back-at-rest", RIGHT),
+        pytest.param("back-at-rest", RIGHT, marks=SLOW),
         # its overlap ended within 1e-9 of the way, which was 2e-6 of the deformation
         pytest.param("pushed-aside", RIGHT, marks=SLOW),
         pytest.param("wedge", [Outcome.NAMED], marks=SLOW),  # two nodes on each flank, which overlaps between them
@@ -50,12 +50,16 @@ def outcome_of(name: str) -> tuple[Outcome, str]:
         # three nodes carry a block, which overlaps between them
         pytest.param("history-of-collocation", [Outcome.NAMED], marks=SLOW),
         pytest.param("history-of-increments", [Outcome.NAMED], marks=SLOW),
-        ("touches-between-nodes", [Outcome.WARNED, Outcome.NAMED]),  # a disc of constant elements, likewise
+        pytest.param(
+            "touches-between-nodes", [Outcome.WARNED, Outcome.NAMED], marks=SLOW
+        ),  # a disc of constant elements, likewise
         ("ends-that-differ-by-round-off", [Outcome.WARNED]),
         ("nothing-holds", [Outcome.NAMED]),  # a block that touches nothing, and two without support
         pytest.param("wedge-let-go", [Outcome.WARNED], marks=SLOW),  # round-off of the load before
-        ("pin-that-spins", [Outcome.WARNED]),  # of quadratic elements that turn by 90 degrees
-        ("pushed-between-nodes", [Outcome.NAMED]),  # a disc whose nodes do not meet the block that moves into it
+        pytest.param("pin-that-spins", [Outcome.WARNED], marks=SLOW),  # of quadratic elements that turn by 90 degrees
+        pytest.param(
+            "pushed-between-nodes", [Outcome.NAMED], marks=SLOW
+        ),  # a disc whose nodes do not meet the block that moves into it
         pytest.param("lining-held-by-its-mesh", [Outcome.NAMED], marks=SLOW),
         ("missed-contact-fixed-mesh", [Outcome.NAMED]),  # half a disc between two nodes of its arc
         pytest.param("missed-contact-hp", RIGHT, marks=SLOW),

@@ -71,13 +71,28 @@ def test_a_report_shows_the_versions_in_its_file(without: Callable[..., None]) -
     "command",
     [
         ("sweep", "paper-1", "--elements", "24", "--vary", "law.friction_coefficient=0.1,0.2"),
-        ("verify", "westergaard", "--quick"),
+        pytest.param(("verify", "westergaard", "--quick"), marks=pytest.mark.slow, id="verify"),
         pytest.param(
             ("stability", "paper-1", "--elements", "24", "--axis", "aspect-ratio"),
             marks=pytest.mark.slow,
             id="stability",
         ),
-        ("study", "paper-1", "--sizes", "12", "--discretisations", "linear", "--meshes", "uniform", "--repeat", "1"),
+        pytest.param(
+            (
+                "study",
+                "paper-1",
+                "--sizes",
+                "12",
+                "--discretisations",
+                "linear",
+                "--meshes",
+                "uniform",
+                "--repeat",
+                "1",
+            ),
+            marks=pytest.mark.slow,
+            id="study",
+        ),
     ],
     ids=lambda command: command[0],
 )

@@ -197,6 +197,7 @@ def test_stick_under_a_punch_and_under_a_cylinder_is_as_spence_says() -> None:
     assert stick / end == pytest.approx(punch, rel=1.5e-2)
 
 
+@pytest.mark.slow
 def test_two_equal_bodies_sheared_after_pressing_as_cattaneo_and_mindlin_say() -> None:
     """One half-plane of the composite modulus and of the Poisson ratio 1/2 stands for two of one material."""
     composite = 0.5 * MODULUS

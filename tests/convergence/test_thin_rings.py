@@ -121,6 +121,7 @@ class TwoHoles:
         return Outline((*plate.loops, bk.Ring(0.3, 1.0, (1.1, 0.3)).outline().loops[1]))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("nu", slow_except([0.3, 0.499995, 0.5], 0.499995))
 def test_collocation_of_two_holes_against_quadratic_elements(nu: float) -> None:
     parts = (

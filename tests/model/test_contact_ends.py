@@ -65,7 +65,7 @@ def errors(parts: tuple[bk.Part, ...], degree: int, elements: int, density: floa
 
 
 @pytest.mark.parametrize("case", PARTS)
-@pytest.mark.parametrize("degree", slow_except([2, 3, 4, 5, 6], 2, 5))
+@pytest.mark.parametrize("degree", slow_except([2, 3, 4, 5, 6], 2))
 def test_ends_converge_like_the_nodes_between(case: str, degree: int) -> None:
     counts = (32, 64) if degree < 5 else (8, 16)
     coarse, fine = (errors(PARTS[case], degree, elements, 1.0) for elements in counts)
@@ -115,8 +115,8 @@ def wedge(angle: float, degree: int, law: bk.FrictionLaw, overlap: float = 0.0) 
     )
 
 
-@pytest.mark.parametrize("degree", [1, 2, 3, 8])
-@pytest.mark.parametrize("angle", [45.0, 60.0, 90.0, 120.0])
+@pytest.mark.parametrize("degree", slow_except([1, 2, 3, 8], 1, 8))
+@pytest.mark.parametrize("angle", slow_except([45.0, 60.0, 90.0, 120.0], 60.0, 120.0))
 def test_a_corner_between_two_obstacles_at_any_angle(angle: float, degree: int) -> None:
     """Uniform pressure shrinks the body towards the corner, and slides it along both obstacles."""
     solution = bk.run(wedge(angle, degree, bk.Frictionless()))

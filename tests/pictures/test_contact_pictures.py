@@ -30,11 +30,12 @@ from bemkit.pictures.traction_curves import traction_curve
 from bemkit.results.solution import Solution
 from bemkit.runs.run import run
 from bemkit.scene.toml import load_scene, with_overrides
+from tests.slow import slow_only
 
 Draw = Callable[[Solution, str], Axes]
 
 
-@pytest.fixture(scope="module", params=["quadratic", "linear", "constant"])
+@pytest.fixture(scope="module", params=slow_only(["quadratic", "linear", "constant"], "linear"))
 def solution(request: pytest.FixtureRequest) -> Solution:
     return run(with_overrides(load_scene("paper-1"), elements=40, discretisation=request.param))
 

@@ -168,6 +168,7 @@ def test_a_ratio_of_meshes_below_two_is_refused() -> None:
         run_nested(scene_of(400), ratio=1)
 
 
+@pytest.mark.slow
 def test_a_body_of_many_sides_takes_no_mesh_that_is_too_coarse_for_it(monkeypatch: pytest.MonkeyPatch) -> None:
     """A plate with 40 holes in place of one with 1000, whose 2004 sides are more than 20000 elements divided by 16."""
     for module, name, value in ((plan, "_FEW", 50), (plan, "_MANY", 100), (run, "_COARSEST", 40), (run, "_LARGE", 50)):

@@ -174,6 +174,8 @@ def traced(small: bk.Scene, scene: bk.Scene) -> bk.Solution:
         "linear",
         "frictionless",
         "degree 3",
+        "degree 5",
+        "curved",
         "degree 9",
         "curved of degree 6",
         "contact all along",

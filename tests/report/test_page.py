@@ -170,6 +170,7 @@ QUIET = (
 )
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(CHROMIUM is None, reason="Chromium is not installed")
 @pytest.mark.parametrize("width", slow_except((500, 1200), 500), ids=["narrow", "wide"])
 def test_a_browser_shows_it_in_light_and_dark(width: int, tmp_path: Path, text: str) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import lru_cache
 
 import numpy as np
 import pytest
@@ -22,6 +23,7 @@ PRESSED = bk.Scene(
 )
 
 
+@lru_cache
 def forces_of(*sides: str) -> np.ndarray:
     solution = bk.run(replace(PRESSED, contacts=(bk.ContactPair(sides),)))  # type: ignore[arg-type]
     assert solution.is_converged

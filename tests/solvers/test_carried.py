@@ -44,7 +44,11 @@ DRIVEN = pytest.mark.parametrize("driver", DRIVERS, ids=lambda driver: type(driv
 @DRIVEN
 @pytest.mark.parametrize(
     ("discretisation", "distance"),
-    [(bk.Galerkin(1), 1e-12), (bk.Galerkin(2), 1e-3), (bk.ConstantCollocation(), 0.3)],
+    [
+        (bk.Galerkin(1), 1e-12),
+        pytest.param(bk.Galerkin(2), 1e-3, marks=pytest.mark.slow),
+        (bk.ConstantCollocation(), 0.3),
+    ],
     ids=["linear", "quadratic", "constant"],
 )
 def test_a_body_that_gives_way_to_its_obstacle_is_solved_without_contact_forces(

@@ -13,6 +13,7 @@ import bemkit as bk
 from bemkit.results.solution import Solution
 from bemkit.testing.independent_check import Violations, violations_of
 from checks.trials import Outcome, judge
+from tests.slow import slow_only
 from tests.testing.independent_check.company import in_company
 
 MATERIAL = bk.Material(1.0, 0.3)
@@ -157,7 +158,7 @@ def test_sides_that_overlap_deeply_between_nodes_need_a_name(among: bool) -> Non
     assert violations_of(belittled).faults == ("between_nodes",)
 
 
-@pytest.mark.parametrize("among", [False, True], ids=["one body", "one of several"])
+@pytest.mark.parametrize("among", slow_only([False, True], True), ids=["one body", "one of several"])
 def test_rigid_bodies_move_and_are_loaded_as_they_are_told(among: bool) -> None:
     scene = bk.load_scene("tilted-punch")
     solution = bk.run(in_company(scene) if among else scene)
