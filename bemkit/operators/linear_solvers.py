@@ -84,14 +84,9 @@ class Cholesky:
             )
 
     @property
-    def factorisation(self) -> Factorisation:
-        """Operation counts."""
-        return Factorisation(FactorKind.CHOLESKY, len(self._factor))
-
-    @property
     def factorisations(self) -> tuple[Factorisation, ...]:
         """A tuple with the only factorisation."""
-        return (self.factorisation,)
+        return (Factorisation(FactorKind.CHOLESKY, len(self._factor)),)
 
     def solve(self, right: FloatArray) -> FloatArray:
         """Solve A x = right."""
@@ -154,9 +149,9 @@ class DenseLU:
             )
 
     @property
-    def factorisation(self) -> Factorisation:
-        """Operation counts."""
-        return Factorisation(FactorKind.LU, len(self._factor))
+    def factorisations(self) -> tuple[Factorisation, ...]:
+        """A tuple with the only factorisation."""
+        return (Factorisation(FactorKind.LU, len(self._factor)),)
 
     def solve(self, right: FloatArray) -> FloatArray:
         """Solve A x = right."""

@@ -38,7 +38,7 @@ def collocation_matrices(
     exact = CollocationPoints(geometry, material, mesh.diameter).at(geometry.centre[row], column, row == column)
     p, conj_p, v, conj_v, s, conj_s = exact.reshape(6, n, whole.n_elements)
     if takes_slopes:
-        reconstruction = GradientReconstruction.of(whole, geometry)
+        reconstruction = GradientReconstruction(whole, geometry)
         v, conj_v = reconstruction.gathered(v, s), reconstruction.gathered(conj_v.conj(), conj_s.conj()).conj()
     return _real(mesh, p, conj_p), _real(mesh, v, conj_v)
 

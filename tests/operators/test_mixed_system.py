@@ -52,7 +52,7 @@ def whole_equations(
     turn = np.zeros((n, n))
     for k, frame in enumerate(conditions.frame):
         turn[2 * k : 2 * k + 2, 2 * k : 2 * k + 2] = frame
-    reciprocity = Reciprocity.of(mesh, MATERIAL, takes_slopes=True)
+    reciprocity = Reciprocity(mesh, MATERIAL, takes_slopes=True)
     errors = np.column_stack([motions, reciprocity.fields])
     order = 2 * n + errors.shape[1]
     system, right = np.zeros((order, order)), np.zeros(order)

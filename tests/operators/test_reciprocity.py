@@ -39,7 +39,7 @@ def in_turn(values: ComplexArray) -> FloatArray:
 def test_uniform_shear_of_a_polygon(poisson_ratio: float, takes_slopes: bool) -> None:
     material = Material(2.0, poisson_ratio)
     mesh = discretise(Rectangle(2.0, 1.0, (3.0, 1.0)).outline(), n_elements=24)
-    found = Reciprocity.of(mesh, material, takes_slopes=takes_slopes)
+    found = Reciprocity(mesh, material, takes_slopes=takes_slopes)
     u, t = shear(mesh, material)
     # tractions are constant and displacements linear on each element; a uniform dilatation sees only their means
     assert np.abs(found.on_traction @ t - found.on_displacement @ u).max() < 1e-13
@@ -53,7 +53,7 @@ def test_fields_of_a_body_with_a_hole_to_second_order(poisson_ratio: float, shap
     misses = []
     for n in (64, 128, 256):
         mesh = discretise(shape.outline(), n_elements=n)
-        found = Reciprocity.of(mesh, material, takes_slopes=True)
+        found = Reciprocity(mesh, material, takes_slopes=True)
         assert found.on_traction.shape == (2, 2 * n)
         u, t = quadratic(mesh, material)
         size = np.abs(found.on_displacement) @ np.abs(u)
@@ -66,7 +66,7 @@ def test_fields_of_a_body_with_a_hole_to_second_order(poisson_ratio: float, shap
 def test_rigid_motions_and_resultants_are_no_volume(symmetry: bk.Symmetry | None) -> None:
     half = {} if symmetry is None else {"symmetry": symmetry}
     mesh = discretise(Ring(0.5, 1.0).outline(), n_elements=48, **half)
-    found = Reciprocity.of(mesh, Material(2.0, 0.3), takes_slopes=True)
+    found = Reciprocity(mesh, Material(2.0, 0.3), takes_slopes=True)
     if symmetry is None:
         x, y = mesh.centres.T
         motions = np.array([in_turn(np.ones_like(x) + 0j), in_turn(1j + 0.0 * x), in_turn(1j * (x + 1j * y))])
@@ -87,7 +87,7 @@ def test_sources_lie_in_holes_of_any_shape_and_in_cavities() -> None:
     # in the bends of the hook there is room for a circle of radius sqrt(2) / (1 + sqrt(2))
     for shape, least, most in ((hook, 0.5, 0.59), (Disk(1.0), 0.99, 1.0)):
         mesh = discretise(ExteriorOf(shape).outline(), n_elements=80)
-        found = Reciprocity.of(mesh, material, takes_slopes=False)
+        found = Reciprocity(mesh, material, takes_slopes=False)
         # a source outside of the hole would carry no volume through it
         flux = found.fields[:, 0] @ (mesh.lengths[:, None] * mesh.normals).ravel()
         assert 2.0 * np.pi * least < abs(flux) < 2.0 * np.pi * most

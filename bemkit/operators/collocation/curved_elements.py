@@ -43,38 +43,27 @@ class _Rule(NamedTuple):
     p: ComplexArray
 
 
-@dataclass(frozen=True, eq=False)
 class CurvedElements:
     """Straight and curved elements in the order of a tree.
 
     Parameters
     ----------
-    constants : Constants
-    points : CollocationPoints
-        Closed forms on the elements of the mesh.
+    geometry : ElementGeometry
+    material : Material
     order : (n_elements,) array
         The element of the mesh at each position.
-    near, far : (n_elements,) arrays [m]
-        Distance from the midpoint below which closed forms are used, and above which the smaller rule is used.
-    rule, small_rule : _Rule
-        Gauss rules on all elements.
+    log_length : float [m]
+        Unit of length in the logarithm.
     """
 
-    constants: Constants
-    points: CollocationPoints
-    order: IntArray
-    near: FloatArray
-    far: FloatArray
-    rule: _Rule
-    small_rule: _Rule
-
-    @classmethod
-    def of(cls, geometry: ElementGeometry, material: Material, order: IntArray, log_length: float) -> CurvedElements:
-        """Return the elements of a mesh."""
-        constants, points = Constants.of(material, log_length), CollocationPoints(geometry, material, log_length)
-        near, far = ((geometry.half * geometry.distance_at(distance))[order] for distance in (CURVED_DISTANCE, _FAR))
-        rules = (_rule(geometry, order, n_points) for n_points in (CURVED_POINTS, _FEW_POINTS))
-        return cls(constants, points, order, near, far, *rules)
+    def __init__(self, geometry: ElementGeometry, material: Material, order: IntArray, log_length: float) -> None:
+        self.constants, self.order = Constants.of(material, log_length), order
+        self.points = CollocationPoints(geometry, material, log_length)
+        # distances below which closed forms are used, and above which the smaller rule is used
+        self.near, self.far = (
+            (geometry.half * geometry.distance_at(distance))[order] for distance in (CURVED_DISTANCE, _FAR)
+        )
+        self.rule, self.small_rule = (_rule(geometry, order, n_points) for n_points in (CURVED_POINTS, _FEW_POINTS))
 
     def factors(self, is_double: bool, x: ComplexArray, centred_on: IntArray, elements: IntArray) -> ComplexArray:
         """Return the factors (n, 2 or 4, n_points) of densities on some elements; see `layers.straight_factors`.

@@ -12,7 +12,6 @@ equations.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
@@ -39,41 +38,34 @@ Densities: TypeAlias = tuple[ComplexArray, ComplexArray, ComplexArray]
 """Complex tractions, constant parts of displacements and slopes, each (n_elements,)."""
 
 
-@dataclass(frozen=True, eq=False)
 class CollocationEquations:
     """The equations of a body without symmetry; see `bemkit.operators.boundary_equations.BoundaryEquations`.
 
     Parameters
     ----------
-    constants : Constants
-    start, end, points : (n_elements,) complex arrays [m]
-        End nodes and midpoints of the elements.
-    lengths : (n_elements,) array [m]
+    mesh : BoundaryMesh
+    material : Material
+    order : (n_elements,) array
+        The element of the mesh at each position of the tree.
+    border : Border
+    takes_slopes : bool
+    layer : Layer, optional
+        Evaluates both layers of straight elements; by default the compiled layer if there are many elements.
+    log_length : float, optional [m]
+        Unit of length in the logarithm; by default the diameter of the mesh.
+
+    Attributes
+    ----------
     acted_on : (n_elements, k) array
         Elements on which the displacement of each element acts: itself, and with slopes its neighbours.
     reconstruction : (n_elements, k, 2) complex array
         Constant part and slope of a unit displacement on these.
-    border : Border
-    layer : Layer
-        Evaluates both layers of straight elements.
     curved : CurvedElements or None
         Evaluates both layers if some elements are curved.
     """
 
-    constants: Constants
-    start: ComplexArray
-    end: ComplexArray
-    points: ComplexArray
-    lengths: FloatArray
-    acted_on: IntArray
-    reconstruction: ComplexArray
-    border: Border
-    layer: Layer
-    curved: CurvedElements | None = None
-
-    @classmethod
-    def of(
-        cls,
+    def __init__(
+        self,
         mesh: BoundaryMesh,
         material: Material,
         order: IntArray,
@@ -82,39 +74,18 @@ class CollocationEquations:
         takes_slopes: bool,
         layer: Layer | None = None,
         log_length: float | None = None,
-    ) -> CollocationEquations:
-        """Return the equations of a mesh without symmetry.
-
-        Parameters
-        ----------
-        mesh : BoundaryMesh
-        material : Material
-        order : (n_elements,) array
-            The element of the mesh at each position of the tree.
-        border : Border
-        takes_slopes : bool
-        layer : Layer, optional
-            By default the compiled layer if there are many elements.
-        log_length : float, optional [m]
-            Unit of length in the logarithm; by default the diameter of the mesh.
-        """
+    ) -> None:
         if layer is None:
             from bemkit.operators.collocation.compiled import layer_for
 
             layer = layer_for(mesh.n_elements)
         log_length = mesh.diameter if log_length is None else log_length
         geometry = ElementGeometry(mesh)
-        return cls(
-            Constants.of(material, log_length),
-            geometry.start[order],
-            geometry.end[order],
-            geometry.centre[order],
-            2.0 * geometry.half[order],
-            *_reconstruction(mesh, geometry, order, takes_slopes=takes_slopes),
-            border,
-            layer,
-            _curved(geometry, material, order, log_length),
-        )
+        self.constants, self.border, self.layer = Constants.of(material, log_length), border, layer
+        self.start, self.end = geometry.start[order], geometry.end[order]
+        self.points, self.lengths = geometry.centre[order], 2.0 * geometry.half[order]
+        self.acted_on, self.reconstruction = _reconstruction(mesh, geometry, order, takes_slopes=takes_slopes)
+        self.curved = _curved(geometry, material, order, log_length)
 
     @property
     def supports(self) -> ComplexArray:
@@ -259,12 +230,12 @@ def collocation_equations(
     """
     border = collocation_border(mesh, material, order, takes_slopes=takes_slopes)
     if mesh.symmetry is None:
-        return CollocationEquations.of(mesh, material, order, border, takes_slopes=takes_slopes, layer=layer)
+        return CollocationEquations(mesh, material, order, border, takes_slopes=takes_slopes, layer=layer)
     from bemkit.operators.collocation.images import FoldedEquations
 
     images = mesh.symmetry.images
     with_images = (np.arange(len(images))[:, None] * mesh.n_elements + order).ravel()
-    whole = CollocationEquations.of(
+    whole = CollocationEquations(
         mesh.whole, material, with_images, border, takes_slopes=takes_slopes, layer=layer, log_length=mesh.diameter
     )
     return FoldedEquations(whole, border, images)
@@ -322,7 +293,7 @@ def _curved(geometry: ElementGeometry, material: Material, order: IntArray, log_
         return None
     from bemkit.operators.collocation.curved_elements import CurvedElements
 
-    return CurvedElements.of(geometry, material, order, log_length)
+    return CurvedElements(geometry, material, order, log_length)
 
 
 def collocation_border(mesh: BoundaryMesh, material: Material, order: IntArray, *, takes_slopes: bool) -> Border:
@@ -332,7 +303,7 @@ def collocation_border(mesh: BoundaryMesh, material: Material, order: IntArray, 
     """
     n = mesh.n_elements
     motions = traction_free_modes(mesh, mesh.centres)
-    reciprocity = Reciprocity.of(mesh, material, takes_slopes=takes_slopes)
+    reciprocity = Reciprocity(mesh, material, takes_slopes=takes_slopes)
     compliance = 1.0 / (8.0 * np.pi * material.shear_modulus * (1.0 - material.effective_poisson_ratio))
     on_traction = np.concatenate([motions.T * (compliance * np.repeat(mesh.lengths, 2)), reciprocity.on_traction])
     on_displacement = np.concatenate([np.zeros(motions.T.shape), reciprocity.on_displacement])
@@ -349,7 +320,7 @@ def _reconstruction(
     n = order.size
     if not takes_slopes:
         return np.arange(n)[:, None], np.tile(np.array([1.0 + 0j, 0.0]), (n, 1, 1))
-    position, gradients = np.empty(n, np.intp), GradientReconstruction.of(mesh, geometry)
+    position, gradients = np.empty(n, np.intp), GradientReconstruction(mesh, geometry)
     position[order] = np.arange(n)
     return position[gradients.acted_on[order]], gradients.weights[order]
 

@@ -12,11 +12,9 @@ by h^2 / 24 times its curvature except at the midpoint, which makes results of t
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
-from bemkit.arrays import BoolArray, ComplexArray, IntArray
+from bemkit.arrays import BoolArray, ComplexArray
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.neighbours import corner_nodes
 from bemkit.operators.element_geometry import ElementGeometry
@@ -25,33 +23,32 @@ CORNER_ANGLE = 0.3
 """Smallest angle [rad] of a corner, across which no slope is taken; polygons of smooth curves have smaller angles."""
 
 
-@dataclass(frozen=True, eq=False)
 class GradientReconstruction:
-    """The linear displacements on elements that the midpoint value of each element causes.
+    """The linear displacements on elements that the midpoint value of each element causes, by least squares.
 
     Parameters
+    ----------
+    mesh : BoundaryMesh
+        Closed.
+    geometry : ElementGeometry
+
+    Attributes
     ----------
     acted_on : (n_elements, 3) array
         Elements on which the value acts: the preceding one, the element itself, and the next one along the boundary.
     weights : (n_elements, 3, 2) complex array
         Constant part and slope of a unit value on these. On every element the constant parts add up to one, the slopes
         to zero.
+
+    Notes
+    -----
+    Let x_k be the midpoints of an element and its neighbours and m their mean. The slope is sum c_k u_k with
+    c_k = conj(x_k - m) / sum |x_j - m|^2: the derivative of the complex-linear least-squares fit, or of the regression
+    line along a straight side. Neighbours across a corner are excluded, unless the element has corners at both ends.
+    Elements at corners have no correction of the mean.
     """
 
-    acted_on: IntArray
-    weights: ComplexArray
-
-    @classmethod
-    def of(cls, mesh: BoundaryMesh, geometry: ElementGeometry) -> GradientReconstruction:
-        """Return the least-squares slopes on a closed mesh.
-
-        Notes
-        -----
-        Let x_k be the midpoints of an element and its neighbours and m their mean. The slope is sum c_k u_k with
-        c_k = conj(x_k - m) / sum |x_j - m|^2: the derivative of the complex-linear least-squares fit, or of the
-        regression line along a straight side. Neighbours across a corner are excluded, unless the element has corners
-        at both ends. Elements at corners have no correction of the mean.
-        """
+    def __init__(self, mesh: BoundaryMesh, geometry: ElementGeometry) -> None:
         neighbours = np.empty((3, mesh.n_elements), dtype=np.intp)
         for loop in mesh.loops:
             neighbours[:, loop] = np.roll(loop, 1), loop, np.roll(loop, -1)
@@ -67,8 +64,8 @@ class GradientReconstruction:
         of_values = np.stack([_means(centre, half, is_smooth), weights * half], axis=2)
         of_values[1, :, 0] += 1.0
         # an element is neighbour 2 of the preceding one, 1 of itself and 0 of the next one
-        acted_on = neighbours.T
-        return cls(acted_on, of_values[np.array([2, 1, 0]), acted_on])
+        self.acted_on = neighbours.T
+        self.weights: ComplexArray = of_values[np.array([2, 1, 0]), self.acted_on]
 
     def gathered(self, on_constant: ComplexArray, on_slope: ComplexArray) -> ComplexArray:
         """Return the coefficients (..., n_elements) of values from those of constant parts and slopes."""

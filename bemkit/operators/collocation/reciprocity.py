@@ -34,11 +34,18 @@ _CANDIDATES = 64
 """Elements of a hole from which its largest circle is sought."""
 
 
-@dataclass(frozen=True, eq=False)
 class Reciprocity:
     """Equations ``on_traction @ traction == on_displacement @ displacement``, indices 2 * element + component.
 
     Parameters
+    ----------
+    mesh : BoundaryMesh
+        Loops that are images of each other share one equation.
+    material : Material
+    takes_slopes : bool
+        Whether displacements have slopes; see `bemkit.operators.collocation.gradient_reconstruction`.
+
+    Attributes
     ----------
     on_traction : (n_loops, 2 n_elements) array [m/Pa]
     on_displacement : (n_loops, 2 n_elements) array [-]
@@ -47,29 +54,14 @@ class Reciprocity:
         smooth, so that they cause no jumps between short elements at corners.
     """
 
-    on_traction: FloatArray
-    on_displacement: FloatArray
-    fields: FloatArray
-
-    @classmethod
-    def of(cls, mesh: BoundaryMesh, material: Material, *, takes_slopes: bool) -> Reciprocity:
-        """Return the equations of constant tractions, and of displacements with or without slopes.
-
-        Parameters
-        ----------
-        mesh : BoundaryMesh
-            Loops that are images of each other share one equation.
-        material : Material
-        takes_slopes : bool
-            Whether displacements have slopes; see `bemkit.operators.collocation.gradient_reconstruction`.
-        """
+    def __init__(self, mesh: BoundaryMesh, material: Material, *, takes_slopes: bool) -> None:
         whole = mesh.whole
         geometry, centres = ElementGeometry(whole), _plane(whole.centres)
-        reconstruction = GradientReconstruction.of(whole, geometry) if takes_slopes else None
+        reconstruction = GradientReconstruction(whole, geometry) if takes_slopes else None
         on_tractions, on_displacements, fields = [], [], []
         for loop, area in zip(mesh.loops, mesh.loop_areas, strict=True):
             images = _reciprocal_fields(mesh, loop, area)
-            arcs = Arcs.of(whole, _POINTS_OF_LINES if area > 0.0 and whole.is_straight.all() else _POINTS)
+            arcs = Arcs(whole, _POINTS_OF_LINES if area > 0.0 and whole.is_straight.all() else _POINTS)
             works = zip(*(field.work(arcs, material) for field in images), strict=True)
             on_traction, on_displacement, on_gradient = (np.sum(work, axis=0) for work in works)
             if reconstruction is not None:
@@ -80,10 +72,10 @@ class Reciprocity:
             value = np.sum([field.value(centres) for field in images], axis=0)
             fields.append(np.stack([value.real, value.imag], axis=1)[: mesh.n_elements].ravel())
         shape = -1, 2 * mesh.n_elements
-        of_traction, of_displacement, values = (
+        self.on_traction, self.on_displacement, values = (
             np.reshape(rows, shape) for rows in (on_tractions, on_displacements, fields)
         )
-        return cls(of_traction, of_displacement, values.T)
+        self.fields: FloatArray = values.T
 
 
 @dataclass(frozen=True, eq=False)
@@ -178,30 +170,22 @@ def _largest_circle(mesh: BoundaryMesh, loop: IntArray) -> tuple[FloatArray, flo
     return whole.centres[touching[largest]] + radius * whole.normals[touching[largest]], radius
 
 
-@dataclass(frozen=True, eq=False)
 class Arcs:
-    """Gauss points on elements.
+    """Gauss points on all elements of a mesh without symmetry.
 
-    Parameters
+    Attributes
     ----------
     start, end : (n_elements,) complex arrays [m]
     z, arm, dz : (n_elements, n_points) complex arrays [m]
         Points, their distances from the midpoint of the element, and weighted steps.
     """
 
-    start: ComplexArray
-    end: ComplexArray
-    z: ComplexArray
-    arm: ComplexArray
-    dz: ComplexArray
-
-    @classmethod
-    def of(cls, mesh: BoundaryMesh, n_points: int) -> Arcs:
-        """Return the points on all elements of a mesh, without images."""
+    def __init__(self, mesh: BoundaryMesh, n_points: int) -> None:
         elements = np.arange(mesh.n_elements)
         xi, weights = gauss_legendre(n_points)
-        z, dz = _plane(mesh.points(elements, xi)), _plane(mesh.derivatives(elements, xi)) * weights
-        return cls(_plane(mesh.start), _plane(mesh.end), z, z - _plane(mesh.centres)[:, None], dz)
+        self.start, self.end = _plane(mesh.start), _plane(mesh.end)
+        self.z, self.dz = _plane(mesh.points(elements, xi)), _plane(mesh.derivatives(elements, xi)) * weights
+        self.arm = self.z - _plane(mesh.centres)[:, None]
 
 
 def _plane(vectors: FloatArray) -> ComplexArray:

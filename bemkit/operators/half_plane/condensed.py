@@ -87,26 +87,13 @@ class CondensedHalfPlane:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class _HalfPlaneMap(CondensedMap):
-    """The half-plane under one load.
-
-    Parameters
-    ----------
-    body : CondensedHalfPlane
-    given : (n_dofs,) array [N/m]
-        Given forces in the frames.
-    prescribed : (n_acting,) array [m]
-        Displacements of fixed directions; zero on retained directions.
-    force_free : (n_dofs,) array [m]
-        Displacements under the given forces, far motions and far strain, without forces on acting directions.
-    far_load : (n_load_controlled,) array
-        Work of all given forces on the load-controlled unit motions.
-    """
+    """The half-plane under one load; arrays are in the frames."""
 
     body: CondensedHalfPlane
-    given: FloatArray
-    prescribed: FloatArray
-    force_free: FloatArray
-    far_load: FloatArray
+    given: FloatArray  # (n_dofs,) [N/m]
+    prescribed: FloatArray  # (n_acting,) [m], zero on retained directions
+    force_free: FloatArray  # (n_dofs,) [m]: displacements without forces on acting directions
+    far_load: FloatArray  # (n_load_controlled,): work of all given forces on the load-controlled unit motions
 
     def recover(self, retained_displacement: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return displacement and force of all elements."""

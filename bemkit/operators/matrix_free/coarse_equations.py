@@ -8,7 +8,6 @@ solution at these points, which smoothing on one scale misses.
 from __future__ import annotations
 
 import itertools
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -25,11 +24,17 @@ _CORNER, _TURN = 0.3, 0.2
 """Angle [rad] between neighbours at which groups end and are short, and largest rotation within one group."""
 
 
-@dataclass(frozen=True, eq=False)
 class ElementGroups:
     """Groups of consecutive elements of a boundary.
 
     Parameters
+    ----------
+    mesh : BoundaryMesh
+        Straight elements without symmetry.
+    kind : (n_elements,) array
+        A group contains elements of one kind, unless there would be too many groups.
+
+    Attributes
     ----------
     mesh : BoundaryMesh
         One straight element for each group.
@@ -39,37 +44,23 @@ class ElementGroups:
         The element in the middle of each group.
     """
 
-    mesh: BoundaryMesh
-    group: IntArray
-    middle: IntArray
-
-    @classmethod
-    def of(cls, mesh: BoundaryMesh, kind: IntArray) -> ElementGroups:
-        """Group the elements of a mesh.
-
-        Parameters
-        ----------
-        mesh : BoundaryMesh
-            Straight elements without symmetry.
-        kind : (n_elements,) array
-            A group contains elements of one kind, unless there would be too many groups.
-        """
+    def __init__(self, mesh: BoundaryMesh, kind: IntArray) -> None:
         for growth, kinds in (*((growth, kind) for growth in _GROWTHS), (_GROWTHS[-1], np.zeros_like(kind))):
             firsts = [_firsts(mesh, loop, kinds[loop], growth) for loop in mesh.loops]
             if sum(first.size for first in firsts) <= _MOST:
                 break
-        group, middle, nodes, elements, count = np.empty(mesh.n_elements, np.intp), [], [], [], 0
+        self.group, middle, nodes, elements, count = np.empty(mesh.n_elements, np.intp), [], [], [], 0
         for loop, first in zip(mesh.loops, firsts, strict=True):
             sizes = np.diff(np.append(first, loop.size + first[0]))
             from_first = np.roll(loop, -first[0])
-            group[from_first] = count + np.repeat(np.arange(first.size), sizes)
+            self.group[from_first] = count + np.repeat(np.arange(first.size), sizes)
             middle.append(from_first[first - first[0] + sizes // 2])
             nodes.append(mesh.start[loop[first]])
             loop_groups = count + np.arange(first.size)
             elements.append(np.stack([loop_groups, np.roll(loop_groups, -1)], axis=1))
             count += first.size
-        coarse = BoundaryMesh(np.concatenate(nodes), np.concatenate(elements), is_exterior=mesh.is_exterior)
-        return cls(coarse, group, np.concatenate(middle))
+        self.mesh = BoundaryMesh(np.concatenate(nodes), np.concatenate(elements), is_exterior=mesh.is_exterior)
+        self.middle = np.concatenate(middle)
 
     def mean(self, values: FloatArray) -> FloatArray:
         """Return the means (n_groups, k) of values (n_elements, k)."""

@@ -68,7 +68,7 @@ class IterativeFactor:
         self._material, self._options = material, options
         order = np.arange(mesh.n_elements)
         border = collocation_border(self._mesh, material, order, takes_slopes=takes_slopes)
-        self.equations = CollocationEquations.of(self._mesh, material, order, border, takes_slopes=takes_slopes)
+        self.equations = CollocationEquations(self._mesh, material, order, border, takes_slopes=takes_slopes)
         self._layers = FastMultipole(self.equations, material, self.tree, max(_PRODUCTS * options.tolerance, _FINEST))
         self._traction_unit = material.plane_modulus / mesh.diameter
         self._z, self._c = np.zeros((mesh.n_elements, 2)), np.zeros(len(border.self_coupling))
@@ -144,7 +144,7 @@ class IterativeFactor:
     def _solve(self) -> None:
         """Solve the equations until the mean residual and each single residual are small enough."""
         assert self.conditions is not None  # `update` comes first
-        inverse = self._inverse = self._inverse or Preconditioner.of(
+        inverse = self._inverse = self._inverse or Preconditioner(
             self._mesh, self._material, self.equations, self.conditions, self._traction_unit
         )
         tolerance, most = self._options.tolerance, self._options.max_steps

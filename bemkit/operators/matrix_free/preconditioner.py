@@ -8,11 +8,9 @@ unknown displacements and to the single layer for unknown tractions. pyamg's hie
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
-from bemkit.arrays import BoolArray, FloatArray
+from bemkit.arrays import FloatArray
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.operators.collocation.equations import CollocationEquations, collocation_border
 from bemkit.operators.hierarchy.system import LocalConditions
@@ -27,60 +25,46 @@ _COUPLED = 1e-6
 """Largest cosine of the angle between two directions that count as perpendicular."""
 
 
-@dataclass(frozen=True, eq=False)
 class Preconditioner:
-    """Approximate inverse of the equations under given factors of the local conditions.
+    """Approximate inverse of the equations under the factors of local conditions.
 
     Parameters
     ----------
-    groups : ElementGroups
-    coarse : DenseLU
-        Factors of the equations on groups.
-    is_traction : (n_elements, 2) bool array
-        Whether an unknown acts as a traction rather than a displacement.
-    units : (n_elements, 2) array
-        Scales of the unknowns in the iteration.
-    inverse : (n_elements, 2, 2) array
-        From x and y to the directions of the unknowns.
-    tractions : TractionHierarchy
+    mesh : BoundaryMesh
+    material : Material
+    equations : CollocationEquations
+    conditions : LocalConditions
+    traction_unit : float [Pa]
+        Scale of unknown tractions in the iteration.
+
+    Raises
+    ------
+    SingularMatrixError
+        If the conditions do not hold the body.
     """
 
-    groups: ElementGroups
-    coarse: DenseLU
-    is_traction: BoolArray
-    units: FloatArray
-    inverse: FloatArray
-    tractions: TractionHierarchy
-
-    @classmethod
-    def of(
-        cls,
+    def __init__(
+        self,
         mesh: BoundaryMesh,
         material: Material,
         equations: CollocationEquations,
         conditions: LocalConditions,
         traction_unit: float,
-    ) -> Preconditioner:
-        """Return the approximate inverse under local conditions; their given parts are ignored.
-
-        Raises
-        ------
-        SingularMatrixError
-            If the conditions do not hold the body.
-        """
+    ) -> None:
         of_traction, of_displacement = conditions.factors[:, :2], conditions.factors[:, 2:]
         compliance = (mesh.lengths / material.plane_modulus)[:, None]
+        # whether an unknown acts as a traction rather than a displacement, and its direction
         is_traction = compliance * np.linalg.norm(of_traction, axis=1) > np.linalg.norm(of_displacement, axis=1)
         along = np.where(is_traction[:, None], of_traction, of_displacement)
         # elements of one kind have the same unknowns and slip, if at all, in the same direction
         cosine = np.einsum("ni,ni->n", along[:, :, 0], along[:, :, 1])
         kind = is_traction @ np.array([1, 2]) + 4 * np.sign(np.where(np.abs(cosine) > _COUPLED, cosine, 0.0))
-        groups = ElementGroups.of(mesh, kind.astype(np.intp))
-        coarse = _coarse(groups.mesh, material, equations, conditions.factors[groups.middle])
+        self.groups = groups = ElementGroups(mesh, kind.astype(np.intp))
+        self.coarse = _coarse(groups.mesh, material, equations, conditions.factors[groups.middle])
         next_element = mesh.node_elements[mesh.elements[:, 1], 1]
-        tractions = TractionHierarchy.of(is_traction, next_element, mesh.lengths, equations.constants)
-        units = np.where(is_traction, traction_unit, 1.0)
-        return cls(groups, coarse, is_traction, units, np.linalg.inv(along), tractions)
+        self.tractions = TractionHierarchy(is_traction, next_element, mesh.lengths, equations.constants)
+        self.is_traction, self.units = is_traction, np.where(is_traction, traction_unit, 1.0)
+        self.inverse = np.linalg.inv(along)
 
     def unknowns(self, x: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return the element unknowns (n_elements, 2) and border unknowns (n_border,) of an iterate."""
@@ -103,7 +87,7 @@ def _coarse(mesh: BoundaryMesh, material: Material, fine: CollocationEquations, 
     """Factor the equations of groups under factors (n_groups, 4, 2) of their local conditions."""
     order, takes_slopes, length = np.arange(n := len(factors)), fine.acted_on.shape[1] > 1, fine.constants.log_length
     border = collocation_border(mesh, material, order, takes_slopes=takes_slopes)
-    of_groups = CollocationEquations.of(mesh, material, order, border, takes_slopes=takes_slopes, log_length=length)
+    of_groups = CollocationEquations(mesh, material, order, border, takes_slopes=takes_slopes, log_length=length)
     balances = border.balances.reshape(-1, n, 4)
     # stored by columns: stored by rows, LAPACK would factor the transpose, whose pivots grow on graded groups
     matrix = np.zeros((2 * n + len(balances), 2 * n + len(balances)), order="F")

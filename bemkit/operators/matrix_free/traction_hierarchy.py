@@ -13,7 +13,6 @@ contain waves of all lengths, which the sum would count several times.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -33,30 +32,27 @@ _COARSEST = 10
 """Largest number of unknowns of the coarsest level."""
 
 
-@dataclass(frozen=True, eq=False)
 class TractionHierarchy:
-    """Approximate inverse of the single layer for one set of unknown tractions.
+    """Approximate inverse of the single layer for those k of all unknowns that are tractions.
 
     Parameters
     ----------
-    unknowns : (k,) array
-        Indices 2 * element + component of the unknown tractions.
+    is_traction : (n_elements, 2) bool array
+    next_element : (n_elements,) array
+    lengths : (n_elements,) array [m]
+    constants : Constants
+
+    Attributes
+    ----------
     jumps : (n_jumps, k) sparse matrix
     prolongations : tuple of sparse matrices
         From each level to the next finer level, finest first.
     scale : (k,) array [Pa/m]
     """
 
-    unknowns: IntArray
-    jumps: csr_matrix
-    prolongations: tuple[csr_matrix, ...]
-    scale: FloatArray
-
-    @classmethod
-    def of(
-        cls, is_traction: BoolArray, next_element: IntArray, lengths: FloatArray, constants: Constants
-    ) -> TractionHierarchy:
-        """Return the inverse for those of the unknowns (n_elements, 2) that are tractions."""
+    def __init__(
+        self, is_traction: BoolArray, next_element: IntArray, lengths: FloatArray, constants: Constants
+    ) -> None:
         from pyamg import ruge_stuben_solver
         from scipy.sparse import csr_matrix, diags_array
 
@@ -68,20 +64,15 @@ class TractionHierarchy:
         k = unknowns.size
         rows = np.searchsorted(jump_keys, np.concatenate([starts, ends]))
         entries = np.repeat([-1.0, 1.0], k)
-        jumps = csr_matrix((entries, (rows, np.tile(np.arange(k), 2))), shape=(jump_keys.size, k))
-        prolongations: tuple[csr_matrix, ...] = ()
+        self.jumps = jumps = csr_matrix((entries, (rows, np.tile(np.arange(k), 2))), shape=(jump_keys.size, k))
+        self.prolongations: tuple[csr_matrix, ...] = ()
         if k > _COARSEST:
             string = (jumps @ diags_array(1.0 / lengths[element]) @ jumps.T).tocsr()
             string += diags_array(_HOLD * string.diagonal())
             hierarchy = ruge_stuben_solver(csr_matrix(string), max_coarse=_COARSEST, max_levels=40)
-            prolongations = tuple(_smoothed(level.P, level.A) for level in hierarchy.levels[:-1])
+            self.prolongations = tuple(_smoothed(level.P, level.A) for level in hierarchy.levels[:-1])
         kappa = 3.0 - 4.0 * constants.poisson_ratio
-        return cls(
-            unknowns,
-            jumps,
-            prolongations,
-            1.0 / (_STRENGTH * np.pi * kappa * constants.single * lengths[element]),
-        )
+        self.scale = 1.0 / (_STRENGTH * np.pi * kappa * constants.single * lengths[element])
 
     def apply(self, displacement: FloatArray) -> FloatArray:
         """Return the tractions (k,) that cause oscillating displacements (k,)."""

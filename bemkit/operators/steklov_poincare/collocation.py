@@ -181,7 +181,7 @@ class MixedSystem:
         work += OperationCounts(
             single_layer=Entries.full(n_rows, n_rows - self._free.size),
             double_layer=Entries.full(n_rows, self._free.size + self._retained.size),
-            factorisations=(self._factor.factorisation,),
+            factorisations=self._factor.factorisations,
             right_hand_sides=right.shape[1] + 1,
         )
         self._work, self._base = work, _Solved(data, self._solution(data, known))
@@ -308,24 +308,13 @@ class MixedSystem:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class _MixedMap(CondensedMap):
-    """The body under one load.
-
-    Parameters
-    ----------
-    system : MixedSystem
-    at_rest : (n_dofs,) array
-        The unknowns while the retained directions are at rest.
-    traction, given : (n_dofs,) arrays [Pa], [m]
-        Given tractions and displacements in the frames.
-    base : _Solved
-        Solved data of which the given data are a multiple.
-    """
+    """The body under one load."""
 
     system: MixedSystem
-    at_rest: FloatArray
-    traction: FloatArray
-    given: FloatArray
-    base: _Solved
+    at_rest: FloatArray  # (n_dofs,): the unknowns while the retained directions are at rest
+    traction: FloatArray  # (n_dofs,) [Pa], given, in the frames
+    given: FloatArray  # (n_dofs,) [m], given displacements in the frames
+    base: _Solved  # solved data of which the given data are a multiple
 
     def recover(self, retained_displacement: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return displacement and force of all elements."""

@@ -114,24 +114,13 @@ class ForcesInside:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class _MapWithBodyForces(CondensedMap):
-    """A condensed map under body forces; see `ForcesInside.add_to`.
-
-    Parameters
-    ----------
-    without_body_forces : CondensedMap
-    inside : ForcesInside
-    conditions : NodalConditions
-    along : (n_nodes, 2) array [m]
-        Particular displacements in the frames.
-    shift : (n_retained,) array [m]
-        Particular displacements along the retained directions.
-    """
+    """A condensed map under body forces; see `ForcesInside.add_to`."""
 
     without_body_forces: CondensedMap
     inside: ForcesInside
     conditions: NodalConditions
-    along: FloatArray
-    shift: FloatArray
+    along: FloatArray  # (n_nodes, 2) [m]: particular displacements in the frames
+    shift: FloatArray  # (n_retained,) [m]: the same along the retained directions
 
     def recover(self, retained_displacement: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return displacement and force of all nodes."""

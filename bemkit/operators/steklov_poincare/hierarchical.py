@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -160,8 +161,6 @@ class LoadedSystem:
     conditions : NodalConditions
         Conditions of the elements.
     system : HierarchicalSystem
-    known : LocalConditions
-        Local conditions of all elements; retained directions are held fast.
     may_be_loaded, may_move : (n_elements,) bool arrays
         Elements whose traction, and whose displacement, has columns in the equations.
     force : (n_elements, 2) array [N/m]
@@ -176,7 +175,6 @@ class LoadedSystem:
     elastic: HierarchicalCollocation
     conditions: NodalConditions
     system: HierarchicalSystem
-    known: LocalConditions
     may_be_loaded: BoolArray
     may_move: BoolArray
     force: FloatArray
@@ -198,10 +196,7 @@ class LoadedSystem:
             motions = motions[~turning(motions)]
         motions = np.ascontiguousarray(motions.transpose(1, 2, 0))
         at_rest = np.zeros(motions.shape[2])
-        nothing = LocalConditions(np.zeros((0, 4, 2)), np.zeros((0, 4)))
-        loaded = cls(
-            elastic, conditions, system, nothing, may_be_loaded, may_move, force, motions, at_rest
-        ).subtracting(at_rest)
+        loaded = cls(elastic, conditions, system, may_be_loaded, may_move, force, motions, at_rest)
         if conditions.later:
             later = (loaded.under(conditions.in_plane(given.force), given.displacement) for given in conditions.later)
             system.prepare(load.known.given for load in (loaded, *later))
@@ -224,10 +219,14 @@ class LoadedSystem:
 
     def subtracting(self, amplitudes: FloatArray) -> LoadedSystem:
         """Return the equations after a further rigid motion, amplitudes (n_motions,), is subtracted."""
-        other = replace(self, amplitudes=self.amplitudes + amplitudes)
+        return replace(self, amplitudes=self.amplitudes + amplitudes)
+
+    @cached_property
+    def known(self) -> LocalConditions:
+        """Local conditions of all elements; retained directions are held fast."""
         conditions = self.conditions
-        given = np.where(conditions.is_fixed, conditions.displacement - conditions.in_frames(other.motion), 0.0)
-        return replace(other, known=self.system.local_conditions(self._with_displacements(given)))
+        given = np.where(conditions.is_fixed, conditions.displacement - conditions.in_frames(self.motion), 0.0)
+        return self.system.local_conditions(self._with_displacements(given))
 
     def _with_displacements(self, displacement: FloatArray) -> NodeConditions:
         """Return conditions: given tractions on free directions, displacements (n_elements, 2) on the others."""

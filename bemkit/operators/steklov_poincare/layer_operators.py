@@ -99,7 +99,7 @@ def galerkin_factors(
     if basis.shape[1]:
         subtract_product(whitened.T, multiply(whitened.T, basis), basis)
     n_solved = excluded.shape[1] + whitened.shape[1]
-    work += OperationCounts(factorisations=(factor.factorisation,), right_hand_sides=n_solved)
+    work += OperationCounts(factorisations=factor.factorisations, right_hand_sides=n_solved)
     return GalerkinFactors(_symmetric_sum(hyper, whitened), factor, whitened, work)
 
 

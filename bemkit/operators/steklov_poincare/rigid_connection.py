@@ -58,7 +58,7 @@ class RigidlyConnected(WrappedMap):
     def condense(self, conditions: NodalConditions, force: FloatArray) -> CondensedMap:
         """Condense the map and eliminate the motions of its connections; see `SteklovPoincare.condense`."""
         fixed = self.elastic.condense(conditions, force)
-        connections = _Connections.of(fixed, conditions, dof_points(self.displacement_space))
+        connections = _Connections(fixed, conditions, dof_points(self.displacement_space))
         return connections.under(fixed, force, fixed.work + connections.work)
 
     def element_tractions(self, displacement: FloatArray, force: FloatArray) -> FloatArray:
@@ -66,18 +66,13 @@ class RigidlyConnected(WrappedMap):
         return self.elastic.element_tractions(displacement, force)
 
 
-@dataclass(frozen=True, eq=False)
 class _Connections:
-    """Responses of a condensed body to the k rigid motions of its connections.
+    """Responses of a body whose connected nodes are fixed to the k rigid motions of its connections.
 
-    Parameters
+    Attributes
     ----------
-    motions : (n_nodes, 2, k) array
-        Displacements of connected nodes in x and y under unit motions; zero at other nodes.
     displacement, force : (n_nodes, 2, k) arrays
         Fields of all nodes under unit motions, with retained directions at rest.
-    unit_maps : tuple of k CondensedMap
-        The body under each unit motion without other loads.
     coupling : (n_retained, k) array
         L: forces of unit motions on the retained directions.
     influence : (k, k) array
@@ -86,27 +81,18 @@ class _Connections:
         K - L A^-1 L^T, the stiffness with the motions eliminated.
     """
 
-    motions: FloatArray
-    displacement: FloatArray
-    force: FloatArray
-    unit_maps: tuple[CondensedMap, ...]
-    coupling: FloatArray
-    influence: FloatArray
-    stiffness: FloatArray
-
-    @classmethod
-    def of(cls, fixed: CondensedMap, conditions: NodalConditions, points: FloatArray) -> _Connections:
-        """Return the connections of a body whose connected nodes are fixed."""
-        motions = np.concatenate([_motions(nodes, points) for nodes in conditions.connected], axis=2)
+    def __init__(self, fixed: CondensedMap, conditions: NodalConditions, points: FloatArray) -> None:
+        self.motions = np.concatenate([_motions(nodes, points) for nodes in conditions.connected], axis=2)
         no_force, at_rest = np.zeros_like(points), np.zeros(len(fixed.load))
-        unit_maps = tuple(fixed.under(no_force, conditions.in_frames(motion)) for motion in np.moveaxis(motions, 2, 0))
-        fields = [unit_map.recover(at_rest) for unit_map in unit_maps]
-        displacement, force = (np.stack([pair[k] for pair in fields], axis=2) for k in (0, 1))
-        coupling = np.stack([unit_map.load for unit_map in unit_maps], axis=1)
-        influence = np.einsum("ncj,nck->jk", motions, force)
-        influence = 0.5 * (influence + influence.T)
-        stiffness = fixed.stiffness - coupling @ np.linalg.solve(influence, coupling.T)
-        return cls(motions, displacement, force, unit_maps, coupling, influence, 0.5 * (stiffness + stiffness.T))
+        in_frames = [conditions.in_frames(motion) for motion in np.moveaxis(self.motions, 2, 0)]
+        self.unit_maps = tuple(fixed.under(no_force, motion) for motion in in_frames)
+        fields = [unit_map.recover(at_rest) for unit_map in self.unit_maps]
+        self.displacement, self.force = (np.stack([pair[k] for pair in fields], axis=2) for k in (0, 1))
+        self.coupling = np.stack([unit_map.load for unit_map in self.unit_maps], axis=1)
+        influence = np.einsum("ncj,nck->jk", self.motions, self.force)
+        self.influence = 0.5 * (influence + influence.T)
+        stiffness = fixed.stiffness - self.coupling @ np.linalg.solve(self.influence, self.coupling.T)
+        self.stiffness = 0.5 * (stiffness + stiffness.T)
 
     @property
     def work(self) -> OperationCounts:
@@ -133,20 +119,11 @@ class _Connections:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class _ConnectedMap(CondensedMap):
-    """A body with rigid connections under one load.
+    """A body with rigid connections under one load."""
 
-    Parameters
-    ----------
-    fixed : CondensedMap
-        The body with fixed connections.
-    connections : _Connections
-    at_rest : (k,) array
-        Motions of the connections while the retained directions are at rest.
-    """
-
-    fixed: CondensedMap
+    fixed: CondensedMap  # the body with fixed connections
     connections: _Connections
-    at_rest: FloatArray
+    at_rest: FloatArray  # (k,): motions of the connections while the retained directions are at rest
 
     def recover(self, retained_displacement: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return displacement and force of all nodes."""

@@ -105,21 +105,12 @@ class SchurCondensation:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class _SchurMap(CondensedMap):
-    """The body under one load.
-
-    Parameters
-    ----------
-    condensation : SchurCondensation
-    prescribed, at_rest : (n_fixed,), (n_free,) arrays [m]
-        Displacements of fixed directions, and of free directions while the retained ones are at rest.
-    pressure : (n_pressures,) array
-        Pressure from `VolumeConstraint.solve`.
-    """
+    """The body under one load."""
 
     condensation: SchurCondensation
-    prescribed: FloatArray
-    at_rest: FloatArray
-    pressure: FloatArray
+    prescribed: FloatArray  # (n_fixed,) [m]
+    at_rest: FloatArray  # (n_free,) [m], while the retained directions are at rest
+    pressure: FloatArray  # (n_pressures,), from `VolumeConstraint.solve`
 
     def recover(self, retained_displacement: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return displacement and force of all nodes."""

@@ -145,7 +145,7 @@ def test_fields_anywhere_are_integrals_of_the_kernel(backend: str) -> None:
 def test_quadrature_gives_the_closed_forms_where_elements_are_straight(backend: str) -> None:
     mesh, order = straight(Rectangle(1.0, 1.0), 48), np.random.default_rng(2).permutation(48)
     geometry, constants = ElementGeometry(mesh), Constants.of(MATERIAL, mesh.diameter)
-    elements = CurvedElements.of(geometry, MATERIAL, order, mesh.diameter)
+    elements = CurvedElements(geometry, MATERIAL, order, mesh.diameter)
     chosen = np.array([3, 10, 47])
     start, end, centre = (of[order[chosen]] for of in (geometry.start, geometry.end, geometry.centre))
     # close to the first of them, some half lengths away, far away, and in the middle of the last one

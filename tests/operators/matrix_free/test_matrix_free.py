@@ -157,7 +157,7 @@ def test_groups_lose_no_digits_on_fine_meshes() -> None:
     local = NodeConditions.given(is_held, nothing, nothing).solved(1.0)
     equations = collocation_equations(mesh, material, np.arange(mesh.n_elements), takes_slopes=True)
     assert isinstance(equations, CollocationEquations)
-    inverse = Preconditioner.of(mesh, material, equations, local, 1.0)
+    inverse = Preconditioner(mesh, material, equations, local, 1.0)
     right = np.cos(np.arange(2.0 * len(inverse.groups.middle) + 4.0) / 10.0)
     unknowns = inverse.coarse.solve(right)
     assert np.abs(inverse.coarse.solve(3.0 * right) / 3.0 - unknowns).max() < 1e-12 * np.abs(unknowns).max()
@@ -168,7 +168,7 @@ def test_groups_are_short_where_conditions_change_and_their_number_hardly_grows(
     for n in (1000, 20_000):
         mesh = mesh_of("rectangle", n)
         kind = (mesh.centres[:, 0] > mesh.nodes[:, 0].mean()).astype(int)
-        groups = ElementGroups.of(mesh, kind)
+        groups = ElementGroups(mesh, kind)
         counts.append(groups.middle.size)
         assert np.array_equal(groups.group[groups.middle], np.arange(counts[-1]))
         assert (
@@ -181,9 +181,9 @@ def test_groups_are_short_where_conditions_change_and_their_number_hardly_grows(
 
 def test_there_are_few_groups_however_often_conditions_change() -> None:
     mesh = mesh_of("rectangle", 8000)
-    assert ElementGroups.of(mesh, np.arange(8000) // 2 % 2).middle.size <= 1200
+    assert ElementGroups(mesh, np.arange(8000) // 2 % 2).middle.size <= 1200
     hole = mesh_of("hole", 8000)
-    groups = ElementGroups.of(hole, np.zeros(8000, int))
+    groups = ElementGroups(hole, np.zeros(8000, int))
     assert len(groups.mesh.loops) == 2
     assert groups.mesh.lengths.sum() == pytest.approx(hole.lengths.sum(), rel=1e-3)  # chords of the hole
 
@@ -192,7 +192,7 @@ def test_the_hierarchy_inverts_the_single_layer_on_waves() -> None:
     n = 512
     constants = Constants.of(MATERIAL, 1.0)
     is_traction = np.tile([True, False], (n, 1))
-    inverse = TractionHierarchy.of(is_traction, np.roll(np.arange(n), -1), np.full(n, 1.0 / n), constants)
+    inverse = TractionHierarchy(is_traction, np.roll(np.arange(n), -1), np.full(n, 1.0 / n), constants)
     ratios = []
     for number in (4, 16, 64, 128, 192):
         wave = np.cos(2.0 * np.pi * number * np.arange(n) / n)
