@@ -18,6 +18,9 @@ else:
 # the colours of Okabe and Ito, which people with colour-vision deficiencies can distinguish
 BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY = "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9"
 GREY = "#9A9A9A"
+COLOURS = (BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY)
+LINES: tuple[Any, ...] = ("-", (0, (5, 2)), (0, (1, 1.5)), (0, (5, 1, 1, 1)))
+"""Styles of series, in their order."""
 CLEAR: Mapping[str, Any] = MappingProxyType({"framealpha": 0.85, "edgecolor": "none", "borderpad": 0.2})
 """Style of legends that stay readable over curves."""
 

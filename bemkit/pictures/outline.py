@@ -8,14 +8,13 @@ import numpy as np
 
 from bemkit.geometry.outline import Outline
 from bemkit.geometry.vectors import norms, turned_right
-from bemkit.pictures.drawing import BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILION, Axes, axes_or_new, show_grid
+from bemkit.pictures.drawing import COLOURS, Axes, axes_or_new, show_grid
 from bemkit.scene.unit_names import UnitNames, with_unit
 
 if TYPE_CHECKING:
     from matplotlib.text import Annotation
     from matplotlib.transforms import Bbox
 
-_COLOURS = (BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY)
 _SEEN = np.linspace(0.0, 1.0, 65)
 _MANY = 40
 """Sides of which each is still named."""
@@ -29,7 +28,7 @@ def draw_outline(outline: Outline, title: str, axes: Axes | None = None, *, unit
     outwards = [1.0 if k == 0 or outline.is_exterior else -1.0 for k, loop in enumerate(outline.loops) for _ in loop]
     for index, (side, sense) in enumerate(zip(outline.sides, outwards, strict=True)):
         points = side.curve.point(_SEEN)
-        colour = _COLOURS[index % len(_COLOURS)]
+        colour = COLOURS[index % len(COLOURS)]
         axes.plot(*points.T, color=colour, linewidth=2.0)
         axes.plot(*points[0], color="black", marker="o", markersize=3.0)
         if len(outline.sides) <= _MANY:

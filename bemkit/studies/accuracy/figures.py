@@ -7,15 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from bemkit.pictures.drawing import BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILION, Axes, Figure, new_figure, show_grid
+from bemkit.pictures.drawing import COLOURS, LINES, Axes, Figure, new_figure, show_grid
 from bemkit.reference.compare import MEASURES
 from bemkit.studies.accuracy.records import ErrorRecord, by_series, fitted_rate, pareto_front
 
 FIGURE = "error-against-run-time"
-_COLOURS = (BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY)
 _FRONT, _DARK = "#D8D8D8", "#444444"
 _MARKERS = ("o", "^", "s", "D", "v", "P")
-_LINES: tuple[Any, ...] = ("-", (0, (5, 2)), (0, (1, 1.5)), (0, (5, 1, 1, 1)))
 _MESHES = ("adaptive", "uniform", "graded")
 """Line style of each kind of meshes, the same in all figures; other kinds follow."""
 _ELEMENTS = ("constant", "linear", "quadratic")
@@ -93,8 +91,8 @@ def _style(records: Sequence[ErrorRecord], record: ErrorRecord) -> tuple[str, An
         names = dict.fromkeys([*known, *(str(getattr(other, name)) for other in records)])
         return list(names).index(getattr(record, name))
 
-    colour = _COLOURS[place(_ELEMENTS, "discretisation") % len(_COLOURS)]
-    line = _LINES[place(_MESHES, "meshes") % len(_LINES)]
+    colour = COLOURS[place(_ELEMENTS, "discretisation") % len(COLOURS)]
+    line = LINES[place(_MESHES, "meshes") % len(LINES)]
     return colour, line, _MARKERS[place((), "solver") % len(_MARKERS)]
 
 

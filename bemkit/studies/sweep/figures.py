@@ -8,12 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from bemkit.pictures.drawing import BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILION, Axes, Figure, new_figure, show_grid
-from bemkit.studies.sweep.records import QUANTITIES, unit_of_column
+from bemkit.pictures.drawing import COLOURS, LINES, Axes, Figure, new_figure, show_grid
+from bemkit.studies.sweep.records import NUMBERS, unit_of_column
 from bemkit.studies.sweep.table import Sweep
-
-_COLOURS = (BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY)
-_LINES: tuple[Any, ...] = ("-", (0, (5, 2)), (0, (1, 1.5)), (0, (5, 1, 1, 1)))
 
 
 def figure_name(over: str, show: str) -> str:
@@ -48,7 +45,10 @@ def draw_sweep(sweep: Sweep, over: str, show: str, axes: Axes | None = None) -> 
     for number, (values, rows) in enumerate(series.items()):
         label = ", ".join(f"{key} = {value:g}" for key, value in zip(others, values, strict=True))
         order = np.array(rows)[np.argsort(sweep.column(along)[rows], kind="stable")]
-        style: dict[str, Any] = {"color": _COLOURS[number % 6], "linestyle": _LINES[number // 6 % 4]}
+        style: dict[str, Any] = {
+            "color": COLOURS[number % len(COLOURS)],
+            "linestyle": LINES[number // len(COLOURS) % len(LINES)],
+        }
         axes.plot(x[order], y[order], marker="o", markersize=3.5, linewidth=1.2, label=label or None, **style)
     axes.set_xlabel(_named(over, sweep), parse_math=False)
     axes.set_ylabel(_named(show, sweep), parse_math=False)
@@ -68,4 +68,4 @@ def draw_all(over: str, shown: Sequence[str], sweep: Sweep) -> dict[str, Figure]
 
 def _named(column: str, sweep: Sweep) -> str:
     unit = unit_of_column(column, sweep.scene.result_units)
-    return f"{column.replace('_', ' ') if column in QUANTITIES else column}{f' [{unit}]' if unit else ''}"
+    return f"{column.replace('_', ' ') if column in NUMBERS else column}{f' [{unit}]' if unit else ''}"
