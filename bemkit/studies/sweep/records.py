@@ -8,33 +8,10 @@ from dataclasses import dataclass
 from types import MappingProxyType
 
 from bemkit.results.solution import Solution
-from bemkit.scene.unit_names import UnitNames, unit_of
+from bemkit.scene.unit_names import QUANTITIES, UnitNames, unit_of
 from bemkit.studies.engine import Attempt
 from bemkit.studies.row_file import RowFile
-from bemkit.table import column, columns_of
-
-QUANTITIES: Mapping[str, str] = MappingProxyType(
-    {
-        "force_normal": "force",
-        "force_tangential": "force",
-        "energy": "energy",
-        "contact_length": "length",
-        "peak_pressure": "stress",
-        "largest_slip": "length",
-        "estimated_error": "",
-        "n_elements": "",
-        "n_contact": "",
-        "linear_solves": "",
-        "seconds": "time",
-    }
-)
-"""The numerical results of a row, in the order in which they are shown, with their quantities."""
-
-
-def unit_of_column(column: str, units: UnitNames | None) -> str:
-    """Return the name of the unit of a column; empty if the scene has no name for it."""
-    quantity = QUANTITIES.get(column, "")
-    return "s" if quantity == "time" else unit_of(quantity, units)
+from bemkit.table import Column, column, columns_of
 
 
 @dataclass(frozen=True)
@@ -72,9 +49,20 @@ class SweepRow:
         return bool(self.certified)
 
 
-_MEASURED = tuple(QUANTITIES)[:7]
-RESULTS = tuple(head.name for head in columns_of(SweepRow))
-"""The names of all results of a row."""
+_MEASURED = (
+    *("force_normal", "force_tangential", "energy", "contact_length", "peak_pressure"),
+    *("largest_slip", "estimated_error"),
+)
+NUMBERS = (*_MEASURED, "n_elements", "n_contact", "linear_solves", "seconds")
+"""The numerical results of a row, in the order in which they are shown."""
+COLUMNS: Mapping[str, Column] = MappingProxyType({head.name: head for head in columns_of(SweepRow)})
+"""All results of a row by name."""
+
+
+def unit_of_column(name: str, units: UnitNames | None) -> str:
+    """Return the name of the unit of a column; empty if the scene has no name for it."""
+    unit = COLUMNS[name].unit if name in COLUMNS else ""
+    return unit if unit == "s" else unit_of(QUANTITIES.get(unit, ""), units)
 
 
 def row_of(values: tuple[float, ...], found: Attempt) -> SweepRow:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -15,8 +15,8 @@ from bemkit.errors import InputError
 from bemkit.formulas import closest
 from bemkit.scene.scene import Scene
 from bemkit.scene.toml import scene_from_toml
-from bemkit.studies.sweep.records import FILE, QUANTITIES, RESULTS, SweepRow, unit_of_column
-from bemkit.table import Column, Table, columns_of, json_text
+from bemkit.studies.sweep.records import COLUMNS, FILE, NUMBERS, SweepRow, unit_of_column
+from bemkit.table import Column, Table, json_text
 
 
 @dataclass(frozen=True)
@@ -73,7 +73,7 @@ class Sweep:
         InputError
             If there is no such column of numbers.
         """
-        names = [*self.keys, *QUANTITIES]
+        names = [*self.keys, *NUMBERS]
         if name not in names:
             raise InputError(f"column {name!r}: the columns of numbers are {', '.join(names)}{closest(name, names)}")
         return np.array([self.entry(row, name) for row in self.solved], dtype=float)
@@ -85,17 +85,15 @@ class Sweep:
     def as_table(self) -> Table:
         """Return all rows with the keys in front; numbers of failed rows are nan."""
         units = self.scene.result_units
-        results = [replace(head, unit=unit_of_column(head.name, units)) for head in columns_of(SweepRow)]
+        results = [replace(head, unit=unit_of_column(head.name, units)) for head in COLUMNS.values()]
         keys = [Column(key, "", "varied", "g") for key in self.keys]
-        rows = ((*row.values, *(getattr(row, name) for name in RESULTS)) for row in self.rows)
+        rows = ((*row.values, *(getattr(row, name) for name in COLUMNS)) for row in self.rows)
         return Table((*keys, *results), tuple(rows))
 
     def columns(self) -> dict[str, Any]:
         """Return the keys and all results of the solved rows: arrays of numbers, lists of texts."""
-        numbers = {name: self.column(name) for name in (*self.keys, *QUANTITIES)}
-        return numbers | {
-            name: [getattr(row, name) for row in self.solved] for name in RESULTS if name not in QUANTITIES
-        }
+        numbers = {name: self.column(name) for name in (*self.keys, *NUMBERS)}
+        return numbers | {name: [getattr(row, name) for row in self.solved] for name in COLUMNS if name not in NUMBERS}
 
     def to_csv(self) -> str:
         """Return all rows as comma-separated values; numbers of failed rows are nan."""
@@ -103,7 +101,7 @@ class Sweep:
 
     def to_json(self) -> str:
         """Return one JSON object: title, keys, solved rows and, apart from them, failed ones."""
-        solved = [self._as_dict(row, RESULTS) for row in self.solved]
+        solved = [self._as_dict(row, COLUMNS) for row in self.solved]
         failed = [self._as_dict(row, ("status", "message", "seconds")) for row in self.failed]
         content = {"title": self.scene.title, "keys": self.keys, "rows": solved, "failed": failed}
         return json_text(content)
@@ -133,11 +131,11 @@ class Sweep:
         axes = [np.unique([self.entry(row, key) for row in self.rows]) for key in self.keys]
         places = tuple(np.searchsorted(axis, self.column(key)) for axis, key in zip(axes, self.keys, strict=True))
         data = {}
-        for name in QUANTITIES:
+        for name in NUMBERS:
             values = np.full([axis.size for axis in axes], np.nan)
             values[places] = self.column(name)
             data[name] = (self.keys, values, {"units": unit_of_column(name, self.scene.result_units)})
         return xr.Dataset(data, coords=dict(zip(self.keys, axes, strict=True)), attrs={"title": self.scene.title})
 
-    def _as_dict(self, row: SweepRow, names: Sequence[str]) -> dict[str, Any]:
+    def _as_dict(self, row: SweepRow, names: Iterable[str]) -> dict[str, Any]:
         return dict(zip(self.keys, row.values, strict=True)) | {name: getattr(row, name) for name in names}
