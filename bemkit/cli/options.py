@@ -5,12 +5,13 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, ExitStack, nullcontext
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 import click
 
-from bemkit.cli.outputs import STDOUT, Content, Outputs, TableFile, TextFile
+from bemkit.cli.outputs import STDOUT, Content, Outputs, TableFile, TextFile, csv_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -90,20 +91,14 @@ def outputs_of(
         raise click.UsageError("--what names figures: add --plot DIR")
     if json_file is csv_file is folder is None:
         return Outputs()
-    from bemkit.results.tables import to_csv, to_json
-
-    def as_csv(solution: Solution) -> str:
-        return to_csv(solution, table)
+    from bemkit.results.tables import table_of, to_json
 
     def pictures(solution: Solution) -> Mapping[str, Figure]:
         from bemkit.pictures.catalogue import figures
 
         return figures(solution, what if what is None else [name for name in what if name != "animation"])
 
-    texts = (
-        TextFile(json_file, to_json),
-        TextFile(csv_file, as_csv),
-    )
+    texts = TextFile(json_file, to_json), csv_of(csv_file, partial(table_of, table=table))
     return Outputs(texts, folder, pictures, "deformation")
 
 

@@ -68,6 +68,11 @@ class TextFile(Generic[Content]):
             _write(Path(self.target), self.text(content))
 
 
+def csv_of(target: str | None, table: Callable[[Content], Table]) -> TextFile[Content]:
+    """Return a table to write as comma-separated values, or nothing."""
+    return TextFile(target, lambda content: table(content).to_csv())
+
+
 @dataclass(frozen=True)
 class TableFile(Generic[Content]):
     """A table to write in the format of the ending of its file, or nothing.

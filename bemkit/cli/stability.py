@@ -10,7 +10,7 @@ import click
 
 from bemkit.cli import options
 from bemkit.cli.options import StudyProgress, reserve, study_output
-from bemkit.cli.outputs import Outputs, TextFile
+from bemkit.cli.outputs import Outputs, TextFile, csv_of
 
 if TYPE_CHECKING:
     from bemkit.studies.engine import Task
@@ -47,7 +47,7 @@ def stability(
         from bemkit.scene.toml import load_scene, scene_to_toml, with_overrides
         from bemkit.studies.stability.axes import axes_of, find_axes
         from bemkit.studies.stability.figures import draw_axes, figure_name
-        from bemkit.studies.stability.records import FILE, table_of, to_csv, to_markdown
+        from bemkit.studies.stability.records import FILE, table_of, to_markdown
         from bemkit.studies.stability.sweep import sweep
 
         chosen = with_overrides(load_scene(scene or "paper-1"), elements=elements, discretisation=discretisation)
@@ -55,11 +55,7 @@ def stability(
         # an axis that is asked for by its name is refused by the sweep
         axes = every if axis else axes_of(chosen)
         rows, table = study_output(output, table_of)
-        texts = (
-            table,
-            TextFile(csv_file, to_csv),
-            TextFile(markdown, partial(to_markdown, axes)),
-        )
+        texts = table, csv_of(csv_file, table_of), TextFile(markdown, partial(to_markdown, axes))
         outputs = Outputs(texts, folder, partial(draw_axes, axes), figure_name(axes[0]))
         reserve(outputs.check(FILE.check(rows)))
         shows_tables = not quiet and not outputs.uses_stdout

@@ -11,7 +11,7 @@ import click
 
 from bemkit.cli import options
 from bemkit.cli.options import StudyProgress, reserve, shown_progress, study_output
-from bemkit.cli.outputs import STDOUT, Outputs, TextFile, plain_table, stdout_console
+from bemkit.cli.outputs import STDOUT, Outputs, TextFile, csv_of, plain_table, stdout_console
 from bemkit.cli.process import NOT_CONVERGED
 from bemkit.errors import concerning
 from bemkit.table import json_text
@@ -92,7 +92,7 @@ def errors(
         from bemkit.scene.toml import load_single_body
         from bemkit.studies.accuracy.figures import FIGURE, draw_errors
         from bemkit.studies.accuracy.options import StudyOptions, read_measures
-        from bemkit.studies.accuracy.records import FILE, table_of, to_csv
+        from bemkit.studies.accuracy.records import FILE, table_of
         from bemkit.studies.accuracy.runs import error_tasks
 
         shown = read_measures(measures)
@@ -102,7 +102,7 @@ def errors(
             return {FIGURE: draw_errors(records, shown, title=problem.title)}
 
         rows, table = study_output(output, table_of)
-        texts = table, TextFile(csv_file, to_csv)
+        texts = table, csv_of(csv_file, table_of)
         # sharp at the width of a page, and a small file
         outputs = Outputs(texts, folder, figures, FIGURE, dots_per_inch=110)
         reserve(outputs.check(FILE.check(rows)))

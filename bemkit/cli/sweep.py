@@ -10,7 +10,7 @@ import click
 
 from bemkit.cli import options
 from bemkit.cli.options import StudyProgress, reserve, study_output
-from bemkit.cli.outputs import Outputs, TextFile
+from bemkit.cli.outputs import Outputs, TextFile, csv_of
 from bemkit.cli.process import NOT_CONVERGED
 from bemkit.errors import concerning
 
@@ -83,7 +83,7 @@ def sweep(
 
         values = read_variations(vary)
         rows, table = study_output(output, Sweep.as_table)
-        texts = table, TextFile(csv_file, Sweep.to_csv), TextFile(json_file, Sweep.to_json)
+        texts = table, csv_of(csv_file, Sweep.as_table), TextFile(json_file, Sweep.to_json)
         outputs = Outputs(texts, folder, *_figures(tuple(values), over, show or (DEFAULT_SHOWN,)))
         own = FILE.check(rows)  # reserved by the sweep itself
         reserve(path for path in outputs.check(own) if path not in own)
@@ -105,9 +105,9 @@ def _figures(
 ) -> tuple[Callable[[Sweep], dict[str, Figure]], str]:
     """Return how to draw some columns over the first key or another column, and the name of the first figure."""
     from bemkit.studies.sweep.figures import draw_all, figure_name
-    from bemkit.studies.sweep.records import QUANTITIES
+    from bemkit.studies.sweep.records import NUMBERS
 
-    abscissa, names = over or keys[0], [*keys, *QUANTITIES]
+    abscissa, names = over or keys[0], [*keys, *NUMBERS]
     for name in (abscissa, *shown):
         if name not in names:
             raise click.UsageError(f"{name!r} is not a column of numbers: give one of {', '.join(names)}")

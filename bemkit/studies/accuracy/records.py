@@ -162,8 +162,3 @@ def table_of(records: Sequence[ErrorRecord]) -> Table:
     heads += [Column(f"pareto_{measure}", "", "1 if no other run is faster and more accurate") for measure in MEASURES]
     rows = tuple((*row, *more) for row, more in zip(table.rows, added, strict=True))
     return Table((*table.columns, *heads), rows)
-
-
-def to_csv(records: Sequence[ErrorRecord]) -> str:
-    """Return the table of the records as comma-separated values."""
-    return table_of(records).to_csv()

@@ -76,8 +76,3 @@ def cells(record: StabilityRecord) -> list[str]:
     solves = row["linear_solves"] if record.linear_solves else ""
     numbers = (row[name] for name in ("certificate", "check", "reciprocity", "condition", "deviation", "scaled_copy"))
     return [row["value"], record.verdict, record.status.replace("_", " "), solves, *numbers]
-
-
-def to_csv(records: Sequence[StabilityRecord]) -> str:
-    """Return the table of the records as comma-separated values."""
-    return table_of(records).to_csv()

@@ -20,7 +20,7 @@ from bemkit.cli.progress import compute_with_progress
 from bemkit.errors import BemkitError, one_line
 from bemkit.reference import MEASURES, find_reference
 from bemkit.studies.accuracy.figures import draw_errors
-from bemkit.studies.accuracy.records import FILE, to_csv
+from bemkit.studies.accuracy.records import FILE, table_of
 from bemkit.studies.accuracy.runs import all_runs, error_tasks, uniform
 from bemkit.studies.row_file import RowFileError
 from tests.studies.accuracy.records import row
@@ -51,7 +51,7 @@ def test_everything_is_written_and_the_tables_are_printed(tmp_path: Path) -> Non
     labels, rows = FILE.read(files["jsonl"])
     assert "title" in labels["scene"]
     assert [(row.meshes, row.size) for row in rows] == [("uniform", 12.0), ("uniform", 24.0), ("adaptive", 0.1)]
-    assert files["csv"].read_text() == to_csv(rows)
+    assert files["csv"].read_text() == table_of(rows).to_csv()
     picture = matplotlib.image.imread(tmp_path / "plots" / "error-against-run-time.png")
     assert min(picture.shape[:2]) > 700
     assert picture[..., :3].std() > 0.05  # not blank

@@ -17,7 +17,7 @@ from bemkit.studies.accuracy.records import (
     fitted_rate,
     orders,
     pareto_front,
-    to_csv,
+    table_of,
 )
 from tests.studies.accuracy.records import row
 
@@ -84,7 +84,7 @@ def test_the_front_is_what_nothing_beats() -> None:
 
 def test_csv_holds_orders_and_marks() -> None:
     rows = [*halving(3.0), dataclasses.replace(halving(2.0, meshes="graded")[3], seconds=9.0)]
-    text = to_csv(rows)
+    text = table_of(rows).to_csv()
     assert text.startswith("discretisation,map,meshes,solver,size,")
     read = list(csv.DictReader(io.StringIO(text)))
     assert read[0]["order_energy"] == "nan"

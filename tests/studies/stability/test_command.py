@@ -12,7 +12,7 @@ from click.testing import CliRunner, Result
 from bemkit.cli.main import commands
 from bemkit.studies.stability.axes import find_axes
 from bemkit.studies.stability.figures import draw_axis
-from bemkit.studies.stability.records import FILE, StabilityRecord, cells, to_csv, to_markdown
+from bemkit.studies.stability.records import FILE, StabilityRecord, cells, table_of, to_markdown
 
 FAST = ("stability", "paper-1", "--elements", "32", "--axis", "sliding")
 
@@ -45,7 +45,7 @@ def test_everything_is_written_and_the_tables_are_printed(swept: bytes, tmp_path
     assert [row["verdict"] for row in csv.DictReader(files["csv"].read_text().splitlines())] == [
         row.verdict for row in rows
     ]
-    assert files["csv"].read_text() == to_csv(rows)
+    assert files["csv"].read_text() == table_of(rows).to_csv()
     assert files["md"].read_text().count("| right |") == 6
     assert (tmp_path / "plots" / "stability-sliding.png").read_bytes().startswith(b"\x89PNG")
 
