@@ -52,10 +52,10 @@ from bemkit.operators.material import Material as Material
 from bemkit.operators.material import Plane as Plane
 from bemkit.pictures.files import save_pictures as save_pictures
 from bemkit.plan import make_plan as make_plan
-from bemkit.results.interior import interior_fields as interior_fields
 from bemkit.results.result_file import read_result as read_result
 from bemkit.results.result_file import write_result as write_result
 from bemkit.results.solution import Solution as Solution
+from bemkit.results.solved_scene import interior_fields as interior_fields
 from bemkit.runs.collapse import coulomb_load_factor as coulomb_load_factor
 from bemkit.runs.collapse import largest_load_factor as largest_load_factor
 from bemkit.runs.collapse import thrust as thrust

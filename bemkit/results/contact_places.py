@@ -14,8 +14,8 @@ from bemkit.contact.body import SlipHistory
 from bemkit.geometry.local_values import element_degrees
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.vectors import norms
-from bemkit.results.transitions import resolved_transitions, unresolved_contacts, unrolled
-from bemkit.results.zone_ends import LYING_AT, Side, ZoneEnd
+from bemkit.results.transitions import resolved_transitions, slip_reversals, unresolved_contacts, unrolled
+from bemkit.results.zone_ends import LYING_AT, Side, ZoneEnd, transition_error
 from bemkit.scene.conditions import name_at_obstacle
 
 if TYPE_CHECKING:
@@ -152,8 +152,6 @@ class ContactPlaces:
     @cached_property
     def reversals(self) -> tuple[ZoneEnd, ...]:
         """Reversals of slip without a resolved stick zone, on all sides; see `slip_reversals`."""
-        from bemkit.results.slip_reversals import slip_reversals
-
         places = [reversal.place for reversal in slip_reversals(self.solution.contact)]
         return tuple(side.near(np.array([place.x, place.y])) for place in places for side in self.sides(place.part))
 
@@ -236,8 +234,6 @@ class ContactPlaces:
 
         The error has about the wave number 2 / l at the length l on which it changes its sign.
         """
-        from bemkit.results.transition_error import transition_error
-
         solution, traction, energy = self.solution, 0.0, 0.0
         table, transitions = unrolled(solution.contact, solution.transitions)
         tractions = sticking = [table.sigma_n, table.sigma_t]

@@ -22,6 +22,7 @@ from bemkit.scene.scene import Scene
 from bemkit.scene.unit_names import UnitNames
 
 if TYPE_CHECKING:
+    from bemkit.operators.somigliana.potentials import PotentialFields
     from bemkit.results.load_history import LoadHistory
     from bemkit.results.side_stress import LargestStress
     from bemkit.table import Table
@@ -183,6 +184,34 @@ class SolvedScene:
         table = self.contact
         squared = table.weight * (table.sigma_n**2 + table.sigma_t**2)
         return float(np.sqrt(sum(self.n_sides(name) * squared[table.rows(name)].sum() for name in table.parts)))
+
+
+def interior_fields(solution: SolvedScene | SolvedBody) -> PotentialFields:
+    """Return the displacement, strain and stress inside the body of a solution.
+
+    Parameters
+    ----------
+    solution : Solution or SolvedBody
+        As `run` returns it or `read_result` reads it. Look at its status first: fields of a run that did not converge
+        are fields of the last state it reached.
+
+    Returns
+    -------
+    InteriorFields, or HalfPlaneFields below the surface of a half-plane
+        In physical units, on the whole body also where a symmetry halves it; evaluate it at points with
+        ``displacement(points)`` and ``stress(points)``, and see `von_mises` and `principal_stresses`.
+
+    Notes
+    -----
+    Where body forces act, their particular solution is added in closed form. In plane strain heat adds -E alpha T to
+    the stress across the plane, which `von_mises` does not know.
+
+    Displacements and tractions are those of the spaces of the discretisation. Inside, their error decays quickly with
+    the distance from the boundary. Within about one element length of it, stresses are those of the piecewise data,
+    with peaks at the ends of elements: see `InteriorFields`.
+    """
+    body = solution.body if isinstance(solution, SolvedScene) else solution
+    return body.boundary_stress.interior
 
 
 def contact_facts(solution: SolvedScene) -> list[dict[str, Any]]:

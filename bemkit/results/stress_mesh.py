@@ -20,8 +20,9 @@ from bemkit.geometry.neighbours import corner_nodes
 from bemkit.geometry.vectors import cross, norms
 from bemkit.operators.somigliana.potentials import PotentialFields
 from bemkit.results.boundary_stress import BoundaryStress
-from bemkit.results.interior import interior_fields
+from bemkit.results.side_stress import LargestStress
 from bemkit.results.solved_body import SolvedBody
+from bemkit.results.stress_measures import STRESSES
 
 _STEP = 1.4
 """Distance of the first points inside from the boundary, in lengths of their elements. At half of it stresses beside
@@ -43,6 +44,10 @@ _NODE = 1e-9
 """Distance from the start of an element, in its local coordinate, within which a place counts as the node."""
 _FLAT = 1e-12
 """Area of a triangle that is round-off, relative to the square of the size of the body."""
+_ACROSS = 48
+"""Sample points along the longer side of the body in the search for the largest stress inside."""
+_STEPS = 16
+"""Number of times that the spacing of the nine points around the best one is halved."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,7 +81,7 @@ def stress_mesh(body: SolvedBody, spacing: float, frame: FloatArray) -> StressMe
     frame : (2, 2) array [m]
         Least and largest x, least and largest y to which an exterior is cut.
     """
-    fields, boundary = interior_fields(body), body.boundary_stress
+    fields, boundary = body.boundary_stress.interior, body.boundary_stress
     mesh = boundary.mesh
     if mesh.surface is not None:
         return _below_surface(boundary, fields, spacing, frame)
@@ -280,3 +285,28 @@ def _apart(points: FloatArray, distance: FloatArray) -> IntArray:
     keys = np.column_stack([np.round(points / cell[:, None]), cell])
     _, first = np.unique(keys, axis=0, return_index=True)
     return np.sort(first)
+
+
+def largest_equivalent_stress(body: SolvedBody) -> LargestStress:
+    """Return the largest equivalent stress of von Mises of a body, inside or on the boundary."""
+    mesh, material, fields = body.mesh.whole, body.scene.material, body.boundary_stress.interior
+    on_boundary = body.largest_stress()
+    low, high = mesh.nodes.min(axis=0), mesh.nodes.max(axis=0)
+    size = float((high - low).max())
+    filled = stress_mesh(body, size / _ACROSS, np.stack([low - 0.5 * size, high + 0.5 * size], axis=1))
+    values = STRESSES["von-mises"].of(filled.stress, material)
+    best = filled.points[[np.argmax(values)]]
+    if not fields.is_inside(best)[0]:
+        return on_boundary
+    # stay clear of the boundary, where constant and linear elements have peaks of their own
+    distance = float(np.hypot(*(mesh.centres - best).T).min())
+    step = 0.25 * min(distance, size / _ACROSS)
+    around = np.stack(np.meshgrid([-1.0, 0.0, 1.0], [-1.0, 0.0, 1.0]), axis=2).reshape(-1, 2)
+    largest = float(values.max())
+    for _ in range(_STEPS):
+        points = best + step * around
+        sampled = STRESSES["von-mises"].of(fields.stress(points), material)
+        best, largest = points[[np.argmax(sampled)]], float(sampled.max())
+        step *= 0.5
+    x, y = best[0].tolist()
+    return max(on_boundary, LargestStress(largest, x, y), key=lambda each: each.value)

@@ -1,16 +1,17 @@
-"""Transitions: the places where the contact status changes between the nodes of a contact table."""
+"""Transitions: the places where the contact status, or the direction of slip, changes between contact nodes."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from itertools import pairwise
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from bemkit.arrays import FloatArray
 from bemkit.results.contact_table import ContactTable
+from bemkit.solvers.active_sets import NodeStatus
 
 FLICKER = 1e-8
 """Changes of status within this share of a side count as one. Clearances grow like d**1.5 with the distance d from the
@@ -213,3 +214,49 @@ def _fitted_power_law(s: FloatArray, field: FloatArray, distance: float) -> tupl
         if abs(step) <= 1e-12 * s[0]:
             break
     return distance, power
+
+
+class SlipReversal(NamedTuple):
+    """A place of a contact where the direction of slip changes.
+
+    Parameters
+    ----------
+    place : Transition
+        From slip to slip, where the slip changes its sign.
+    n_sticking : int
+        Nodes that stick in between: one or none.
+    """
+
+    place: Transition
+    n_sticking: int
+
+
+def slip_reversals(contact: ContactTable) -> tuple[SlipReversal, ...]:
+    """Return where the direction of slip changes along contacts, directly or at a single node that sticks.
+
+    Between opposite directions lies a stick zone, where the tangential traction changes sign; here the mesh does not
+    resolve it. For stick zones of several nodes see `resolved_transitions`. Parts without friction are skipped.
+    """
+    table, _ = contact.unrolled
+    direction = np.where(table.status == NodeStatus.SLIP_FORWARD, 1.0, 0.0)
+    direction[table.status == NodeStatus.SLIP_BACKWARD] = -1.0
+    direction[table.sigma_t == 0.0] = 0.0
+    sticks, joined = table.status == NodeStatus.STICK, table.is_joined
+    reversals = []
+    for n_sticking in (0, 1):
+        beyond = n_sticking + 1
+        for i in np.flatnonzero(direction[:-beyond] * direction[beyond:] < 0.0).tolist():
+            if joined[i : i + beyond].all() and sticks[i + 1 : i + beyond].all():
+                place = _where_slip_vanishes(table, i, i + beyond)
+                wrapped = replace(place, s=contact.wrapped(place.part, place.s))
+                reversals.append(SlipReversal(wrapped, n_sticking))
+    return tuple(reversals)
+
+
+def _where_slip_vanishes(contact: ContactTable, i: int, k: int) -> Transition:
+    """Return the place between two nodes by their displacements, or halfway if these do not change their sign."""
+    slip, share = contact.u_t[[i, k]], 0.5
+    if slip[0] * slip[1] < 0.0:
+        share = float(slip[0] / (slip[0] - slip[1]))
+    x, y, s = ((1.0 - share) * column[i] + share * column[k] for column in (contact.x, contact.y, contact.s))
+    return Transition(contact.part[i], float(x), float(y), float(s), "slip", "slip")

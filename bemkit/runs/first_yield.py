@@ -6,8 +6,8 @@ import math
 from dataclasses import dataclass
 
 from bemkit.errors import InputError
-from bemkit.results.equivalent_stress import largest_equivalent_stress
 from bemkit.results.solution import Solution
+from bemkit.results.stress_mesh import largest_equivalent_stress
 from bemkit.runs.run import run
 from bemkit.scene.load_history import with_scaled_loads
 from bemkit.scene.scene import Scene

@@ -27,9 +27,8 @@ from bemkit.geometry.meshing.layers import (
 )
 from bemkit.geometry.meshing.partition import Partition
 from bemkit.results.coefficient_decay import CoefficientErrors
-from bemkit.results.slip_reversals import slip_reversals
 from bemkit.results.solution import Solution
-from bemkit.results.transitions import FLICKER, resolved_transitions, unrolled
+from bemkit.results.transitions import FLICKER, resolved_transitions, slip_reversals, unrolled
 from bemkit.runs.density import DensityMeshes
 from bemkit.runs.element_degrees import below_layers, few_kinds, sufficient_degrees
 from bemkit.runs.mesh_sequence import Level, Member, zone_cuts

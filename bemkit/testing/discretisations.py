@@ -15,8 +15,8 @@ from bemkit.geometry.spaces import dof_points
 from bemkit.operators.linear_solvers import DenseCholesky, Tag
 from bemkit.operators.material import Material
 from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions
-from bemkit.results.interior import interior_fields
 from bemkit.results.solution import Solution
+from bemkit.results.solved_scene import interior_fields
 from bemkit.runs.run import run
 from bemkit.scene.conditions import Clamped, Contact, Part, Roller, Traction
 from bemkit.scene.discretisation import Discretisation, MeshOptions

@@ -503,7 +503,7 @@ except SystemExit as end:
     assert end.code == 0
 wanted = {"matplotlib", "meshio", "h5py", "rich", "pyamg", "distributed", "scipy.sparse"}
 names = ("operators.somigliana.fields", "operators.somigliana.moments", "operators.matrix_free.factor",
-    "results.interior", "pictures.files", "results.result_file", "hdf5", "cli.console",
+    "results.boundary_stress", "pictures.files", "results.result_file", "hdf5", "cli.console",
     "runs.adaptive", "contact.mortar", "geometry.drawn", "operators.forms", "solvers.homotopy")
 wanted |= {f"bemkit.{name}" for name in names}
 print(sorted(wanted & set(sys.modules)), file=sys.stderr)

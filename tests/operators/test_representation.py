@@ -26,7 +26,7 @@ from bemkit.operators.somigliana.stress import principal_stresses, von_mises
 from bemkit.operators.steklov_poincare.collocation import CollocationElasticity
 from bemkit.operators.steklov_poincare.galerkin import GalerkinElasticity
 from bemkit.operators.steklov_poincare.operator import SteklovPoincareOperator
-from bemkit.results.interior import interior_fields
+from bemkit.results.solved_scene import interior_fields
 from tests.slow import slow_except, slow_only
 
 Field = Callable[[FloatArray], FloatArray]

@@ -16,8 +16,8 @@ from bemkit.pictures import draw_deformation, draw_scene, draw_stress, draw_zoom
 from bemkit.pictures.contact_map import is_short
 from bemkit.pictures.magnification import LINE, exaggeration, magnification
 from bemkit.pictures.shown import at_mesh_nodes, shown
-from bemkit.results.interior import interior_fields
 from bemkit.results.solution import Solution
+from bemkit.results.solved_scene import interior_fields
 from bemkit.results.stress_mesh import stress_mesh
 from bemkit.runs.run import run
 from bemkit.scene.plane_motion import FarField

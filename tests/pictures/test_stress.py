@@ -14,7 +14,7 @@ from bemkit.geometry import Rectangle, discretise
 from bemkit.pictures import draw_stress
 from bemkit.pictures.shown import shown
 from bemkit.pictures.stress import largest_shown
-from bemkit.results.interior import interior_fields
+from bemkit.results.solved_scene import interior_fields
 from bemkit.results.stress_measures import STRESSES
 from bemkit.results.stress_mesh import StressMesh, _inner_points, stress_mesh
 from bemkit.scene.toml import with_overrides

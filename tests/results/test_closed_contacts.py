@@ -11,8 +11,13 @@ import bemkit as bk
 from bemkit.results.contact_table import ContactTable
 from bemkit.results.error_indicators import contact_errors
 from bemkit.results.part_forces import PartForce, contact_forces
-from bemkit.results.slip_reversals import slip_reversals
-from bemkit.results.transitions import find_transitions, resolved_transitions, unresolved_contacts, unrolled
+from bemkit.results.transitions import (
+    find_transitions,
+    resolved_transitions,
+    slip_reversals,
+    unresolved_contacts,
+    unrolled,
+)
 from bemkit.solvers.active_sets import NodeStatus
 
 N_NODES, HALF_ANGLE = 40, 0.7

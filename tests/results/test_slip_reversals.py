@@ -9,7 +9,7 @@ import pytest
 
 import bemkit as bk
 from bemkit.results.contact_table import ContactTable
-from bemkit.results.slip_reversals import slip_reversals
+from bemkit.results.transitions import slip_reversals
 from bemkit.solvers.active_sets import NodeStatus
 
 OPEN, STICK, FORWARD, BACKWARD = NodeStatus

@@ -14,9 +14,8 @@ import bemkit as bk
 from bemkit.arrays import FloatArray
 from bemkit.geometry import discretise
 from bemkit.results.contact_table import ContactTable
-from bemkit.results.transition_error import transition_error
 from bemkit.results.transitions import Transition
-from bemkit.results.zone_ends import ZoneEnd
+from bemkit.results.zone_ends import ZoneEnd, transition_error
 from bemkit.solvers.active_sets import NodeStatus
 from checks.calibration.true_errors import true_errors
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 import bemkit as bk
-from bemkit.results.equivalent_stress import largest_equivalent_stress
+from bemkit.results.stress_mesh import largest_equivalent_stress
 from tests.perforated_plate import NOMINAL, plate
 
 

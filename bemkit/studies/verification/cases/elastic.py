@@ -9,8 +9,8 @@ from bemkit.geometry.shapes import Disk, ExteriorOf, Ring
 from bemkit.geometry.symmetry import Symmetry
 from bemkit.operators.material import Material, Plane
 from bemkit.reference import BrazilianDisc, KirschHole, LameRing, RotatingDisc
-from bemkit.results.interior import interior_fields
 from bemkit.results.solution import Solution
+from bemkit.results.solved_scene import interior_fields
 from bemkit.scene.body_forces import Rotation
 from bemkit.scene.conditions import Part, Pressure, Traction
 from bemkit.scene.discretisation import Galerkin
