@@ -30,14 +30,14 @@ class Format:
     check : callable
         Path -> the file, if it can be written, before any work is done.
     write : callable
-        Path and solution -> None.
-    write_inside : callable, optional
-        Path, solution and number of points across a body -> None, with fields inside; of formats that hold these.
+        Path, solution and number of points across a body, zero without fields inside -> None.
+    holds_inside : bool
+        Whether it holds fields inside.
     """
 
     check: Callable[[Path], Path]
-    write: Callable[[Path, Solution], None]
-    write_inside: Callable[[Path, Solution, int], None] | None = None
+    write: Callable[[Path, Solution, int], None]
+    holds_inside: bool = False
 
 
 def format_of(path: str | Path, inside: int = 0) -> Format:
@@ -61,7 +61,7 @@ def format_of(path: str | Path, inside: int = 0) -> Format:
         known = ", ".join(FORMATS)
         raise OutputFileError(f"{path}: the ending {ending!r} names no format of results: give one of {known}")
     chosen = FORMATS[ending]
-    if inside and chosen.write_inside is None:
+    if inside and not chosen.holds_inside:
         raise OutputFileError(f"{path}: {ending} holds no fields inside the body: give .vtu, or no inside")
     if inside and not 2 <= inside <= MOST_ACROSS:
         raise OutputFileError(f"{path}: inside is {inside}: give from 2 to {MOST_ACROSS} points across the body")
@@ -88,11 +88,7 @@ def export_result(path: str | Path, solution: Solution, *, inside: int = 0) -> N
         If the ending is unknown, or the file cannot be written.
     """
     chosen = format_of(path, inside)
-    target = chosen.check(Path(path))
-    if inside and chosen.write_inside is not None:
-        chosen.write_inside(target, solution, inside)
-    else:
-        chosen.write(target, solution)
+    chosen.write(chosen.check(Path(path)), solution, inside)
 
 
 def to_pyvista(solution: Solution, inside: int) -> Any:
@@ -126,12 +122,12 @@ def boundary_arrays(solution: Solution) -> dict[str, FloatArray | IntArray]:
     return arrays
 
 
-def _write_npz(path: Path, solution: Solution) -> None:
+def _write_npz(path: Path, solution: Solution, inside: int) -> None:
     with replacing(path.resolve()) as temporary, temporary.open("wb") as stream:
         np.savez_compressed(stream, **boundary_arrays(solution))  # type: ignore[arg-type]  # names of arrays
 
 
-def _write_vtu(path: Path, solution: Solution, inside: int = 0) -> None:
+def _write_vtu(path: Path, solution: Solution, inside: int) -> None:
     from bemkit.results.vtk import write_vtk
 
     write_vtk(path, solution, inside)
@@ -143,14 +139,14 @@ def _check_hdf5(path: Path) -> Path:
     return check_result_target(path)
 
 
-def _write_hdf5(path: Path, solution: Solution) -> None:
+def _write_hdf5(path: Path, solution: Solution, inside: int) -> None:
     from bemkit.results.result_file import write_result
 
     write_result(path, solution)
 
 
 def _text(text: Callable[[Solution], str]) -> Format:
-    return Format(check_target, lambda path, solution: write_text(path, text(solution)))
+    return Format(check_target, lambda path, solution, inside: write_text(path, text(solution)))
 
 
 _HDF5 = Format(_check_hdf5, _write_hdf5)
@@ -161,7 +157,7 @@ FORMATS: Mapping[str, Format] = MappingProxyType(
         ".json": _text(to_json),
         ".csv": _text(lambda each: to_csv(each, "contact")),
         ".npz": Format(check_target, _write_npz),
-        ".vtu": Format(check_target, _write_vtu, _write_vtu),
+        ".vtu": Format(check_target, _write_vtu, holds_inside=True),
     }
 )
 """By ending."""

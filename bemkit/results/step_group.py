@@ -7,9 +7,9 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
@@ -34,12 +34,15 @@ from bemkit.solvers.base import Status, StepRecord
 if TYPE_CHECKING:
     import h5py
 
+Force = TypeVar("Force", bound=PartForce)
 NODES = ("x", "y", "s", "weight")
 """Columns of the contact table that all steps share, with the part."""
 _CONTACT = ("u_n", "u_t", "sigma_n", "sigma_t", "gap", "clearance")
 _STATE = ("state_u_n", "state_u_t", "state_sigma_n", "state_sigma_t")
 _SLIP = ("slip", "last_slip")
 _DIRECTIONS = ("direction_x", "direction_y")
+_PLAIN = ("message", "linear_solves", "outer_steps")
+"""Entries of a solution that are texts and numbers."""
 _FIELDS = ("displacement", "traction", "traction_dofs", "reaction")
 
 
@@ -107,10 +110,9 @@ def read_step(reader: Reader, group: str, outcome: str, problem: Scene, layout: 
     table = {name: columns[name] for name in (*_CONTACT, "status")}
     boundaries = _read_boundaries(reader, group, layout.bodies)
     placed = [problem.scene_of(body) for body in problem.placed_bodies]
-    energies = map(float, entries["energies"])
-    columns_of_bodies = layout.bodies, placed, boundaries, energies, entries["contact_forces"]
+    columns_of_bodies = layout.bodies, placed, boundaries, map(float, entries["energies"]), entries["contact_forces"]
     bodies = [
-        SolvedBody(body.name, scene, body.mesh, boundary, energy, {row.name: row for row in _rows(forces, PartForce)})
+        SolvedBody(body.name, scene, body.mesh, boundary, energy, _by_name(PartForce, forces))
         for body, scene, boundary, energy, forces in zip(*columns_of_bodies, strict=True)
     ]
     bound = columns["friction_bound"]
@@ -120,13 +122,11 @@ def read_step(reader: Reader, group: str, outcome: str, problem: Scene, layout: 
         plan=layout.plan,
         provenance=layout.provenance,
         bodies={body.name: body for body in bodies},
-        contact_sides={
-            name: tuple(SideName(*map(str, side)) for side in sides) for name, sides in entries["sides"].items()
-        },
+        contact_sides={name: tuple(SideName(*side) for side in sides) for name, sides in entries["sides"].items()},
         contact_directions=np.stack([columns[name] for name in _DIRECTIONS], axis=1),
         friction_bound=bound if entries["has_friction"] else None,
-        contacts=tuple(_rows(entries["contacts"], ContactForce)),
-        rigid={row.name: row for row in _rows(entries["rigid"], RigidResult)},
+        contacts=tuple(_by_name(ContactForce, entries["contacts"]).values()),
+        rigid=_by_name(RigidResult, entries["rigid"]),
         **_outcome(entries),
     )
 
@@ -135,7 +135,7 @@ def write_outcome(group: h5py.Group, solution: Solution, step: LoadStep | None =
     """Write all of a solution but its arrays as a text in JSON, of a step also what it adds to its load history."""
     entries: dict[str, Any] = {
         "status": solution.status.name,
-        **{name: getattr(solution, name) for name in ("message", "linear_solves", "outer_steps")},
+        **{name: getattr(solution, name) for name in _PLAIN},
         "certificate": solution.certificate.as_dict(),
         "transitions": [transition.as_dict() for transition in solution.transitions],
         "timings": dict(solution.timings),
@@ -143,8 +143,6 @@ def write_outcome(group: h5py.Group, solution: Solution, step: LoadStep | None =
         "work": solution.work.as_dict(),
         "warnings": [warning.as_dict() for warning in solution.warnings],
         "history": [vars(record) | {"certificate": record.certificate.as_dict()} for record in solution.history],
-    }
-    entries |= {
         "energies": [body.energy for body in solution.bodies.values()],
         "contact_forces": [list(map(asdict, body.contact_forces.values())) for body in solution.bodies.values()],
         "sides": solution.contact_sides,
@@ -165,12 +163,12 @@ def read_load_step(reader: Reader, group: str, end: Solution) -> LoadStep:
     entries = reader.json(f"{group}/outcome")["step"]
     state = np.stack([columns[name] for name in _STATE], axis=1)
     return LoadStep(
-        work=StepWork(**{name: float(value) for name, value in entries["work"].items()}),
-        n_increments=int(entries["n_increments"]),
-        linear_solves=int(entries["linear_solves"]),
+        work=StepWork(**_floats(entries["work"])),
+        n_increments=entries["n_increments"],
+        linear_solves=entries["linear_solves"],
         end=end,
         state=ContactState(state[:, :2].copy(), state[:, 2:].copy()),
-        motion=SlipHistory(float(entries["time"]), float(entries["time_step"]), *(columns[name] for name in _SLIP)),
+        motion=SlipHistory(entries["time"], entries["time_step"], *(columns[name] for name in _SLIP)),
     )
 
 
@@ -180,32 +178,28 @@ def read_outcome(reader: Reader, path: str) -> dict[str, Any]:
 
 
 def _outcome(entries: Mapping[str, Any]) -> dict[str, Any]:
-    return {
+    return {name: entries[name] for name in (*_PLAIN, "memory")} | {
         "status": Status[entries["status"]],
-        "message": str(entries["message"]),
-        "linear_solves": int(entries["linear_solves"]),
-        "outer_steps": int(entries["outer_steps"]),
-        "certificate": _certificate(entries["certificate"]),
+        "certificate": Certificate(**_floats(entries["certificate"])),
         "transitions": tuple(map(Transition.of, entries["transitions"])),
-        "timings": {name: float(seconds) for name, seconds in entries["timings"].items()},
-        "memory": {name: int(size) for name, size in entries["memory"].items()},
+        "timings": _floats(entries["timings"]),
         "work": structure(entries["work"], OperationCounts),
         "warnings_of": partial(stated_warnings, tuple(ResultWarning(**warning) for warning in entries["warnings"])),
         "history": tuple(
-            StepRecord(**{**record, "certificate": _certificate(record["certificate"])})
+            StepRecord(**{**record, "certificate": Certificate(**_floats(record["certificate"]))})
             for record in entries["history"]
         ),
     }
 
 
-def _certificate(entries: Mapping[str, Any]) -> Certificate:
-    return Certificate(**{name: float(value) for name, value in entries.items()})
+def _by_name(kind: type[Force], rows: Sequence[Mapping[str, Any]]) -> dict[str, Force]:
+    """Return resultants by their names."""
+    numbers = ({key: value for key, value in row.items() if key != "name"} for row in rows)
+    return {row["name"]: kind(row["name"], **_floats(own)) for row, own in zip(rows, numbers, strict=True)}
 
 
-def _rows(rows: Sequence[Mapping[str, Any]], kind: type[Any]) -> list[Any]:
-    """Return resultants from tables of a name and numbers."""
-    names = [entry.name for entry in fields(kind)][1:]
-    return [kind(str(row["name"]), *(float(row[name]) for name in names)) for row in rows]
+def _floats(entries: Mapping[str, Any]) -> dict[str, float]:
+    return {name: float(value) for name, value in entries.items()}
 
 
 def _read_boundaries(reader: Reader, group: str, bodies: Sequence[BodyLayout]) -> list[BoundaryFields]:
