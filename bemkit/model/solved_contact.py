@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 
@@ -141,7 +140,7 @@ def with_energies_checked(model: Model, result: ContactSolution) -> ContactSolut
         else:
             finding = _negative_energy_of(condensed, elastic, body, displacements)
         if finding:
-            return _named_negative(result, f"{body.title}: {finding}" if body.name else finding)
+            return result.named(Status.NEGATIVE_ENERGY, f"{body.title}: {finding}" if body.name else finding)
     return result
 
 
@@ -251,12 +250,6 @@ def is_indefinite(stiffness: FloatArray, sensitivity: FloatArray | None = None) 
     return False
 
 
-def _named_negative(result: ContactSolution, reason: str) -> ContactSolution:
-    """Return an outcome with the status NEGATIVE_ENERGY and a reason."""
-    status = Status.NEGATIVE_ENERGY
-    return replace(result, status=status, message=f"{status.value} [{reason}]")
-
-
 def with_sliding_checked(model: Model, result: ContactSolution) -> ContactSolution:
     """Return the outcome of a solve, named FINITE_SLIDING if a contact has moved too far along its surface."""
     prepared = model.prepared
@@ -282,6 +275,5 @@ def with_sliding_checked(model: Model, result: ContactSolution) -> ContactSoluti
         motion = model.rigid_bodies(result.state)[number][0] if number >= 0 else np.zeros(3)
         reason = why_off(prepared, rows, motion, displacement, is_pressed, deformation)
         if reason:
-            status = Status.FINITE_SLIDING
-            return replace(result, status=status, message=f"{status.value} [{reason}]")
+            return result.named(Status.FINITE_SLIDING, reason)
     return result

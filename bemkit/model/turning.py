@@ -8,7 +8,6 @@ turns such a body.
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TypeAlias
 
 import numpy as np
@@ -48,7 +47,7 @@ def with_turning_checked(prepared: Prepared, result: ContactSolution) -> Contact
     if not (reason or result.is_converged):
         reasons = (_loose(*group) for group in _joined_by_friction(prepared))
         status, reason = Status.SINGULAR, next(filter(None, reasons), "")
-    return replace(result, status=status, message=f"{status.value} [{reason}]") if reason else result
+    return result.named(status, reason) if reason else result
 
 
 def turned_by_load(prepared: Prepared) -> str:

@@ -183,6 +183,10 @@ class ContactSolution:
         """Whether the status is CONVERGED."""
         return self.status is Status.CONVERGED
 
+    def named(self, status: Status, reason: str) -> "ContactSolution":
+        """Return the same outcome under another status, for a reason in words."""
+        return replace(self, status=status, message=f"{status.value} [{reason}]")
+
 
 class ContactFailure(NoResultError):  # noqa: N818 - an outcome of the mathematics, not an error of the program
     """A solve ended without a certified solution; `solution` is its last result."""
@@ -269,11 +273,10 @@ class _Run:
             try:
                 if self.problem.body.lacks_room(self.problem.gap):
                     raise ClosedVolume
-                contact_free = self._contact_free_response()
+                contact_free = self.problem.for_all_laws("contact_free", self._contact_free_response)
                 if contact_free is None and (unsolvable := find_unsolvable_load(self.problem)) is not None:
                     return self._without_state(Status.UNSOLVABLE_LOAD, unsolvable.description)
-                first = self._first(start, n_before=int(contact_free is not None))
-                iterate = self._without_contact(first, contact_free)
+                iterate = self._without_contact(self._first(start, int(contact_free is not None)), contact_free)
             except SingularResponse as error:
                 return self._without_state(_status_of(error), str(error))
             sets = contact_sets(self.problem, iterate.state)
@@ -307,10 +310,7 @@ class _Run:
         return self._solution(iterate, status, sets, certificate, history)
 
     def _contact_free_response(self) -> FloatingResponse | None:
-        """Return the response without contact, if there is one; it does not depend on the law."""
-        return self.problem.for_all_laws(
-            "contact_free", lambda: None if needs_contact(self.problem) else contact_free_response(self.problem.body)
-        )
+        return None if needs_contact(self.problem) else contact_free_response(self.problem.body)
 
     def _first(self, start: ContactState | None, n_before: int) -> Iterate:
         """Return the first iterate, with all linear solves counted."""
