@@ -69,12 +69,7 @@ def single_body(prepared: Prepared, elastic: SteklovPoincare, condensed: Condens
 
         check_held(prepared)
     if body.mesh.surface is not None:
-        from bemkit.contact.half_plane.bodies import surface_body
-        from bemkit.operators.half_plane.surface import SurfaceElasticity
-
-        assert isinstance(elastic, SurfaceElasticity)
-        nodes = prepared.contact_nodes
-        return surface_body(elastic, opened(body.conditions, nodes), nodes, body.force)
+        return _half_plane(prepared, elastic)
     if not prepared.n_contact:
         from bemkit.model.contact_free_body import ContactFreeBody
 
@@ -96,3 +91,25 @@ def single_body(prepared: Prepared, elastic: SteklovPoincare, condensed: Condens
     compressed = without_body_forces(elastic, body.inside)
     assert isinstance(compressed, HierarchicalCollocation)
     return hierarchical_body(compressed, conditions, nodes, body.force, body.inside)
+
+
+def _half_plane(prepared: Prepared, elastic: SteklovPoincare) -> SurfaceBody:
+    from bemkit.operators.half_plane.elasticity import HalfPlaneElasticity
+
+    body, nodes = prepared.only, prepared.contact_nodes
+    conditions = opened(body.conditions, nodes)
+    if isinstance(elastic, HalfPlaneElasticity):
+        from bemkit.operators.half_plane.large import LargeHalfPlane
+
+        if isinstance(elastic, LargeHalfPlane) and not conditions.is_fixed.any():
+            from bemkit.contact.half_plane.large_strip_body import LargeStripBody
+
+            return LargeStripBody(elastic, conditions, nodes, body.force)
+        from bemkit.contact.half_plane.strip_body import StripBody
+
+        return StripBody(elastic, conditions, nodes, body.force)
+    from bemkit.contact.half_plane.periodic_body import PeriodicBody
+    from bemkit.operators.half_plane.periodic import PeriodicElasticity
+
+    assert isinstance(elastic, PeriodicElasticity)
+    return PeriodicBody(elastic, conditions, nodes, body.force)
