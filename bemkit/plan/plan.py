@@ -157,7 +157,7 @@ def _profile_warnings(scene: BodyScene) -> Iterator[ResultWarning]:
     if scene.may_touch_profiles:
         from bemkit.scene.profiles import profile_warnings
 
-        yield from profile_warnings(scene.parts, scene.units)
+        yield from profile_warnings(scene.obstacles, scene.units)
 
 
 def _cost_of(steps: Sequence[Prepared], number: int) -> BodyCost:

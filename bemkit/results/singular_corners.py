@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -177,22 +176,18 @@ class GivenSides:
         rows = np.flatnonzero(self._table.rows(self._part[element]))
         if not rows.size:  # both nodes of a part of one element belong to its neighbours
             return None
-        return touching_side(self._table, self._law, self._mesh.centres[element], rows)
-
-    @cached_property
-    def _law(self) -> FrictionLaw:
-        """At the contact nodes."""
-        law = self._scene.law_at(self._table.part, self._table.points)
-        return law if self._motion is None else law.at_slip(self._motion)
+        law = self._scene.laws[self._part[element]].at(self._table.points[rows])
+        law = law if self._motion is None else law.at_slip(self._motion.of(rows))
+        return touching_side(self._table, law, self._mesh.centres[element], rows)
 
 
 def touching_side(table: ContactTable, law: FrictionLaw, point: FloatArray, rows: IntArray) -> WedgeSide:
-    """Return the condition of the contact node nearest to a point among some rows, with the law at all nodes."""
-    row = int(rows[np.argmin(norms(table.points[rows] - point))])
-    status = NodeStatus(int(table.status[row]))
+    """Return the condition of the contact node nearest to a point among some rows, with the law at these."""
+    nearest = int(np.argmin(norms(table.points[rows] - point)))
+    status = NodeStatus(int(table.status[rows[nearest]]))
     if status in (NodeStatus.SEPARATED, NodeStatus.STICK):
         return FREE if status is NodeStatus.SEPARATED else HELD
-    slope = -float(law.bound_derivative(np.minimum(table.sigma_n, 0.0))[row])
+    slope = -float(law.bound_derivative(np.minimum(table.sigma_n[rows], 0.0))[nearest])
     return WedgeSide(holds_normal=True, friction=slope if status is NodeStatus.SLIP_FORWARD else -slope)
 
 

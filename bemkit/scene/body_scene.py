@@ -6,12 +6,9 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-import numpy as np
-
-from bemkit.arrays import FloatArray, IntArray
+from bemkit.arrays import IntArray
 from bemkit.contact.laws import FrictionLaw
 from bemkit.contact.obstacle import SIMPLE_OBSTACLES, Obstacle
-from bemkit.contact.problem import LawError
 from bemkit.errors import InputError, Mistakes
 from bemkit.formulas import choices
 from bemkit.geometry.mesh import BoundaryMesh
@@ -103,7 +100,7 @@ class BodyScene:
                 if self.may_touch_profiles:
                     from bemkit.scene.profiles import check_profiles
 
-                    check_profiles(self.parts, self.units)
+                    check_profiles(self.obstacles, self.units)
         with mistakes.collected():
             self._check_body_forces(outline)
         for part in self.parts:
@@ -183,37 +180,6 @@ class BodyScene:
     def selections(self) -> dict[str, Selection]:
         """The pieces of the outline that the parts cover, by name."""
         return {part.name: part.selection for part in self.parts}
-
-    def law_at(self, parts: Sequence[str], points: FloatArray) -> FrictionLaw:
-        """Return the friction law of given contact nodes, every coefficient in numbers.
-
-        Parameters
-        ----------
-        parts : sequence of n_contact str
-            The contact part that each node belongs to.
-        points : (n_contact, 2) array [m]
-
-        Raises
-        ------
-        LawError
-            If a coefficient is not finite or negative somewhere; the message names the part.
-        """
-        laws: list[FrictionLaw] = []
-        nodes: list[IntArray] = []
-        for name, law in self.laws.items():
-            part_nodes = np.flatnonzero(np.array([part == name for part in parts], bool))
-            try:
-                laws.append(law.at(points[part_nodes]))
-            except ValueError as error:
-                raise LawError(f"part {name!r}: friction law: {error}") from error
-            nodes.append(part_nodes)
-        if not laws:  # a scene without contact
-            return self.law
-        if len(laws) == 1 or all(law is laws[0] for law in laws):
-            return laws[0]
-        from bemkit.contact.further_laws import PiecewiseLaw
-
-        return PiecewiseLaw(laws, nodes)
 
     @property
     def takes_graded_layers(self) -> bool:

@@ -11,6 +11,7 @@ import numpy as np
 from bemkit.arrays import BoolArray, FloatArray
 from bemkit.contact.obstacle import Obstacle, check_pair
 from bemkit.errors import InputError
+from bemkit.operators.rigid_modes import rigid_motions
 from bemkit.scene.objects import check_objects
 
 COMPONENTS = (("x", "force_x"), ("y", "force_y"), ("turn", "moment"))
@@ -121,9 +122,7 @@ class RigidBody(PlaneMotion):
 
     def motions_at(self, points: FloatArray) -> FloatArray:
         """Return (n, 2, 3): how the motions x, y, turn displace points (n, 2) [m] of the body."""
-        x, y = (points - np.array(self.centre)).T
-        one, zero = np.ones_like(x), np.zeros_like(x)
-        return np.stack([np.stack([one, zero, -y], axis=1), np.stack([zero, one, x], axis=1)], axis=1)
+        return rigid_motions(points, np.array(self.centre), 1.0)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -262,7 +262,7 @@ def test_contact_nodes_that_a_support_holds_move_in_its_frame(travel: float) -> 
     dense = condensed_body(elastic, conditions, contact, body_data.force)
     np.testing.assert_array_equal(body.tangent_follows, dense.tangent_follows)
     assert body.tangent_follows.sum() == 5
-    law = prepared.scene.only.law_at(candidates.parts, candidates.points)
+    (law,) = prepared.scene.only.laws.values()
     problems = [ContactProblem(each, candidates.gap, law) for each in (body, dense)]
     ask = stick(0.01 * np.cos(np.arange(body.n_contact)), np.zeros(body.n_contact))
     opened = np.zeros((body.n_contact, 2), bool)
