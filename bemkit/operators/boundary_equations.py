@@ -17,17 +17,15 @@ class Border:
     errors : (2 n_nodes, n_border) array
         Columns of the additional unknowns in the equations.
     balances : (n_border, 4 n_nodes) array
-        Additional equations: balances @ (t_x, t_y, u_x, u_y of all nodes) + self_coupling @ c = 0.
-    self_coupling : (n_border, n_border) array
+        Additional equations: balances @ (t_x, t_y, u_x, u_y of all nodes) = 0.
     """
 
     errors: FloatArray
     balances: FloatArray
-    self_coupling: FloatArray
 
 
 class BoundaryEquations(Protocol):
-    """Linear equations E (t, u) + R c = 0 and B (t, u) + D c = 0, independent of supports, loads and contact.
+    """Linear equations E (t, u) + R c = 0 and B (t, u) = 0, independent of supports, loads and contact.
 
     Nodes are numbered in the order of a tree. Rows are 2 * node + component, columns 4 * node + 2 * kind + component,
     kind 0 for the tractions t and 1 for the displacements u of the node. All arrays of rows or columns are ascending.
@@ -47,7 +45,7 @@ class BoundaryEquations(Protocol):
 
     @property
     def border(self) -> Border:
-        """R, B and D."""
+        """R and B."""
 
     def block(self, rows: IntArray, columns: IntArray) -> FloatArray:
         """Return entries (n_rows, n_columns) of E."""

@@ -85,15 +85,8 @@ class OperationCounts:
 
     def __add__(self, other: OperationCounts) -> OperationCounts:
         """Return the sum of both counts."""
-        return OperationCounts(
-            self.element_pairs + other.element_pairs,
-            self.single_layer + other.single_layer,
-            self.double_layer + other.double_layer,
-            self.hypersingular + other.hypersingular,
-            self.factorisations + other.factorisations,
-            self.right_hand_sides + other.right_hand_sides,
-            self.contact_unknowns + other.contact_unknowns,
-        )
+        pairs = zip(vars(self).values(), vars(other).values(), strict=True)
+        return OperationCounts(*(one + two for one, two in pairs))
 
     def as_dict(self) -> dict[str, Any]:
         """Return the counts as a JSON object."""

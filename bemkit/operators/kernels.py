@@ -41,11 +41,6 @@ DIGITS = 17.0
 """Digits of the downward recurrence."""
 
 
-def interval_moment(k: int) -> float:
-    """Return m_k, the integral of P_k over [-1, 1]."""
-    return 2.0 if k == 0 else 0.0
-
-
 def terms_needed(distance: float) -> int:
     """Return the number of terms of the series in 1 / zeta**2 for round-off at |zeta| >= distance > 1."""
     return max(1, math.ceil(16.5 / (2.0 * math.log10(distance))))
@@ -240,7 +235,7 @@ def quotient_integrals(integrals: ComplexArray, eta: FloatArray) -> ComplexArray
     result = np.empty(integrals.shape, complex)
     np.multiply(integrals.imag, twice, out=result.real)
     np.multiply(integrals.real, twice, out=result.imag)
-    result[:1] += interval_moment(0)
+    result[:1] += 2.0  # m_0
     return result
 
 

@@ -6,8 +6,9 @@ import numpy as np
 
 from bemkit.arrays import ComplexArray, FloatArray
 from bemkit.geometry.mesh import BoundaryMesh
-from bemkit.operators.collocation.curved_elements import CollocationPoints
+from bemkit.operators.collocation.curved_elements import exact_factors
 from bemkit.operators.collocation.gradient_reconstruction import GradientReconstruction
+from bemkit.operators.collocation.layers import Constants
 from bemkit.operators.element_geometry import ElementGeometry
 from bemkit.operators.material import Material
 
@@ -35,7 +36,7 @@ def collocation_matrices(
     n, whole = mesh.n_elements, mesh.whole
     geometry = ElementGeometry(whole)
     row, column = np.divmod(np.arange(n * whole.n_elements), whole.n_elements)
-    exact = CollocationPoints(geometry, material, mesh.diameter).at(geometry.centre[row], column, row == column)
+    exact = exact_factors(geometry, Constants.of(material, mesh.diameter), geometry.centre[row], column, row == column)
     p, conj_p, v, conj_v, s, conj_s = exact.reshape(6, n, whole.n_elements)
     if takes_slopes:
         reconstruction = GradientReconstruction(whole, geometry)

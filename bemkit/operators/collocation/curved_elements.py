@@ -1,7 +1,7 @@
 """Displacements of constant and linear densities on elements of any shape, by quadrature.
 
 Far from an element a Gauss rule on its arc is used, with fewer points at a large distance; near it the integrals are
-closed forms (`CollocationPoints`). With y on the arc, rho = x - y, the density f and dy = tangent ds:
+closed forms (`exact_factors`). With y on the arc, rho = x - y, the density f and dy = tangent ds:
 
     U f p = A sum f [(1/2 - kappa log|rho / r0|) p + (rho / conj(rho)) conj(p) / 2] ds,      A = 1 / (8 pi mu (1 - nu))
     T f v = B sum [(2 - 2 nu) Im - i (1 - 2 nu) Re](f dy / rho) v + B sum (rho / conj(rho)) Im(dy / rho) conj(f v),
@@ -12,7 +12,6 @@ p of the element (`bemkit.operators.integrals.curved_geometry`).
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -57,8 +56,7 @@ class CurvedElements:
     """
 
     def __init__(self, geometry: ElementGeometry, material: Material, order: IntArray, log_length: float) -> None:
-        self.constants, self.order = Constants.of(material, log_length), order
-        self.points = CollocationPoints(geometry, material, log_length)
+        self.constants, self.order, self.geometry = Constants.of(material, log_length), order, geometry
         # distances below which closed forms are used, and above which the smaller rule is used
         self.near, self.far = (
             (geometry.half * geometry.distance_at(distance))[order] for distance in (CURVED_DISTANCE, _FAR)
@@ -76,7 +74,7 @@ class CurvedElements:
             The element whose midpoint is x, where T is a principal value; otherwise any other number.
         elements : (n,) array
         """
-        geometry, mesh_elements = self.points.geometry, self.order[elements]
+        geometry, mesh_elements = self.geometry, self.order[elements]
         distance = np.abs(x - geometry.centre[mesh_elements][:, None])
         is_far = distance.min(axis=1, initial=np.inf) > self.far[elements]
         result = np.empty((elements.size, 4 if is_double else 2, x.size), complex)
@@ -86,7 +84,8 @@ class CurvedElements:
                 result[chosen] = _gauss_layer(self.constants, is_double, x, arcs)
         element, point = np.nonzero(distance < self.near[elements][:, None])
         if element.size:
-            exact = self.points.at(x[point], mesh_elements[element], centred_on[point] == elements[element])
+            is_midpoint = centred_on[point] == elements[element]
+            exact = exact_factors(geometry, self.constants, x[point], mesh_elements[element], is_midpoint)
             result[element, :, point] = (exact[[2, 4, 3, 5]] if is_double else exact[:2]).T
         return result
 
@@ -127,72 +126,63 @@ def _gauss_layer(constants: Constants, is_double: bool, x: ComplexArray, rule: _
     return result
 
 
-@dataclass(frozen=True, eq=False)
-class CollocationPoints:
-    """Closed forms for listed pairs of points and elements, exact at any distance.
+def exact_factors(
+    geometry: ElementGeometry, constants: Constants, x: ComplexArray, elements: IntArray, is_midpoint: BoolArray
+) -> ComplexArray:
+    """Return the factors (6, n) of p, conj(p), v, conj(v), s and conj(s) in closed form, exact at any distance.
 
     Parameters
     ----------
     geometry : ElementGeometry
-    material : Material
-    r0 : float [m]
-        Unit of length in the logarithm.
+    constants : Constants
+    x : (n,) complex array
+    elements : (n,) array
+        The element of each point.
+    is_midpoint : (n,) bool array
+        Whether the point is the midpoint of the element.
     """
+    result = np.zeros((6, elements.size), complex)
+    is_straight = geometry.is_straight[elements]
+    for chosen in (np.flatnonzero(is_straight), np.flatnonzero(~is_straight)):
+        if chosen.size:
+            result[:, chosen] = _of_one_kind(geometry, constants, x[chosen], elements[chosen], is_midpoint[chosen])
+    return result
 
-    geometry: ElementGeometry
-    material: Material
-    r0: float
 
-    def at(self, x: ComplexArray, elements: IntArray, is_midpoint: BoolArray) -> ComplexArray:
-        """Return the factors (6, n) of p, conj(p), v, conj(v), s and conj(s) for pairs of points and elements.
-
-        Parameters
-        ----------
-        x : (n,) complex array
-        elements : (n,) array
-        is_midpoint : (n,) bool array
-            Whether the point is the midpoint of the element.
-        """
-        result = np.zeros((6, elements.size), complex)
-        is_straight = self.geometry.is_straight[elements]
-        for chosen in (np.flatnonzero(is_straight), np.flatnonzero(~is_straight)):
-            if chosen.size:
-                result[:, chosen] = self._factors(x[chosen], elements[chosen], is_midpoint[chosen])
-        return result
-
-    def _factors(self, x: ComplexArray, elements: IntArray, is_midpoint: BoolArray) -> ComplexArray:
-        """Return the factors of pairs whose elements are all straight or all curved."""
-        geometry, nu, kappa = self.geometry, self.material.effective_poisson_ratio, self.material.kappa
-        from_start, from_end = x - geometry.start[elements], x - geometry.end[elements]
-        plus, minus = from_start * geometry.to_local[elements], from_end * geometry.to_local[elements]
-        is_straight = bool(geometry.is_straight[elements[0]])
-        polynomials = geometry.polynomials(elements)[: 2 if is_straight else None]
-        highest = len(polynomials) - 1
-        degrees = Degrees(log=(0, highest - 1), double=(0, highest))
-        inner = inner_integrals(geometry, degrees, elements, from_start, from_end)
-        if is_midpoint.any():
-            store(inner, is_midpoint, inner_on_element(geometry, degrees, elements[is_midpoint], 0.0))
-            if is_straight:
-                plus[is_midpoint], minus[is_midpoint] = 1.0, -1.0
-        # eta is more accurate if measured from the nearer end
-        eta = np.where(np.abs(plus) < np.abs(minus), plus.imag, minus.imag)
-        log_ratio = np.log(np.abs(plus)) - np.log(np.abs(minus))
-        # difference of rho / conj(rho) between the ends, without cancellation
-        quotient_change = (plus - minus).real * eta / (plus * minus).conj()
-        half, b = geometry.half[elements], -1.0 / (4.0 * np.pi * (1.0 - nu))
-        a = half / (8.0 * np.pi * self.material.shear_modulus * (1.0 - nu))
-        turn, angle, ratio = geometry.tangent[elements] ** 2, 0.5 / np.pi, b * (1.0 - 2.0 * nu)
-        double, log_moment, quotient_moment = _moments_by_parts(inner, polynomials, plus, minus)
-        return np.array(
-            [
-                a * (1.0 - 2.0 * kappa * np.log(half / self.r0)) - a * kappa * inner.log[0],
-                a * turn * (0.5 * inner.quotient[0]),
-                angle * inner.double[0] + 1j * ratio * log_ratio,
-                b * turn * quotient_change,
-                angle * double + 1j * ratio * log_moment,
-                b * turn * quotient_moment,
-            ]
-        )
+def _of_one_kind(
+    geometry: ElementGeometry, constants: Constants, x: ComplexArray, elements: IntArray, is_midpoint: BoolArray
+) -> ComplexArray:
+    """Return the factors of pairs whose elements are all straight or all curved."""
+    from_start, from_end = x - geometry.start[elements], x - geometry.end[elements]
+    plus, minus = from_start * geometry.to_local[elements], from_end * geometry.to_local[elements]
+    is_straight = bool(geometry.is_straight[elements[0]])
+    polynomials = geometry.polynomials(elements)[: 2 if is_straight else None]
+    highest = len(polynomials) - 1
+    degrees = Degrees(log=(0, highest - 1), double=(0, highest))
+    inner = inner_integrals(geometry, degrees, elements, from_start, from_end)
+    if is_midpoint.any():
+        store(inner, is_midpoint, inner_on_element(geometry, degrees, elements[is_midpoint], 0.0))
+        if is_straight:
+            plus[is_midpoint], minus[is_midpoint] = 1.0, -1.0
+    # eta is more accurate if measured from the nearer end
+    eta = np.where(np.abs(plus) < np.abs(minus), plus.imag, minus.imag)
+    log_ratio = np.log(np.abs(plus)) - np.log(np.abs(minus))
+    # difference of rho / conj(rho) between the ends, without cancellation
+    quotient_change = (plus - minus).real * eta / (plus * minus).conj()
+    half, b = geometry.half[elements], -constants.double
+    a, kappa = constants.single * half, 3.0 - 4.0 * constants.poisson_ratio
+    turn, angle, ratio = geometry.tangent[elements] ** 2, 0.5 / np.pi, b * (1.0 - 2.0 * constants.poisson_ratio)
+    double, log_moment, quotient_moment = _moments_by_parts(inner, polynomials, plus, minus)
+    return np.array(
+        [
+            a * (1.0 - 2.0 * kappa * np.log(half / constants.log_length)) - a * kappa * inner.log[0],
+            a * turn * (0.5 * inner.quotient[0]),
+            angle * inner.double[0] + 1j * ratio * log_ratio,
+            b * turn * quotient_change,
+            angle * double + 1j * ratio * log_moment,
+            b * turn * quotient_moment,
+        ]
+    )
 
 
 def _moments_by_parts(

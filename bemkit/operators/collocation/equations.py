@@ -310,7 +310,7 @@ def collocation_border(mesh: BoundaryMesh, material: Material, order: IntArray, 
     errors = np.column_stack([motions, reciprocity.fields])
     k = errors.shape[1]
     balances = np.concatenate([on_traction.reshape(k, n, 2), -on_displacement.reshape(k, n, 2)], axis=2)[:, order]
-    return Border(errors.reshape(n, 2, k)[order].reshape(2 * n, k), balances.reshape(k, 4 * n), np.zeros((k, k)))
+    return Border(errors.reshape(n, 2, k)[order].reshape(2 * n, k), balances.reshape(k, 4 * n))
 
 
 def _reconstruction(

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from bemkit.arrays import ComplexArray, FloatArray, IntArray
 from bemkit.operators.boundary_equations import Border, BoundaryEquations
 
@@ -51,10 +53,8 @@ class FoldedEquations:
 
     def block(self, rows: IntArray, columns: IntArray) -> FloatArray:
         """Return entries (n_rows, n_columns) of unknowns together with their images."""
-        result = self.whole.block(rows, columns)
-        for image, signs in enumerate(self.images[1:], 1):
-            result = result + self.whole.block(rows, columns + 4 * image * self.n) * signs[columns % 2]
-        return result
+        images = zip(self.image_blocks(rows, columns), self.images, strict=True)
+        return np.asarray(sum(block * signs[columns % 2] for block, signs in images))
 
     def image_blocks(self, rows: IntArray, columns: IntArray) -> list[FloatArray]:
         """Return entries (n_rows, n_columns) of the unknowns of each image, before its signs are applied."""

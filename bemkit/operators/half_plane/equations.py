@@ -81,7 +81,7 @@ class HalfPlaneEquations:
         balances = np.zeros((n_motions, n, 4))
         balances[:, :, :2] = motions * self.lengths[:, None]
         errors = -motions.reshape(n_motions, 2 * n).T
-        return Border(errors, balances.reshape(n_motions, 4 * n), np.zeros((n_motions, n_motions)))
+        return Border(errors, balances.reshape(n_motions, 4 * n))
 
     def logarithms(self, targets: IntArray, sources: IntArray) -> FloatArray:
         """Return the mean logarithms (n_targets, n_sources) between elements."""

@@ -82,7 +82,7 @@ class Factor:
         may_differ = np.ones((n, 4), bool) if may_differ is None else may_differ
         self.equations, self.tree = equations, tree
         self.compression = Compression.of(equations, tree, may_differ, tolerance, level_view)
-        self.border_load = np.zeros(equations.border.self_coupling.shape[0])
+        self.border_load = np.zeros(len(equations.border.balances))
         self.conditions: LocalConditions | None = None
         self.n_updates = self.n_factored = 0
         changing = tree.leaves_of(np.arange(n) if may_change is None else np.flatnonzero(may_change))
@@ -303,4 +303,4 @@ class Factor:
     def _of_border(self, root: ClusterResponse) -> FloatArray:
         """Return the border unknowns (n_border, k)."""
         error = SingularMatrixError("the balance of forces is singular: check that supports and contacts hold the body")
-        return SmallLU(root.scattering - self.equations.border.self_coupling, error).solve(root.of_loads)
+        return SmallLU(root.scattering, error).solve(root.of_loads)

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from functools import lru_cache
 
 import numpy as np
 import numpy.typing as npt
 
-from bemkit.arrays import BoolArray, FloatArray, IntArray, read_only
+from bemkit.arrays import BoolArray, FloatArray, IntArray
 from bemkit.geometry.quadrature import gauss_graded, gauss_legendre
 from bemkit.operators import kernels
 from bemkit.operators.element_geometry import ElementGeometry, squared_distance
@@ -135,16 +134,6 @@ def batches(rules: Iterable[OuterRule], n_points: int) -> Iterator[list[OuterRul
         yield batch
 
 
-@lru_cache(maxsize=16)
-def _on_unit_interval(n_points: int) -> tuple[FloatArray, FloatArray]:
-    """Return Gauss points and weights on [0, 1], read-only."""
-    reference, reference_weights = gauss_legendre(n_points)
-    points, weights = 0.5 * (reference + 1.0), 0.5 * reference_weights
-    read_only(points)
-    read_only(weights)
-    return points, weights
-
-
 def split_rules(
     geometry: ElementGeometry, outer: IntArray, inner: IntArray, item: IntArray, extra_points: int
 ) -> tuple[OuterRule, OuterRule]:
@@ -179,5 +168,6 @@ def split_rules(
         ends = np.broadcast_to(at_start[chosen, None], (start.size, points.size))
         return OuterRule(item[chosen], ends, start + points * length, 2.0 * weights * length)
 
-    regular, touching = _on_unit_interval(N_REGULAR + extra_points), gauss_graded(N_TOUCHING + extra_points)
-    return on_pieces(~touches, *regular), on_pieces(touches, *touching)
+    xi, weights = gauss_legendre(N_REGULAR + extra_points)
+    regular = on_pieces(~touches, 0.5 * (xi + 1.0), 0.5 * weights)
+    return regular, on_pieces(touches, *gauss_graded(N_TOUCHING + extra_points))

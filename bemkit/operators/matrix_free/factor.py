@@ -71,7 +71,7 @@ class IterativeFactor:
         self.equations = CollocationEquations(self._mesh, material, order, border, takes_slopes=takes_slopes)
         self._layers = FastMultipole(self.equations, material, self.tree, max(_PRODUCTS * options.tolerance, _FINEST))
         self._traction_unit = material.plane_modulus / mesh.diameter
-        self._z, self._c = np.zeros((mesh.n_elements, 2)), np.zeros(len(border.self_coupling))
+        self._z, self._c = np.zeros((mesh.n_elements, 2)), np.zeros(len(border.balances))
         self.conditions: LocalConditions | None = None
         self.n_updates, self._is_solved = 0, False
         self._inverse: Preconditioner | None = None

@@ -116,7 +116,8 @@ def straight_displacement_moments(
     half, square = geometry.half[elements], geometry.tangent[elements] ** 2
     c, g = local_moments(plus, minus, highest + 1, 2)
     log_product = np.log(np.abs(plus)) + np.log(np.abs(minus))
-    measure = np.stack([half * kernels.interval_moment(k) for k in range(highest + 1)])
+    measure = np.zeros((highest + 1, half.size))
+    measure[0] = 2.0 * half
     return DisplacementMoments(
         log=half * kernels.log_integrals(c, log_product) + measure * np.log(half / length),
         measure=measure,

@@ -11,7 +11,7 @@ from bemkit.operators.counts import OperationCounts
 from bemkit.operators.linear_solvers import Factor, LinearSolver, multiply
 from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions, rotated
 from bemkit.operators.steklov_poincare.protocol import CondensedMap
-from bemkit.operators.steklov_poincare.volume_constraint import Volume, VolumeConstraint, without_round_off
+from bemkit.operators.steklov_poincare.volume_constraint import Volume, without_round_off
 
 _ROWS = 128
 """Rows of a matrix that are copied at a time."""
@@ -59,9 +59,10 @@ class SchurCondensation:
         volume = self.volume.in_frames(conditions.frame)
         unit = volume.retained_pressure(conditions, float(np.abs(np.diagonal(matrix)).max()))
         self._volume, self._by_pressure = volume.change, volume.change @ unit
-        self._constrained = VolumeConstraint(
-            self.factor, without_round_off(volume.change)[self._free], volume.compliance, is_eliminated=not unit.size
-        )
+        # of a pressure that is eliminated: its free forces, their displacements, and the change of volume
+        self._of_pressure = pressed = without_round_off(volume.change)[self._free, : 0 if unit.size else None]
+        self._under_pressure = self.factor.solve(pressed) if pressed.size else pressed
+        self._compliance = self._of_pressure.T @ self._under_pressure + volume.compliance
         coupling, stiffness = (block_of(matrix, rows, self._retained) for rows in (self._free, self._retained))
         if unit.size:
             forces = self._by_pressure[self._retained]
@@ -69,13 +70,21 @@ class SchurCondensation:
             stiffness = np.block([[stiffness, forces], [forces.T, np.zeros((1, 1))]])
         self._coupling = coupling
         self._of_volume = np.pad(volume.change[self._retained], ((0, unit.shape[1]), (0, 0)))
-        self._response, self._pressures = self._constrained.solve(-coupling, -self._of_volume.T)
+        self._response, self._pressures = self._solve(-coupling, -self._of_volume.T)
         stiffness = stiffness + multiply(coupling.T, self._response)
         stiffness += self._of_volume @ self._pressures
         self._stiffness = 0.5 * (stiffness + stiffness.T)
         self._pressures[:, self._retained.size :] = unit
         rows = (self.matrix[first : first + _ROWS] for first in range(0, len(self.matrix), _ROWS))
         self._sensitivity = sum(np.abs(chunk).sum(axis=0) for chunk in rows).reshape(-1, 2)
+
+    def _solve(self, right: FloatArray, volume: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return free displacements and pressure for forces (n_free, ...) and changes of volume (0 or 1, ...)."""
+        free = self.factor.solve(right)
+        if not self._of_pressure.shape[1]:
+            return free, np.zeros(volume.shape)
+        pressure = (self._of_pressure.T @ free - volume) / self._compliance[0, 0]
+        return free - self._under_pressure @ pressure, pressure
 
     @property
     def work(self) -> OperationCounts:
@@ -87,7 +96,7 @@ class SchurCondensation:
         """Return the condensed map under given forces (n_nodes, 2), and displacements (n_nodes, 2) in the frames."""
         prescribed = displacement.ravel()[self._fixed]
         known = self.conditions.in_frames(force).ravel() - self._of_fixed @ prescribed
-        at_rest, pressure = self._constrained.solve(known[self._free], -self._volume[self._fixed].T @ prescribed)
+        at_rest, pressure = self._solve(known[self._free], -self._volume[self._fixed].T @ prescribed)
         load = np.append(known[self._retained], -self._by_pressure[self._fixed].T @ prescribed)
         load -= self._coupling.T @ at_rest + self._of_volume @ pressure
         return _SchurMap(
@@ -110,7 +119,7 @@ class _SchurMap(CondensedMap):
     condensation: SchurCondensation
     prescribed: FloatArray  # (n_fixed,) [m]
     at_rest: FloatArray  # (n_free,) [m], while the retained directions are at rest
-    pressure: FloatArray  # (n_pressures,), from `VolumeConstraint.solve`
+    pressure: FloatArray  # (n_pressures,), zero unless it is eliminated
 
     def recover(self, retained_displacement: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return displacement and force of all nodes."""

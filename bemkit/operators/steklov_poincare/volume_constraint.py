@@ -1,14 +1,13 @@
-"""Free displacements of a body together with the uniform pressure that belongs to its change of volume."""
+"""The change of volume of a body, and the uniform pressure that belongs to it."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import numpy as np
 
 from bemkit.arrays import FloatArray
-from bemkit.operators.linear_solvers import Factor, SingularMatrixError
+from bemkit.operators.linear_solvers import SingularMatrixError
 from bemkit.operators.steklov_poincare.nodal_conditions import SLIDES, NodalConditions, turn_columns
 
 
@@ -72,43 +71,6 @@ class Volume:
                 "leave a part free, or give a poisson_ratio of 0.499999"
             )
         return np.array([[stiffness / np.abs(self.change).max()]])
-
-
-@dataclass(frozen=True, eq=False)
-class VolumeConstraint:
-    """Solves for the free displacements and the pressure.
-
-    Parameters
-    ----------
-    stiffness : Factor
-        Factor of the free directions.
-    volume : (n_free, 0 or 1) array
-        Change of volume per free displacement.
-    compliance : float
-        See `Volume`.
-    is_eliminated : bool
-        Whether to solve for the pressure; otherwise it is zero.
-    """
-
-    stiffness: Factor
-    volume: FloatArray
-    compliance: float
-    is_eliminated: bool
-
-    @cached_property
-    def _compliance(self) -> tuple[FloatArray, FloatArray]:
-        """Displacements under a unit pressure, and the total compliance."""
-        displacement = self.stiffness.solve(self.volume)
-        return displacement, self.volume.T @ displacement + self.compliance
-
-    def solve(self, right: FloatArray, volume: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return displacements and pressure for given forces (n_free, ...) and changes of volume (0 or 1, ...)."""
-        free = self.stiffness.solve(right)
-        if not (self.volume.shape[1] and self.is_eliminated):
-            return free, np.zeros(volume.shape)
-        displacement, total_compliance = self._compliance
-        pressure = (self.volume.T @ free - volume) / total_compliance[0, 0]
-        return free - displacement @ pressure, pressure
 
 
 def without_round_off(volume: FloatArray) -> FloatArray:
