@@ -37,7 +37,7 @@ def condensed_body(elastic, conditions, contact, force):
     """Reduce a body to contact nodes and the conditions that `contact_conditions` has found for them."""
     condensed = elastic.condense(conditions, force)
     whole = WholeBody.of(elastic.displacement_space, condensed, conditions, force)
-    return DirectBody.of(whole, contact, elastic.material.plane_modulus)
+    return DirectBody.of(whole, contact, elastic.material)
 
 
 def block_stiffness(n, poisson_ratio):

@@ -15,6 +15,11 @@ _ROUND_OFF = 1e-13
 _LARGEST_STICKING_RATIO = 100.0
 """Largest ratio of the stress scale, from the sticking state, to the tractions of the state. At a tolerance of 1e-9
 tractions are then accurate to 1e-7, or to 1e-6 (mean of an element) if few nodes carry the load."""
+_LONGEST = 1e5
+"""Largest length scale relative to the displacement. Where a volume hardly changes, forces do not cause force / E',
+which would hide any distance."""
+_SHORTEST = 1e-5
+"""Smallest length scale relative to force / E': displacements have a round-off of 1e-16 times that."""
 DEFORMED = 1e-3
 """Length scale of a body without contact tractions, relative to its displacement. It is larger than round-off at a
 tolerance of 1e-9, and smaller than the deformation by a load that lets the body recede from an overlap."""
@@ -126,8 +131,8 @@ class Scales:
     regime               stress [Pa]                                  length [m]
     ===================  ===========================================  ===================================
     contact carries      the largest traction of the state, or that   what the largest nodal force causes
-    something            of the sticking state where it is larger,    at its node: force / E', at least
-                         up to 100 times the former                   1e-6 of the largest displacement
+    something            of the sticking state where it is larger,    at its node: force / E', within 1e-6
+                         up to 100 times the former                   and 1e5 of the largest displacement
     nothing, but moved   the sticking state                           1e-3 of the largest displacement
     nothing, at rest     the sticking state, or one                   force / E' of the sticking state,
                                                                       else the gaps, else one
@@ -188,10 +193,12 @@ class Scales:
             )
             for factor in (1.0, weights)
         )
-        least_length = 1e-6 * float(np.abs(state.displacement).max())
+        moved = float(np.abs(state.displacement).max())
+        length, least_length = force / problem.modulus, 1e-6 * moved
+        length = max(min(length, _LONGEST * moved), _SHORTEST * length, least_length)
         tractions = np.maximum(present, np.minimum(sticking, _LARGEST_STICKING_RATIO * required))
         share = problem.body.shares(weights * tractions)
-        return cls(stress, force, max(force / problem.modulus, least_length), least_length, share)
+        return cls(stress, force, length, least_length, share)
 
     @classmethod
     def _of_motion(cls, problem: ContactProblem, state: ContactState) -> Scales:

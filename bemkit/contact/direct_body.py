@@ -23,6 +23,7 @@ from bemkit.operators.steklov_poincare import CondensedMap
 from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions, free_modes
 
 if TYPE_CHECKING:
+    from bemkit.operators.material import Material
     from bemkit.operators.steklov_poincare.forces_inside import ForcesInside
 
 
@@ -184,7 +185,7 @@ class DirectBody(DenseBody):
     offset: FloatArray
 
     @classmethod
-    def of(cls, whole: WholeBody, nodes: ContactNodes, modulus: float) -> DirectBody:
+    def of(cls, whole: WholeBody, nodes: ContactNodes, material: Material) -> DirectBody:
         """Return a body whose contact nodes are retained."""
         coupling = NodeCoupling.of(whole.conditions, nodes, whole.condensed.n_pressures)
         motions = coupling.moved(whole.motions)
@@ -196,8 +197,9 @@ class DirectBody(DenseBody):
             weights=nodes.weights,
             motions=motions,
             following_tangents=coupling.following(offset),
-            modulus=modulus,
+            modulus=material.plane_modulus,
             n_pressures=whole.condensed.n_pressures,
+            largest_modulus=max(material.plane_modulus, material.bulk_modulus),
             whole=whole,
             coupling=coupling,
             nodes=nodes,

@@ -15,7 +15,6 @@ from bemkit.model.placed import groups, shape_numbers
 from bemkit.model.prepared import Prepared, PreparedBody
 from bemkit.model.rigid import rigid_members
 from bemkit.operators.counts import OperationCounts
-from bemkit.operators.material import Material
 from bemkit.operators.steklov_poincare import CondensedMap, SteklovPoincare
 from bemkit.operators.steklov_poincare.forces_inside import condensed_under
 
@@ -33,7 +32,7 @@ def joined_bodies(prepared: Prepared, condensed: Sequence[CondensedMap]) -> Join
             modulus=body.material.plane_modulus / prepared.units.modulus,
             name=body.name,
             n_pressures=map_.n_pressures,
-            bulk_modulus=_bulk_modulus(body.material) / prepared.units.modulus,
+            bulk_modulus=body.material.bulk_modulus / prepared.units.modulus,
         )
         for map_, body, number in zip(condensed, prepared.bodies, numbers, strict=True)
     )
@@ -103,10 +102,6 @@ def _is_loaded_alike(one: PreparedBody, two: PreparedBody) -> bool:
     """Whether loads, body forces, prescribed displacements and motions far away are the same objects in two steps."""
     data, other = ((body.force, body.inside, body.conditions.displacement) for body in (one, two))
     return one.far_motion == two.far_motion and all(a is b for a, b in zip(data, other, strict=True))
-
-
-def _bulk_modulus(material: Material) -> float:
-    return 0.0 if material.is_incompressible else 1.0 / material.plane_compressibility
 
 
 def _motions(body: PreparedBody, n_pressures: int) -> FloatArray:

@@ -83,7 +83,7 @@ def single_body(prepared: Prepared, elastic: SteklovPoincare, condensed: Condens
             conditions = opened(body.conditions, nodes)
             condensed = elastic.condense(conditions, body.force)
         whole = WholeBody.of(body.own_space, condensed, conditions, body.force, body.free_modes)
-        return DirectBody.of(whole, nodes, elastic.material.plane_modulus)
+        return DirectBody.of(whole, nodes, elastic.material)
     conditions = opened(body.conditions, nodes)
     from bemkit.contact.hierarchical_body import hierarchical_body
     from bemkit.operators.steklov_poincare.hierarchical import HierarchicalCollocation

@@ -8,6 +8,10 @@ from dataclasses import dataclass
 
 from bemkit.errors import InputError
 
+_LEAST_COMPRESSIBILITY = 1e-4
+"""1 - 2 nu below which volume and shape are kept apart: one stiffness of both loses the digits of the shape, and an
+error of its pressures, of the square of the length of an element, has negative energy on coarse meshes."""
+
 
 class Plane(enum.Enum):
     """The two plane states: strain (long bodies) and stress (thin plates)."""
@@ -70,6 +74,16 @@ class Material:
     def is_incompressible(self) -> bool:
         """Whether the volume cannot change: plane strain with Poisson's ratio 1/2 to round-off."""
         return self.effective_poisson_ratio > 0.5 - 1e-12
+
+    @property
+    def is_nearly_incompressible(self) -> bool:
+        """Whether a change of volume takes 1e4 times the stress of a change of shape, or is impossible."""
+        return 1.0 - 2.0 * self.effective_poisson_ratio < _LEAST_COMPRESSIBILITY
+
+    @property
+    def bulk_modulus(self) -> float:
+        """Tension along x and y by the strain along both [Pa]; zero of an incompressible body, which has no strain."""
+        return 0.0 if self.is_incompressible else 1.0 / self.plane_compressibility
 
     @property
     def plane_compressibility(self) -> float:

@@ -157,6 +157,16 @@ def test_lengths_without_tractions_are_measured_by_a_thousandth_of_the_displacem
         assert certificate.penetration == pytest.approx(1e-3, rel=1e-5)
 
 
+def test_pressures_that_move_nothing_do_not_hide_distances():
+    """A stiffness of 1e12 on the only node, as of a closed volume, while the modulus of the material is one."""
+    body = DenseBody(1e12 * np.eye(2), np.zeros(2), np.ones(1), modulus=1.0)
+    problem = ContactProblem(body, np.array([-1e-2]), Coulomb(0.0))
+    state = ContactState(np.array([[-2e-2, 0.0]]), np.array([[-2e10, 0.0]]))
+    certificate = certify(problem, state)  # pressed at a distance of 0.01 from the obstacle
+    assert certificate.force_imbalance == 0.0
+    assert certificate.complementarity > 1e-8  # 5e-13 if compared with the force
+
+
 def test_friction_without_pressure_is_not_excused_by_the_tractions_that_would_hold_the_body():
     body = block_body(press=0.0, push=0.0, is_held_sideways=False)
     problem = ContactProblem(body, np.full(body.n_contact, -1.0), Tresca(0.0))

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -90,6 +92,43 @@ def test_a_half_cylinder_is_the_limit_of_compressible_ones(discretisation: objec
         # the force is smooth in nu, with a relative derivative of 2.4
         assert solution.force_normal == pytest.approx(other.force_normal, rel=4.0 * distance)
         assert abs(solution.force_normal / other.force_normal - 1.0) > 0.5 * distance
+
+
+NEARLY = (0.499, 0.4999, 0.49999, 0.499999, *(0.5 - 10.0**-k for k in range(7, 12)), 0.5 - 1.1e-12)
+
+
+@pytest.mark.parametrize("friction", slow_only([0.0, 0.3], 0.0))
+@pytest.mark.parametrize("discretisation", slow_only(DISCRETISATIONS, *DISCRETISATIONS[:2]))
+@pytest.mark.parametrize(
+    ("scene_of", "n_elements", "slope"),
+    slow_except(
+        [(half_disc, 31, 3.0), (half_disc, 60, 3.0), (partial(in_cavity, 0.03), 60, 400.0)], (half_disc, 31, 3.0)
+    ),
+)
+def test_nearly_incompressible_bodies_approach_the_limit(
+    scene_of: Callable[..., bk.Scene], n_elements: int, slope: float, discretisation: object, friction: float
+) -> None:
+    """On coarse meshes, too, where the pressure of collocation is not conjugate to the change of volume."""
+    scene = replace(scene_of(friction=friction, discretisation=discretisation), mesh=bk.MeshOptions(n_elements))
+    limit = bk.run(scene).force_normal
+    # Galerkin's interpolated normals are used up to nu = 1/2, and exact ones there
+    jump = 1e-9 if discretisation == bk.ConstantCollocation() else 1e-4
+    for ratio in NEARLY:
+        solution = bk.run(replace(scene, material=bk.Material(1.0, ratio)))
+        assert solution.is_converged
+        # 1e-11 is the round-off of one stiffness of shape and volume at 0.49999
+        assert solution.certificate.worst < 2e-12
+        assert solution.force_normal == pytest.approx(limit, rel=slope * (0.5 - ratio) + jump)
+
+
+@pytest.mark.parametrize("discretisation", slow_except(DISCRETISATIONS, bk.ConstantCollocation()))
+def test_a_full_cavity_squeezes_nearly_incompressible_bodies(discretisation: object) -> None:
+    forces = []
+    for distance in (1e-5, 1e-8, 1e-11):
+        solution = bk.run(in_cavity(0.1, poisson_ratio=0.5 - distance, discretisation=discretisation))
+        assert solution.is_converged
+        forces.append(distance * solution.force_normal)
+    assert forces == pytest.approx([forces[1]] * 3, rel=1e-4)  # 3e-5 are the stiffness of the shape
 
 
 @pytest.mark.parametrize("discretisation", slow_except(DISCRETISATIONS, bk.Galerkin(1)))

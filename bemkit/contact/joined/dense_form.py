@@ -110,5 +110,5 @@ class RelativeStiffness:
 
 def _modulus_of_room(members: Sequence[Member]) -> float:
     """Return the largest modulus of members that make room for others; if there are none, the smallest of all."""
-    yielding = [max(member.modulus, member.bulk_modulus) for member in members if not member.n_pressures]
+    yielding = [max(each.modulus, each.bulk_modulus) for each in members if each.bulk_modulus or not each.n_pressures]
     return max(yielding, default=min(member.modulus for member in members))

@@ -199,19 +199,20 @@ class MixedSystem:
             The pressure in each of the balances.
         """
         n_balances = len(self._on_traction)
-        self._volume = np.zeros((self._weights.size, 0))
-        if not self._material.is_incompressible:
+        self._volume, self._by_tractions = np.zeros((2, self._weights.size, 0))
+        if not self._material.is_nearly_incompressible or self._mesh.is_exterior:
             return np.zeros((n_balances, 0))
         from bemkit.operators.steklov_poincare.volume_constraint import Volume
 
         is_volume = np.zeros(n_balances, bool)  # the reciprocities of all loops come last
         is_volume[-len(self._mesh.loops) :] = np.asarray(self._mesh.loop_areas) > 0.0
-        volume = Volume(self._on_displacement[is_volume].T.copy(), 0.0)
+        normal = self._conditions.in_frames(self._mesh.normals).ravel()
+        compliance = 0.0 if self._material.is_incompressible else (self._on_traction[is_volume] @ normal).item()
+        volume = Volume(self._on_displacement[is_volume].T.copy(), compliance, is_stiff=True)
         unit = volume.retained_pressure(self._conditions, self._material.plane_modulus)
-        self._volume = volume.change @ unit
+        self._volume, self._by_tractions = volume.change @ unit, self._on_traction[is_volume].T @ unit
         if unit.size:
-            normal = self._conditions.in_frames(self._mesh.normals).ravel() * self._weights
-            held = np.where(self._conditions.is_free.ravel(), 0.0, normal)
+            held = np.where(self._conditions.is_free.ravel(), 0.0, normal * self._weights)
             self._on_traction[is_volume], self._on_displacement[is_volume] = held / np.abs(held).sum(), 0.0
         pressures = np.zeros((n_balances, unit.shape[1]))
         pressures[is_volume] = unit
@@ -278,11 +279,14 @@ class MixedSystem:
             weights * (traction[retained] - at_rest[retained]),
         )
         if self._volume.size:
-            of_free = self._volume[self._free].T
-            change = of_free @ self._response[self._free]
+            free, fixed = self._free, self._fixed
+            of_unknowns = -self._by_tractions.T
+            of_unknowns[:, free] = self._volume[free].T
+            change = of_unknowns @ self._response
             change[:, : retained.size] += self._volume[retained].T
             stiffness = np.vstack([stiffness, change])
-            load = np.append(load, -self._volume[self._fixed].T @ given[self._fixed] - of_free @ at_rest[self._free])
+            of_given = self._volume[fixed].T @ given[fixed] - self._by_tractions[free].T @ traction[free]
+            load = np.append(load, -of_given - of_unknowns @ at_rest)
         return _MixedMap(
             stiffness=stiffness,
             load=load,

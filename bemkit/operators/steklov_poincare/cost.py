@@ -98,11 +98,11 @@ class BodyCase:
 
     @property
     def is_enclosed(self) -> bool:
-        """Whether only contact determines the pressure in an incompressible body of constant elements.
+        """Whether only contact determines the pressure in a nearly incompressible body of constant elements.
 
         See `bemkit.operators.steklov_poincare.volume_constraint.Volume.retained_pressure`.
         """
-        if self.mesh.is_exterior or not self.material.is_incompressible:
+        if self.mesh.is_exterior or not self.material.is_nearly_incompressible:
             return False
         is_changing = np.abs(self.conditions.in_frames(self.mesh.normals)) > SLIDES
         return not bool(np.any(is_changing & self.conditions.is_free))

@@ -160,10 +160,11 @@ class GalerkinElasticity(BoundaryMap):
         """
         total = self._flux
         if self.material.is_incompressible or self.mesh.is_exterior:
-            return Volume(total, 0.0)
+            return Volume(total, 0.0, is_stiff=True)
         beta, dilatation = self.material.plane_compressibility, dilatation_of(self.displacement_space)[:, None]
         change = total - beta * multiply(self.factors.matrix, dilatation)
-        return Volume(change, beta * float(np.vdot(dilatation, change)))
+        compliance = beta * float(np.vdot(dilatation, change))
+        return Volume(change, compliance, self.material.is_nearly_incompressible)
 
     def stiffness(self) -> FloatArray:
         """Return S, (n_dofs, n_dofs) [Pa]; for an incompressible body without the uniform pressure."""

@@ -23,8 +23,8 @@ if TYPE_CHECKING:
 class CondensedMap(ABC):
     """A body reduced to its retained directions: force = stiffness @ displacement - load.
 
-    If only retained directions can change the volume of an incompressible body, its uniform pressure is one more
-    unknown, the last one, whose "force" is the change of volume, which must vanish.
+    If only retained directions can change the volume of a nearly incompressible body, its uniform pressure is one more
+    unknown, the last one, whose "force" is the change of volume less that by the pressure, which must vanish.
 
     Parameters
     ----------

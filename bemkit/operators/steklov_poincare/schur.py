@@ -67,7 +67,7 @@ class SchurCondensation:
         if unit.size:
             forces = self._by_pressure[self._retained]
             coupling = np.hstack([coupling, self._by_pressure[self._free]])
-            stiffness = np.block([[stiffness, forces], [forces.T, np.zeros((1, 1))]])
+            stiffness = np.block([[stiffness, forces], [forces.T, -volume.compliance * unit**2]])
         self._coupling = coupling
         self._of_volume = np.pad(volume.change[self._retained], ((0, unit.shape[1]), (0, 0)))
         self._response, self._pressures = self._solve(-coupling, -self._of_volume.T)

@@ -23,10 +23,13 @@ class Volume:
     compliance : float
         Change of volume per pressure, zero for an incompressible body. Without the pressure as unknown, a division by
         it would cost digits in nearly incompressible bodies.
+    is_stiff : bool
+        Whether a division by the compliance costs too many digits; see `Material.is_nearly_incompressible`.
     """
 
     change: FloatArray
     compliance: float
+    is_stiff: bool
 
     def in_frames(self, frame: FloatArray) -> Volume:
         """Return the change of volume per displacement in the frames of the nodes."""
@@ -37,8 +40,8 @@ class Volume:
     def retained_pressure(self, conditions: NodalConditions, stiffness: float) -> FloatArray:
         """Return the unit of a pressure that only retained displacements determine, as column of an array.
 
-        This is so if the body is incompressible and all its free directions slide along the boundary. Until contact
-        is known, nothing then decides whether a displacement of the retained directions keeps the volume.
+        This is so if the body is nearly incompressible and all its free directions slide along the boundary. Until
+        contact is known, nothing then decides whether a displacement of the retained directions keeps the volume.
 
         Parameters
         ----------
@@ -55,10 +58,10 @@ class Volume:
         Raises
         ------
         SingularMatrixError
-            If no retained displacement changes the volume, either.
+            If no retained displacement changes the volume of an incompressible body, either.
         """
         n_pressures = self.change.shape[1]
-        if self.compliance or not n_pressures:
+        if not (self.is_stiff and n_pressures):
             return np.zeros((n_pressures, 0))
         at_nodes = without_round_off(self.change).reshape(-1, 2, n_pressures)
         sizes = np.linalg.norm(at_nodes, axis=1, keepdims=True)
@@ -66,6 +69,8 @@ class Volume:
         if np.any(is_changing & conditions.is_free):
             return np.zeros((n_pressures, 0))
         if not np.any(is_changing & conditions.is_retained):
+            if self.compliance:
+                return np.zeros((n_pressures, 0))
             raise SingularMatrixError(
                 "the incompressible body (poisson_ratio 0.5) has no free boundary, because supports take all of it: "
                 "leave a part free, or give a poisson_ratio of 0.499999"
