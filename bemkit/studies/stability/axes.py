@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 from importlib import resources
 from math import radians
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -279,90 +280,66 @@ def degenerate_diameters(mesh: BoundaryMesh, material: Material) -> FloatArray:
     return np.sort(np.exp(1.0 / (factor * eigenvalues)))
 
 
-def _of_half_planes(reason: str, *, only_periodic: bool = False) -> Callable[[Scene], str]:
-    """Return a function that gives the reason to skip half-planes, or periodic ones."""
-
-    def given(scene: Scene) -> str:
-        surface = scene.only.shape.outline().surface
-        return reason if surface is not None and (surface.is_periodic or not only_periodic) else ""
-
-    return given
-
-
-def _of_one_body(reason: Callable[[Scene], str] = lambda scene: "") -> Callable[[Scene], str]:
-    """Return functions that give the reasons to skip several bodies, and single ones."""
-    return lambda scene: "it is about one body" if scene.bodies else reason(scene)
-
-
-def _of_bodies(similarity: Similarity, *, is_of_one: bool = False) -> Callable[[Scene], str]:
-    """Return what gives a reason against a scene of bodies without a similar one, and against single bodies."""
-
-    def reason(scene: Scene) -> str:
-        if not scene.bodies:
-            return "" if is_of_one else "it is about several bodies"
-        try:
-            similarity.apply(scene)
-        except InputError as error:
-            return str(error)
+def _reason_against(table: Mapping[str, Any], scene: Scene) -> str:
+    """Return why the axis of a table does not apply to a scene; empty if it does."""
+    about = table.get("about", "")
+    if about and about != ("several bodies" if scene.bodies else "one body"):
+        return f"it is about {about}"
+    if scene.bodies:
+        return _without_similar(scene, **table["similar"]) if "similar" in table else ""
+    surface = scene.only.shape.outline().surface
+    if surface is None:
         return ""
+    return str(table.get("half_planes", table.get("periodic", "") if surface.is_periodic else ""))
 
-    return reason
+
+def _without_similar(scene: Scene, turn: float = 0.0, shift: Sequence[float] = (0.0, 0.0)) -> str:
+    """Return why a scene of bodies has no similar one that is moved; empty if it has."""
+    x, y = shift
+    try:
+        Similarity(turn=turn, shift=(x, y)).apply(scene)
+    except InputError as error:
+        return str(error)
+    return ""
 
 
-def _read_axes(
-    kinds: Mapping[str, tuple[Callable[[Any, float], Case], Callable[[Any], str]]],
-) -> tuple[Axis, ...]:
-    """Return the axes of ``axes.toml`` with the functions that make their cases and give reasons to skip them."""
+_MAKERS: Mapping[str, Callable[[Solution, float], Case]] = MappingProxyType(
+    {
+        "youngs-modulus": _similar("modulus"),
+        "load": _similar("stress"),
+        "size": _similar("length"),
+        "position": _moved,
+        "degenerate-size": _degenerate,
+        "poisson-ratio": _poisson,
+        "friction": _friction,
+        "gap": _gap,
+        "load-direction": _turned,
+        "sliding": _pushed,
+        "aspect-ratio": _stretched,
+        "rho-newton": _penalised(lambda rho: SemismoothNewton(rho=rho)),
+        "rho-augmented": _penalised(lambda rho: AugmentedLagrangian(rho_n=rho, rho_t=rho)),
+        "elements": _elements,
+        "grading": _graded,
+        "stress": _similar("modulus", "stress"),
+        "turn": _similar("turn"),
+        "stiffness": _stiffened,
+    }
+)
+
+
+def _read_axes() -> tuple[Axis, ...]:
+    """Return the axes of ``axes.toml`` with the functions that make their cases."""
     text = (resources.files("bemkit") / "studies" / "stability" / "axes.toml").read_text("utf-8")
     return tuple(
         Axis(
             name,
-            table["label"],
-            table["promise"],
-            tuple(table["values"]),
-            kinds[name][0],
-            table.get("reference"),
-            kinds[name][1],
+            *(table["label"], table["promise"], tuple(table["values"]), _MAKERS[name]),
+            reference=table.get("reference"),
+            reason_against=partial(_reason_against, table),
         )
         for name, table in tomllib.loads(text).items()
     )
 
 
-def _always(scene: Scene) -> str:
-    return ""
-
-
-AXES: tuple[Axis, ...] = _read_axes(
-    {
-        "youngs-modulus": (_similar("modulus"), _of_one_body()),
-        "load": (_similar("stress"), _of_one_body()),
-        "size": (_similar("length"), _always),
-        "position": (_moved, _of_bodies(Similarity(shift=(1.0, 0.0)), is_of_one=True)),
-        "degenerate-size": (
-            _degenerate,
-            _of_one_body(
-                _of_half_planes("the flexibility of a half-plane, measured by its strip, is singular at no size")
-            ),
-        ),
-        "poisson-ratio": (_poisson, _of_one_body()),
-        "friction": (_friction, _always),
-        "gap": (_gap, _of_one_body()),
-        "load-direction": (_turned, _of_one_body()),
-        "sliding": (_pushed, _of_one_body()),
-        "aspect-ratio": (
-            _stretched,
-            _of_one_body(_of_half_planes("a half-plane has no thickness to compare its length with")),
-        ),
-        "rho-newton": (_penalised(lambda rho: SemismoothNewton(rho=rho)), _of_one_body()),
-        "rho-augmented": (_penalised(lambda rho: AugmentedLagrangian(rho_n=rho, rho_t=rho)), _of_one_body()),
-        "elements": (_elements, _always),
-        "grading": (
-            _graded,
-            _of_one_body(_of_half_planes("the elements of a periodic half-plane are equal", only_periodic=True)),
-        ),
-        "stress": (_similar("modulus", "stress"), _of_bodies(Similarity())),
-        "turn": (_similar("turn"), _of_bodies(Similarity(turn=30.0))),
-        "stiffness": (_stiffened, _of_bodies(Similarity())),
-    }
-)
+AXES: tuple[Axis, ...] = _read_axes()
 """Every axis, in the order of the report; an axis that does not apply to a scene gives the reason."""
