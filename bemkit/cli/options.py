@@ -146,9 +146,7 @@ def write_animation(solution: Solution, folder: str | None, what: tuple[str, ...
         return
     from bemkit.pictures.animation import save_animation
 
-    n_steps = 0 if solution.loading is None else len(solution.loading.steps)
-    steps = [solution.at_step(1 + k) for k in range(n_steps)] or [solution]
-    save_animation(Path(folder) / "animation.gif", steps)
+    save_animation(Path(folder) / "animation.gif", solution.each_step())
 
 
 def study_output(target: str | None, table: Callable[[Content], Table]) -> tuple[str | None, TableFile[Content]]:

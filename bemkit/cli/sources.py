@@ -32,7 +32,7 @@ def solved_steps(source: str, callback: Callable[[StepRecord], None] | None) -> 
         solution = read_result(source)
         if solution.loading is None:
             raise InputError(f"{source}: the result has no load steps: give a scene with [[steps]] or load_factors")
-        return [solution.at_step(1 + k) for k in range(len(solution.loading.steps))]
+        return solution.each_step()
     scene: Any = load_scene(source)
     with concerning(source):
         steps: Sequence[Result] = run([scene], callback=callback)

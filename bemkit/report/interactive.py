@@ -87,8 +87,7 @@ def interactive_figure(result: Result) -> Any:
     from plotly.graph_objects import Figure, Frame
     from plotly.subplots import make_subplots
 
-    count = 0 if result.loading is None else len(result.loading.steps)
-    steps = [result.at_step(1 + k) for k in range(count)] or [result]
+    steps = result.each_step()
     bodies = [shown(step) for step in steps]
     factor = min(map(magnification, bodies))
     parts = tuple(dict.fromkeys(part for step in steps for part in step.contact.parts))
@@ -118,9 +117,9 @@ def interactive_figure(result: Result) -> Any:
         spare = 0.05 * (high - low)
         extent = [low - spare, high + spare] if high > low else None
         figure.update_yaxes(title=with_unit("traction", "stress", units), range=extent, row=2, col=1)
-    if count:
+    if result.loading is not None:
         figure.frames = [Frame(name=str(1 + k), data=traces) for k, traces in enumerate(frames)]
-        figure.update_layout(sliders=[_slider(count)])
+        figure.update_layout(sliders=[_slider(len(steps))])
     return figure
 
 

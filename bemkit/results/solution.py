@@ -123,6 +123,11 @@ class Solution(SolvedScene, Explorable):
         end: Any = loading.steps[number - 1].end
         return cast("Self", replace(end, loading=replace(loading, steps=loading.steps[:number])))
 
+    def each_step(self) -> list[Solution]:
+        """Return the solutions at the ends of all finished load steps; the solution itself without a load history."""
+        n_steps = 0 if self.loading is None else len(self.loading.steps)
+        return [self.at_step(1 + k) for k in range(n_steps)] or [self]
+
     @cached_property
     def estimated_error(self) -> float | None:
         """Estimated error of all bodies in the energy norm, sqrt(a(u - u_h, u - u_h) / a(u_h, u_h)).

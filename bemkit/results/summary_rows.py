@@ -111,8 +111,12 @@ def _force_rows(solution: Solution) -> Iterator[tuple[str, str]]:
             f"friction {_amount(fact['force_tangential'], 'force', units)}, length {_length(fact, units)}, "
             f"peak pressure {_peak(fact, units)}, slip up to {_amount(fact['largest_slip'], 'length', units)}",
         )
-    if len(facts) > _MANY_CONTACTS:
-        yield "", f"and {len(facts) - _MANY_CONTACTS} contacts more (--json -)"
+    yield from _more(len(facts), "contacts")
+
+
+def _more(count: int, words: str) -> Iterator[tuple[str, str]]:
+    if count > _MANY_CONTACTS:
+        yield "", f"and {count - _MANY_CONTACTS} {words} more (--json -)"
 
 
 def _length(fact: Mapping[str, Any], units: UnitNames | None) -> str:
@@ -136,8 +140,7 @@ def _part_rows(solution: Solution) -> Iterator[tuple[str, str]]:
         moment = _amount(fact["moment"], "energy", units)
         name = f"{fact['body']}.{fact['name']}" if "body" in fact else fact["name"]
         yield f"force on {name}", f"{_vector(fact['force_x'], fact['force_y'], 'force', units)}, moment {moment}"
-    if len(forces) > _MANY_CONTACTS:
-        yield "", f"and {len(forces) - _MANY_CONTACTS} parts more (--json -)"
+    yield from _more(len(forces), "parts")
     rigid = list(solution.rigid.values())
     for body in rigid[:_MANY_CONTACTS]:
         yield (
@@ -146,8 +149,7 @@ def _part_rows(solution: Solution) -> Iterator[tuple[str, str]]:
             f"force {_vector(body.force_x, body.force_y, 'force', units)}, "
             f"moment {_amount(body.moment, 'energy', units)} on it",
         )
-    if len(rigid) > _MANY_CONTACTS:
-        yield "", f"and {len(rigid) - _MANY_CONTACTS} rigid bodies more (--json -)"
+    yield from _more(len(rigid), "rigid bodies")
 
 
 def _traction_errors(solution: Solution) -> str:

@@ -116,8 +116,8 @@ def solve_and_judge(
 
 
 def _checked(solution: Solution) -> Violations:
-    n_steps = 0 if solution.loading is None else len(solution.loading.steps)
-    return violations_of(solution, solution.at_step(n_steps - 1) if n_steps > 1 else None)
+    steps = solution.each_step()
+    return violations_of(solution, steps[-2] if len(steps) > 1 else None)
 
 
 def _attempt(scene: Scene, case: Case, solve: Callable[..., Any] = run) -> Attempt:

@@ -166,8 +166,6 @@ def _tractions(body: SolvedBody, points: FloatArray, normals: FloatArray, is_tou
     space = body.scene.discretisation.traction_space(body.mesh)
     values = body.boundary.traction_dofs.reshape(body.mesh.n_elements, -1, 2)
     basis = space.basis(np.polynomial.legendre.leggauss(_N_POINTS)[0])
-    if len(basis) != values.shape[1]:  # only the means are known
-        values, basis = body.boundary.traction[:, None], np.ones((1, _N_POINTS))
     traction[is_known] = np.einsum("lq,elc->eqc", basis, values[is_known])
     return traction
 

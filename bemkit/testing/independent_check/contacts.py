@@ -117,11 +117,6 @@ class MeasuredContact:
         return self.facing is not None and self.owner.body.touched.count(self.owner.part) > 1
 
     @property
-    def points(self) -> FloatArray:
-        """(m, 2) array [m]."""
-        return np.column_stack([self.table.x, self.table.y])
-
-    @property
     def frame(self) -> FloatArray:
         """(m, 2, 2) array [-]: rows are the direction of contact and its quarter turn."""
         return np.stack([self.direction, np.column_stack([-self.direction[:, 1], self.direction[:, 0]])], axis=1)
@@ -139,8 +134,8 @@ class MeasuredContact:
     @cached_property
     def touched(self) -> FloatArray:
         """(m, 2) array [m]: the points that the nodes may touch."""
-        reach = np.where(np.isfinite(self.table.gap), self.table.gap, 0.0) - gap_of(self.pair, self.points)
-        return np.asarray(self.points + reach[:, None] * self.direction)
+        reach = np.where(np.isfinite(self.table.gap), self.table.gap, 0.0) - gap_of(self.pair, self.table.points)
+        return np.asarray(self.table.points + reach[:, None] * self.direction)
 
     @property
     def is_supported(self) -> BoolArray:
@@ -229,7 +224,7 @@ def _measured(
     facing: Facing | None,
 ) -> MeasuredContact:
     owner, table = sides[0], solution.contact.renamed({name: name})
-    points, rows = np.column_stack([table.x, table.y]), np.flatnonzero(solution.contact.rows(name))
+    points, rows = table.points, np.flatnonzero(solution.contact.rows(name))
     boundary, body = owner.body.boundary, owner.body.solved
     own = np.unique(boundary.nodes[owner.elements])
     offset, nearest = (np.asarray(each) for each in cKDTree(body.boundary.points[own]).query(points))

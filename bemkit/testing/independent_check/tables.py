@@ -18,12 +18,12 @@ def gap_mismatch(contact: MeasuredContact) -> float:
     """Return the largest difference [-] of gaps from distances measured again, of obstacles and of flat sides."""
     table, scales, distance = contact.table, contact.owner.body.scales, contact.distance
     if contact.flat is not None:
-        distance = contact.flat.distance + gap_of(contact.pair, contact.points)
+        distance = contact.flat.distance + gap_of(contact.pair, contact.table.points)
     elif contact.facing is not None and not contact.is_shared:
         if np.any((np.isfinite(table.gap) != np.isfinite(distance)) & ~contact.is_grazing):
             return float("inf")
     known = np.isfinite(table.gap) & np.isfinite(distance)
-    coordinates = max(scales.coordinates, 64.0 * EPSILON * largest(np.abs(contact.points)))
+    coordinates = max(scales.coordinates, 64.0 * EPSILON * largest(np.abs(contact.table.points)))
     return beyond(np.abs(table.gap[known] - distance[known]), coordinates, contact.length)
 
 
