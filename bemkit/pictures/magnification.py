@@ -10,6 +10,7 @@ import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray
 from bemkit.contact.obstacle import DirectedObstacle, Gap
+from bemkit.geometry.pieces import overlapping_boxes, point_distances
 from bemkit.pictures.shown import DrawnBody, DrawnScene
 from bemkit.results.contact_table import ContactTable
 from bemkit.scene.conditions import Contact
@@ -103,9 +104,9 @@ def drawn_overlap(shown: DrawnScene, factor: float) -> float:
     if len(bodies) < 2:
         return 0.0
     moved, initial = ([body.outlines(by) for body in bodies] for by in (factor, 0.0))
-    boxes = np.array([[points.min(axis=0), points.max(axis=0)] for points in map(np.concatenate, moved)])
+    low, high = (np.array([extreme(np.concatenate(loops), axis=0) for loops in moved]) for extreme in (np.min, np.max))
     deepest = 0.0
-    for first, second in _near(boxes):
+    for first, second in zip(*overlapping_boxes(low, high), strict=True):
         for one, other in permutations((first, second)):
             now = _depth(np.concatenate(moved[one]), bodies[other], moved[other])
             if now.max() > deepest:
@@ -114,23 +115,13 @@ def drawn_overlap(shown: DrawnScene, factor: float) -> float:
     return deepest
 
 
-def _near(boxes: FloatArray) -> list[tuple[int, int]]:
-    """Return the pairs of boxes (n, 2, 2), least and largest coordinates, that meet."""
-    low, high = boxes[:, 0], boxes[:, 1]
-    meet = np.all((low[:, None] <= high) & (low <= high[:, None]), axis=2)
-    return [(int(i), int(j)) for i, j in np.argwhere(np.triu(meet, 1))]
-
-
 def _depth(points: FloatArray, body: DrawnBody, loops: list[FloatArray]) -> FloatArray:
     """Return how deep (n,) [m] points (n, 2) are inside a body with these loops, zero outside."""
     depth = np.zeros(len(points))
     inside = np.flatnonzero(_is_inside(points, body, loops))
-    starts = np.concatenate([loop[:-1] for loop in loops])
-    ways = np.concatenate([np.diff(loop, axis=0) for loop in loops])
+    starts, ends = (np.concatenate([loop[piece] for loop in loops]) for piece in (slice(-1), slice(1, None)))
     for k in inside:  # few, if any
-        share = np.sum((points[k] - starts) * ways, axis=1) / np.maximum(np.sum(ways**2, axis=1), np.finfo(float).tiny)
-        nearest = starts + np.clip(share, 0.0, 1.0)[:, None] * ways
-        depth[k] = np.hypot(*(points[k] - nearest).T).min()
+        depth[k] = point_distances(points[k], starts, ends).min()
     return depth
 
 
