@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from bemkit.arrays import BoolArray, IntArray, read_only
+from bemkit.arrays import BoolArray, FloatArray, IntArray, read_only
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.vectors import angles_between
+
+_POINTS_OF_CURVE = 9
 
 
 def along_boundary(mesh: BoundaryMesh, elements: IntArray) -> IntArray:
@@ -37,6 +39,19 @@ def along_boundary(mesh: BoundaryMesh, elements: IntArray) -> IntArray:
             ordered.append(element)
             element = int(following[element])
     return np.array(ordered, dtype=np.intp)
+
+
+def arc_lengths(mesh: BoundaryMesh, elements: IntArray, xi: FloatArray) -> FloatArray:
+    """Return the arc lengths (m, q) [m] of points xi (q,) or (m, q) of elements (m,) in their order."""
+    lengths = mesh.lengths[elements]
+    starts = np.append(0.0, np.cumsum(lengths)[:-1])
+    return np.asarray(starts[:, None] + 0.5 * lengths[:, None] * (xi + 1.0))
+
+
+def drawn_points(mesh: BoundaryMesh, degree: int) -> FloatArray:
+    """Return the local coordinates (q,) by which elements with fields of a degree are drawn: ends of straight ones."""
+    is_straight = degree <= 1 and bool(mesh.is_straight.all())
+    return np.linspace(-1.0, 1.0, 2 if is_straight else _POINTS_OF_CURVE)
 
 
 def break_nodes(mesh: BoundaryMesh) -> BoolArray:

@@ -12,6 +12,7 @@ import numpy as np
 from bemkit.arrays import FloatArray, IntArray
 from bemkit.geometry.local_values import values_on_elements
 from bemkit.geometry.mesh import BoundaryMesh
+from bemkit.geometry.neighbours import drawn_points
 from bemkit.geometry.reflection import reflected_to_whole
 from bemkit.geometry.spaces import BoundarySpace
 from bemkit.model.placed import place
@@ -28,9 +29,6 @@ from bemkit.scene.unit_names import UnitNames
 
 Result: TypeAlias = Solution
 Drawable: TypeAlias = Result | Scene
-
-_POINTS_OF_CURVE = 9
-"""Points of an element whose displacement or shape is curved."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,8 +70,7 @@ class DrawnBody:
 
     def outlines(self, factor: float) -> list[FloatArray]:
         """Return the closed loops (n, 2), or the strip, of the body moved by a multiple of its displacement."""
-        is_polygon = self.space.degree <= 1 and bool(self.mesh.is_straight.all())
-        xi = np.linspace(-1.0, 1.0, 2 if is_polygon else _POINTS_OF_CURVE)[:-1]
+        xi = drawn_points(self.mesh, self.space.degree)[:-1]
         elements = np.arange(self.mesh.n_elements)
         moved = self.mesh.points(elements, xi) + factor * self.displacement_at(elements, xi)
         loops = [moved[loop].reshape(-1, 2) for loop in self.mesh.loops]

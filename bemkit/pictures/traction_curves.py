@@ -9,12 +9,10 @@ import numpy as np
 from bemkit.arrays import FloatArray, IntArray
 from bemkit.contact.contact_nodes import contact_frame
 from bemkit.contact.obstacle import measure_contact
-from bemkit.geometry.neighbours import along_boundary
+from bemkit.geometry.neighbours import along_boundary, arc_lengths, drawn_points
 from bemkit.pictures.shown import Result
 from bemkit.results.solved_body import SolvedBody
 from bemkit.scene.conditions import Contact, name_at_obstacle
-
-_POINTS_OF_CURVE = 9
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,30 +43,21 @@ def traction_curve(solution: Result, part: str) -> TractionCurve:
     side = solution.contact_sides[part][0]
     body, name = solution.bodies[side.body], side.part
     elements = along_boundary(body.mesh, body.mesh.part(name))
-    xi = local_points(body)
-    s = arc_length(body, elements, xi)
+    xi = _local_points(body)
+    s = arc_lengths(body.mesh, elements, xi).ravel()
     directions = _directions(solution, part, body, elements, xi, s)
     return _resolved(body, elements, xi, s, directions)
 
 
 def boundary_curve(body: SolvedBody, elements: IntArray) -> TractionCurve:
     """Return the tractions along some elements, in their order, along the normals and tangents of the body."""
-    xi = local_points(body)
+    xi = _local_points(body)
     normals = body.mesh.normals_at(elements, xi).reshape(-1, 2)
-    return _resolved(body, elements, xi, arc_length(body, elements, xi), normals)
+    return _resolved(body, elements, xi, arc_lengths(body.mesh, elements, xi).ravel(), normals)
 
 
-def local_points(body: SolvedBody) -> FloatArray:
-    """Return the local coordinates (q,) at which an element is drawn: its ends, and more where tractions are curved."""
-    is_straight = body.scene.discretisation.traction_space(body.mesh).degree <= 1 and bool(body.mesh.is_straight.all())
-    return np.linspace(-1.0, 1.0, 2 if is_straight else _POINTS_OF_CURVE)
-
-
-def arc_length(body: SolvedBody, elements: IntArray, xi: FloatArray) -> FloatArray:
-    """Return the arc length (m q,) [m] of points of elements that follow each other."""
-    lengths = body.mesh.lengths[elements]
-    begin = np.concatenate([[0.0], np.cumsum(lengths)[:-1]])
-    return np.asarray((begin[:, None] + 0.5 * lengths[:, None] * (xi + 1.0)).ravel())
+def _local_points(body: SolvedBody) -> FloatArray:
+    return drawn_points(body.mesh, body.scene.discretisation.traction_space(body.mesh).degree)
 
 
 def _resolved(

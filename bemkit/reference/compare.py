@@ -15,7 +15,7 @@ from bemkit.arrays import FloatArray, read_only
 from bemkit.errors import InputError
 from bemkit.geometry.local_values import from_own_nodes
 from bemkit.geometry.meshing.discretise import Algebraic
-from bemkit.geometry.neighbours import along_boundary
+from bemkit.geometry.neighbours import along_boundary, arc_lengths
 from bemkit.geometry.quadrature import gauss_legendre
 from bemkit.geometry.spaces import element_nodes
 from bemkit.results.solution import Solution
@@ -260,7 +260,7 @@ def _along(solution: Solution, places: SamplePoints) -> FloatArray:
     ends = np.cumsum(lengths)
     element_index = np.clip(np.searchsorted(ends, places.s), 0, elements.size - 1)
     basis = space.basis(np.clip(2.0 * (places.s - ends[element_index]) / lengths[element_index] + 1.0, -1.0, 1.0))
-    at_dofs = (ends - lengths)[:, None] + 0.5 * lengths[:, None] * (element_nodes(space)[elements] + 1.0)
+    at_dofs = arc_lengths(mesh, elements, element_nodes(space)[elements])
     rows = table.rows(places.part)
     columns = np.stack([np.interp(at_dofs, table.s[rows], getattr(table, name)[rows]) for name in COLUMNS], axis=2)
     return np.asarray(np.einsum("pn,npc->cn", basis, from_own_nodes(space, columns, elements)[element_index]))
@@ -268,8 +268,8 @@ def _along(solution: Solution, places: SamplePoints) -> FloatArray:
 
 def _gauss_places(solution: Solution, part: str) -> SamplePoints:
     mesh = solution.mesh
-    lengths = mesh.lengths[along_boundary(mesh, mesh.part(part))]
+    elements = along_boundary(mesh, mesh.part(part))
     space = solution.scene.discretisation.displacement_space(mesh)
     xi, weights = gauss_legendre(max(4, space.degree + 1))
-    half = 0.5 * lengths[:, None]
-    return SamplePoints(part, (np.cumsum(lengths)[:, None] + half * (xi - 1.0)).ravel(), (half * weights).ravel())
+    length_shares = 0.5 * mesh.lengths[elements, None] * weights
+    return SamplePoints(part, arc_lengths(mesh, elements, xi).ravel(), length_shares.ravel())

@@ -10,7 +10,7 @@ import numpy as np
 from bemkit.arrays import FloatArray, IntArray
 from bemkit.errors import InputError
 from bemkit.geometry.mesh import BoundaryMesh
-from bemkit.geometry.neighbours import along_boundary
+from bemkit.geometry.neighbours import along_boundary, arc_lengths
 from bemkit.geometry.vectors import components_before
 from bemkit.results.boundary_stress import BoundaryStress
 from bemkit.results.stress_measures import STRESSES
@@ -35,11 +35,9 @@ def side_stress(boundary: BoundaryStress, mesh: BoundaryMesh, part: str) -> Tabl
     elements = along_boundary(mesh, mesh.part(part))
     xi = np.linspace(-1.0, 1.0, 2 * boundary.space.degree + 1) if boundary.space.degree > 1 else np.zeros(1)
     stress, points = boundary.at(elements, xi), mesh.points(elements, xi).reshape(-1, 2)
-    ends = np.cumsum(mesh.lengths[elements])
-    s = (ends - mesh.lengths[elements])[:, None] + 0.5 * (1.0 + xi) * mesh.lengths[elements, None]
     normal, shear, hoop = components_before(stress, mesh.normals_at(elements, xi))
     columns = {
-        "s": s,
+        "s": arc_lengths(mesh, elements, xi),
         "x": points[:, 0],
         "y": points[:, 1],
         "sigma_n": normal,

@@ -18,6 +18,7 @@ import numpy.typing as npt
 from bemkit.arrays import FloatArray, IntArray
 from bemkit.atomic_files import replacing
 from bemkit.geometry.local_values import values_on_elements
+from bemkit.geometry.neighbours import drawn_points
 from bemkit.geometry.vectors import norms
 from bemkit.operators.material import Material, Plane
 from bemkit.operators.somigliana.locate import Locator
@@ -28,8 +29,6 @@ from bemkit.results.stress_mesh import stress_mesh
 
 _CELL_TYPES = {"vertex": 1, "line": 3, "triangle": 5}
 _TYPES = {"float64": "Float64", "int64": "Int64", "uint8": "UInt8"}
-_POINTS_OF_CURVE = 9
-"""Points of an element whose displacement or shape is curved."""
 _CONTACT = ("u_n", "u_t", "sigma_n", "sigma_t", "gap", "clearance", "status", "weight")
 
 
@@ -140,8 +139,8 @@ def write_vtk(path: Path, solution: Solution, inside: int = 0) -> None:
 def _boundary(body: SolvedBody, number: int) -> Block:
     """Return the boundary of a body as lines, each element sampled by itself."""
     mesh, space = body.mesh, body.scene.discretisation.displacement_space(body.mesh)
-    n_points = 2 if space.degree <= 1 and bool(mesh.is_straight.all()) else _POINTS_OF_CURVE
-    xi = np.linspace(-1.0, 1.0, n_points)
+    xi = drawn_points(mesh, space.degree)
+    n_points = xi.size
     points = mesh.points(np.arange(mesh.n_elements), xi).reshape(-1, 2)
     at_nodes = values_on_elements(space, body.boundary.displacement)
     moved = np.einsum("pq,epc->eqc", space.basis(xi), at_nodes).reshape(-1, 2)
