@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import NamedTuple
 
 import numpy as np
 
@@ -40,14 +39,6 @@ class ClusterResponse:
         return self.scattering.nbytes + self.of_loads.nbytes + self.response.nbytes + self.at_rest.nbytes
 
 
-class _Columns(NamedTuple):
-    """Column groups of the arrays of a merge: incoming displacements of the parent, border unknowns, loads."""
-
-    parent: slice
-    border: slice
-    loads: slice
-
-
 def merge_siblings(
     first: ClusterResponse,
     second: ClusterResponse,
@@ -81,7 +72,9 @@ def merge_siblings(
     to_first, to_second = couplings
     n_first, n_second = len(to_first), len(to_second)
     row_map = np.zeros((n_first + n_second, 0)) if parent is None else parent.row_map.matrix()
-    columns = _column_groups(row_map.shape[1], n_border, first.of_loads.shape[1])
+    # columns: incoming displacements of the parent, border unknowns, loads
+    n_incoming = row_map.shape[1] + n_border
+    border = slice(row_map.shape[1], n_incoming)
 
     # S12 W2 and S21 W1
     from_second = to_first @ second.scattering[: to_first.shape[1]]
@@ -98,13 +91,12 @@ def merge_siblings(
     into_second -= from_first[:, :n_first] @ into_first
 
     # both siblings emit through the column skeleton of the parent and add to the same balances
-    emitted = _emitted(first, into_first, columns), _emitted(second, into_second, columns)
+    emitted = _emitted(first, into_first, border), _emitted(second, into_second, border)
     balances = sum(part[len(part) - n_border :] for part in emitted)
-    of_parent = np.zeros((0, columns.loads.stop))
+    of_parent = np.zeros((0, into_first.shape[1]))
     if parent is not None:
         of_parent = parent.column_map.gather(np.concatenate([part[: len(part) - n_border] for part in emitted]))
     outgoing, incoming = np.concatenate([of_parent, balances]), np.concatenate([into_first, into_second])
-    n_incoming = columns.border.stop
     return ClusterResponse(
         np.ascontiguousarray(outgoing[:, :n_incoming]),
         -outgoing[:, n_incoming:],
@@ -113,20 +105,15 @@ def merge_siblings(
     )
 
 
-def _column_groups(n_parent: int, n_border: int, n_loads: int) -> _Columns:
-    n_incoming = n_parent + n_border
-    return _Columns(slice(0, n_parent), slice(n_parent, n_incoming), slice(n_incoming, n_incoming + n_loads))
-
-
 def _side_by_side(*blocks: FloatArray) -> FloatArray:
     """Return blocks of columns in one array, stored by columns as LAPACK wants it."""
     joined = np.empty((len(blocks[0]), sum(block.shape[1] for block in blocks)), order="F")
     return np.concatenate(blocks, axis=1, out=joined)
 
 
-def _emitted(child: ClusterResponse, incoming: FloatArray, columns: _Columns) -> FloatArray:
+def _emitted(child: ClusterResponse, incoming: FloatArray, border: slice) -> FloatArray:
     """Return W (f, e) - a of a child: outgoing unknowns and balances, with the opposite sign, for each column."""
     emitted: FloatArray = child.scattering[:, : len(incoming)] @ incoming
-    emitted[:, columns.border] += child.scattering[:, len(incoming) :]
-    emitted[:, columns.loads] -= child.of_loads
+    emitted[:, border] += child.scattering[:, len(incoming) :]
+    emitted[:, border.stop :] -= child.of_loads
     return emitted

@@ -42,7 +42,7 @@ def inner_integrals(
     """
     plus, minus = from_start * geometry.to_local[trial], from_end * geometry.to_local[trial]
     if geometry.curved is None or bool(geometry.is_straight[trial].all()):
-        return _seen_from(degrees, plus, minus)
+        return near_inner(degrees, None, plus, minus)
     result = Inner.zeros(degrees, trial.shape)
     zeta = local_coordinates(geometry, trial, from_start)
     near = np.flatnonzero(np.abs(zeta) < geometry.distance_at(curved_geometry.ELLIPSE)[trial])
@@ -80,25 +80,21 @@ def store(result: Inner, chosen: IntArray | BoolArray, values: Inner) -> None:
     result.cauchy[:, chosen] = values.cauchy
 
 
-def _seen_from(degrees: Degrees, plus: ComplexArray, minus: ComplexArray) -> Inner:
-    """Return the closed forms of straight elements; see `kernels.near_integrals`."""
-    integrals, log_product = kernels.near_integrals(plus, minus, degrees.highest_integral)
-    return Inner.straight(degrees, integrals, log_product, kernels.local_coordinate(plus, minus).imag)
-
-
-def near_inner(degrees: Degrees, coefficients: ComplexArray, plus: ComplexArray, minus: ComplexArray) -> Inner:
-    """Integrate over curved elements near points with the parameters t0 = plus - 1 = minus + 1.
+def near_inner(degrees: Degrees, coefficients: ComplexArray | None, plus: ComplexArray, minus: ComplexArray) -> Inner:
+    """Integrate over elements near points with the parameters t0 = plus - 1 = minus + 1.
 
     Parameters
     ----------
     degrees : Degrees
     coefficients : (n_powers, n) complex array
-        The polynomials p of the elements.
+        The polynomials p of the elements; None if all are straight, which have closed forms at any distance.
     plus, minus : (n,) complex arrays
     """
     integrals, log_product = kernels.near_integrals(plus, minus, degrees.highest_integral)
     root = kernels.local_coordinate(plus, minus)
     straight = Inner.straight(degrees, integrals, log_product, root.imag)
+    if coefficients is None:
+        return straight
     return _sum(straight, bending(degrees, coefficients, root, root.imag, integrals))
 
 
