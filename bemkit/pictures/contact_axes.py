@@ -126,10 +126,12 @@ def cut_peaks(
 
 
 def near(distance: FloatArray, solution: Result, chosen: BoolArray) -> FloatArray:
-    """Blank out distances to the obstacle that are much larger than the displacements."""
+    """Blank out distances to the obstacle that are much larger than the displacements and the smallest distance."""
     contact = solution.contact
-    largest = max(float(np.abs(component[chosen]).max()) for component in (contact.u_n, contact.u_t))
-    return np.where(np.abs(distance) <= 2.0 * largest, distance, np.nan)
+    sizes = [np.abs(component[chosen]).max() for component in (contact.u_n, contact.u_t)]
+    nearest = np.abs(distance).min()
+    largest = 2.0 * max(*sizes, nearest if np.isfinite(nearest) else 0.0)
+    return np.where(np.abs(distance) <= largest, distance, np.nan)
 
 
 def displacement_scale(solution: Result) -> float:

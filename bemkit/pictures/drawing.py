@@ -62,7 +62,7 @@ def ignore_round_off(axes: Axes, scale: float, axis: Literal["x", "y"] = "y") ->
         Position of the values.
     """
     low, high = axes.dataLim.intervaly if axis == "y" else axes.dataLim.intervalx
-    if high - low < _NOISE * scale:  # of the values: axes of a single one are widened by matplotlib
+    if 0.0 <= high - low < _NOISE * scale:  # of the values: axes of a single one are widened by matplotlib
         middle = 0.5 * (low + high)
         flat = middle - _FLAT * scale, middle + _FLAT * scale
         _ = axes.set_ylim(flat) if axis == "y" else axes.set_xlim(flat)

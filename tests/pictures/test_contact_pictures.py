@@ -187,6 +187,18 @@ def test_a_clearance_of_nothing_but_zeros_is_drawn_on_the_scale_of_the_displacem
     assert np.ptp(right.get_ylim()) < np.abs([still.u_n, still.u_t]).max()
 
 
+def test_a_body_far_from_its_obstacle_or_out_of_reach_is_drawn() -> None:
+    solution = run(with_overrides(load_scene("uniform-slip"), elements=24))
+    for distance in (1.0, np.inf):
+        away = replace(
+            solution.contact, gap=solution.contact.u_n + distance, clearance=solution.contact.u_n * 0.0 + distance
+        )
+        axes = draw_contact_clearance(replace(solution, contact=away), "floor")
+        (right,) = (other for other in axes.get_figure().axes if other.get_ylabel() == "clearance")
+        assert np.isfinite(right.get_ylim()).all()
+        assert np.isfinite(right.lines[0].get_ydata()).all() == np.isfinite(distance)
+
+
 def test_the_convergence_ends_where_the_certificate_is(solution: Solution) -> None:
     axes = draw_convergence(solution)
     worst = axes.lines[0].get_ydata()
