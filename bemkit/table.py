@@ -9,9 +9,12 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from pathlib import Path
-from typing import Any, Self
+from typing import TYPE_CHECKING, Any, Self
 
 from bemkit.errors import InputError
+
+if TYPE_CHECKING:
+    from bemkit.hdf5 import FileFormat
 
 
 @dataclass(frozen=True)
@@ -115,9 +118,9 @@ class Table:
 
     def to_hdf5(self, path: str | Path) -> None:
         """Write a dataset for each column, with its unit and meaning as attributes."""
-        from bemkit.hdf5 import FileFormat, write_array
+        from bemkit.hdf5 import write_array
 
-        with FileFormat("bemkit-table", 1, "bemkit table", "-o FILE.h5").created(path) as file:
+        with table_format().created(path) as file:
             for head in self.columns:
                 write_array(file, head.name, _array(self.values(head.name)))
                 file[head.name].attrs.update({"unit": head.unit, "meaning": head.meaning})
@@ -135,6 +138,13 @@ class Table:
         except ImportError:
             raise InputError('data frames need pandas: pip install "bemkit[pandas]"') from None
         return pd.DataFrame(self.as_dicts(), columns=list(self.names))
+
+
+def table_format() -> FileFormat:
+    """Return the format of tables in HDF5 files."""
+    from bemkit.hdf5 import FileFormat  # h5py only where it is needed
+
+    return FileFormat("bemkit-table", 1, "bemkit table", "-o FILE.h5")
 
 
 def markdown_table(heads: Sequence[str], rows: Iterable[Sequence[str]], is_number: Sequence[bool]) -> str:

@@ -22,6 +22,9 @@ if TYPE_CHECKING:
     from bemkit.studies.row_file import R
     from bemkit.table import Table
 
+_ENDINGS = frozenset({".csv", ".json", ".md", ".jsonl", ".h5", ".hdf5", ".npz", ".vtu", ".toml", ".html"})
+"""Endings of files that bemkit reads or writes."""
+
 
 def degree_of(context: click.Context, parameter: click.Parameter, value: str | None) -> int | Literal["hp"] | None:
     """Return a polynomial degree, or the word for degrees that rise until an accuracy is reached."""
@@ -50,6 +53,18 @@ def names_of(context: click.Context, parameter: click.Parameter, values: tuple[s
     return tuple(name.strip() for value in values for name in value.split(",") if name.strip())
 
 
+def file_of(ending: str) -> Callable[[click.Context, click.Parameter, str | None], str | None]:
+    """Return a check that a file in an option does not have the ending of another kind of file, such as a scene."""
+
+    def checked(context: click.Context, parameter: click.Parameter, value: str | None) -> str | None:
+        if value is not None and Path(value).suffix.lower() in _ENDINGS - {ending}:
+            words = f"{value} has the ending of another kind of file: give a name that ends in {ending}"
+            raise click.BadParameter(words, context, parameter)
+        return value
+
+    return checked
+
+
 elements_option = click.option("--elements", type=int, metavar="N", help="Number of boundary elements.")
 accuracy_option = click.option(
     "--accuracy", type=float, metavar="E", help="Refine until the estimated relative error is below E."
@@ -66,9 +81,19 @@ settings_option = click.option(
 rows_option = click.option(
     "-o", "--output", metavar="FILE", help="Write the rows: .csv, .json, .md, .h5, or .jsonl, which resumes."
 )
-json_option = click.option("--json", "json_file", metavar="FILE", help="Write numbers as JSON; - is standard output.")
-csv_option = click.option("--csv", "csv_file", metavar="FILE", help="Write the table as CSV; - is standard output.")
-markdown_option = click.option("--markdown", metavar="FILE", help="Write the table as Markdown; - is standard output.")
+json_option = click.option(
+    "--json",
+    "json_file",
+    metavar="FILE",
+    callback=file_of(".json"),
+    help="Write numbers as JSON; - is standard output.",
+)
+csv_option = click.option(
+    "--csv", "csv_file", metavar="FILE", callback=file_of(".csv"), help="Write the table as CSV; - is standard output."
+)
+markdown_option = click.option(
+    "--markdown", metavar="FILE", callback=file_of(".md"), help="Write the table as Markdown; - is standard output."
+)
 plot_option = click.option("--plot", "folder", metavar="DIR", help="Draw figures into the folder DIR.")
 what_option = click.option(
     "--what", metavar="NAME,...", callback=pictures_of, help="Pictures to draw; bemkit plot --help lists them."

@@ -105,7 +105,11 @@ class TableFile(Generic[Content]):
                 f"{path}: the ending {path.suffix!r} names no format of tables: give one of {endings}, or .jsonl for "
                 "rows that an interrupted study resumes from"
             )
-        return [_checked(path)]
+        if path.suffix.lower() in _TABLE_TEXTS:
+            return [_checked(path)]
+        from bemkit.table import table_format
+
+        return [table_format().check_target(path)]
 
     def write(self, content: Content) -> None:
         """Write the table of some content, if it is wanted.

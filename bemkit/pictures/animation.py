@@ -51,7 +51,7 @@ def save_animation(path: str | Path, steps: Sequence[Result], *, steps_per_secon
     from matplotlib import rc_context
     from matplotlib.animation import FFMpegWriter, PillowWriter
 
-    writer = (PillowWriter if target.suffix == GIF else FFMpegWriter)(fps=steps_per_second)
+    writer = (PillowWriter if target.suffix.lower() == GIF else FFMpegWriter)(fps=steps_per_second)
     scenes = [shown(step) for step in steps]
     factor = min(magnification(scene) for scene in scenes)
     loops = [loop for scene in scenes for body in scene.bodies for loop in body.outlines(factor)]
@@ -74,9 +74,9 @@ def save_animation(path: str | Path, steps: Sequence[Result], *, steps_per_secon
 def check_animation(path: str | Path) -> Path:
     """Check that an animation can be written, and return its path; OutputFileError if not."""
     target = Path(path)
-    if target.suffix not in (GIF, MP4):
+    if target.suffix.lower() not in (GIF, MP4):
         raise OutputFileError(f"{target}: unknown ending of a moving picture: choose .gif or .mp4")
-    if target.suffix == MP4 and _encoder() is None:
+    if target.suffix.lower() == MP4 and _encoder() is None:
         raise OutputFileError(f'{target}: .mp4 needs an encoder: pip install "bemkit[movie]", or choose .gif')
     return check_target(target)
 

@@ -61,9 +61,9 @@ def save_pictures(
     if not steps:
         raise InputError("steps is empty: give the solutions of a load history")
     still = None if what is None else [name for name in what if name != ANIMATION]
-    if place.suffix in (GIF, MP4):
+    if place.suffix.lower() in (GIF, MP4):
         return (save_animation(place, steps),)
-    if place.suffix in FIGURE_FORMATS:
+    if place.suffix.lower() in FIGURE_FORMATS:
         drawn = figures(steps[-1], still)
         if len(drawn) > 1:
             raise OutputFileError(f"{place}: one file for {len(drawn)} pictures: give a folder, or name one picture")
@@ -89,11 +89,12 @@ def check_place(place: str | Path, what: Sequence[str] | None) -> list[Path]:
         if name != ANIMATION:
             find_picture(name)
     check_figure_folder(None)
-    if place.suffix in (GIF, MP4):
+    ending = place.suffix.lower()
+    if ending in (GIF, MP4):
         if what is not None and list(what) != [ANIMATION]:
             raise OutputFileError(f"{place}: only the picture 'animation' can be written to .gif or .mp4")
         return [check_animation(place)]
-    if place.suffix in FIGURE_FORMATS:
+    if ending in FIGURE_FORMATS:
         if what is None or len(set(what)) != 1 or ANIMATION in what:
             raise OutputFileError(f"{place}: one file takes one picture: name one, or give a folder")
         return [check_target(place)]

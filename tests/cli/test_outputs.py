@@ -105,3 +105,25 @@ def test_the_output_of_a_study_obeys_its_ending(command, capsys) -> None:
     assert Path("rows.jsonl").read_text().startswith('{"format": "bemkit-')
     assert call(*command, "-q", "-o", "rows.xyz") == 2
     assert "the ending '.xyz' names no format of tables" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("option", "name", "ending"),
+    [("--csv", "scene.toml", ".csv"), ("--csv", "r.H5", ".csv"), ("--json", "r.csv", ".json")],
+)
+def test_a_text_takes_no_name_of_another_kind_of_file(option: str, name: str, ending: str, capsys) -> None:
+    Path(name).write_text("kept")
+    assert call("run", "paper-1", *SMALL, option, name) == 2
+    assert (
+        f"{name} has the ending of another kind of file: give a name that ends in {ending}" in capsys.readouterr().err
+    )
+    assert Path(name).read_text() == "kept"
+
+
+def test_a_result_is_not_replaced_by_a_table_and_the_sweep_does_not_begin(capsys, caplog) -> None:
+    assert call("run", "paper-1", *SMALL, "-q", "-o", "r.h5") == 0
+    caplog.set_level("DEBUG", "bemkit.progress")
+    caplog.clear()
+    assert call("sweep", "paper-1", *SMALL, "--vary", "law.friction_coefficient=0.1", "-q", "-o", "r.h5") == 2
+    assert "r.h5: exists and is not a bemkit table: choose another name" in capsys.readouterr().err
+    assert not caplog.records
