@@ -23,9 +23,9 @@ SHORT = {name: name for name in MEASURES} | {
 }
 
 
-def print_reference(title: str, reference: Reference, console: Console | None = None) -> None:
+def print_reference(title: str, reference: Reference) -> None:
     """Print the reference of the errors and its own uncertainty."""
-    console = _console(console)
+    console = _console(None)
     console.print(Text(title, style="bold"))
     console.print(Text(f"reference: {reference.source}"))
     own = [f"{MEASURES[name]} {value:.0e}" for name, value in reference.own_errors.items() if np.isfinite(value)]

@@ -160,9 +160,7 @@ def support_forces(
     forces = {}
     for name, share in shares.items():
         nodes = np.unique(moved.element_dofs[mesh.part(name)])
-        (x, y), (force_x, force_y) = points[nodes].T, (share + left)[nodes].T
-        moment = float(x @ force_y - y @ force_x)
-        forces[name] = PartForce(name, float(force_x.sum()), float(force_y.sum()), moment)
+        forces[name] = nodal_resultant(name, (share + left)[nodes], points[nodes])
     return forces
 
 
