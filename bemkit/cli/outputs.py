@@ -38,7 +38,7 @@ class TextFile(Generic[Content]):
 
     Parameters
     ----------
-    place : str or None
+    target : str or None
         File name, ``"-"`` for standard output, or None if the text is not wanted.
     text : callable (content) -> str
     """
@@ -79,7 +79,7 @@ class TableFile(Generic[Content]):
 
     Parameters
     ----------
-    place : str or None
+    target : str or None
     table : callable (content) -> Table
     """
 
