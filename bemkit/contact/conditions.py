@@ -43,9 +43,11 @@ def largest_components(motions: RigidMotions) -> FloatArray:
     return np.asarray(abs(rows).max(axis=1).toarray(), dtype=float).ravel()
 
 
-def scaled_motions(motions: RigidMotions, sizes: FloatArray) -> RigidMotions:
-    """Return motions, one in each row, divided by their sizes (n_motions,)."""
-    return motions / sizes[:, None] if isinstance(motions, np.ndarray) else (motions.T / sizes).T.tocsr()
+def of_unit_size(motions: RigidMotions) -> tuple[RigidMotions, FloatArray]:
+    """Return motions, one in each row, of largest component one, and the sizes (n_motions,) that divide them."""
+    sizes = largest_components(motions)
+    sizes = np.where(sizes > 0.0, sizes, 1.0)  # motions of bodies that touch nothing stay zero
+    return motions / sizes[:, None] if isinstance(motions, np.ndarray) else (motions.T / sizes).T.tocsr(), sizes
 
 
 def orthonormal(motions: FloatArray) -> FloatArray:

@@ -11,7 +11,7 @@ from scipy.optimize import linprog
 from scipy.sparse import csc_array
 
 from bemkit.arrays import FloatArray
-from bemkit.contact.conditions import RigidMotions, largest_components, scaled_motions
+from bemkit.contact.conditions import RigidMotions, of_unit_size
 from bemkit.contact.limit_load import WITHOUT_BOUND, largest_factor
 from bemkit.contact.solvability import with_violated_nodes
 from bemkit.errors import InputError
@@ -102,9 +102,8 @@ def coulomb_limit(
         return None
     if np.isinf(associative) and not (motions.shape[0] and constant.any() and growing.any()):
         return _WITHOUT_LIMIT
-    unit = largest_components(motions)
-    unit = np.where(unit > 0.0, unit, 1.0)  # bodies that touch nothing
-    scaled, constant, growing = scaled_motions(motions, unit), constant / unit, growing / unit
+    scaled, unit = of_unit_size(motions)
+    constant, growing = constant / unit, growing / unit
     size = float(np.abs(growing).max())
     scale = float(np.abs(constant).max()) or size
 

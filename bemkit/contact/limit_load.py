@@ -8,7 +8,7 @@ from functools import partial
 import numpy as np
 
 from bemkit.arrays import FloatArray
-from bemkit.contact.conditions import RigidMotions, largest_components, scaled_motions
+from bemkit.contact.conditions import RigidMotions, of_unit_size
 from bemkit.contact.solvability import contact_forces, with_violated_nodes
 from bemkit.errors import InputError
 
@@ -50,9 +50,7 @@ def largest_factor(
     """
     if not motions.shape[0]:
         return np.inf
-    unit = largest_components(motions)
-    unit = np.where(unit > 0.0, unit, 1.0)  # bodies that touch nothing
-    motions = scaled_motions(motions, unit)
+    motions, unit = of_unit_size(motions)
     constant, growing = constant / unit, growing / unit
     load_scale = float(np.abs(growing).max())
     if load_scale == 0.0:
@@ -123,13 +121,12 @@ def least_force(
     from scipy import sparse
     from scipy.optimize import linprog
 
-    unit = largest_components(motions)
-    unit = np.where(unit > 0.0, unit, 1.0)  # bodies that touch nothing
+    motions, unit = of_unit_size(motions)
     scale = float(np.abs(load / unit).max()) or 1.0
     simple, bounds = contact_forces(sparse.eye_array(2 * slope.size, format="csr"), cohesion / scale, slope)
     result = linprog(  # type: ignore[call-overload]  # the stubs know no sparse arrays
         direction @ simple,
-        A_eq=scaled_motions(motions, unit) @ simple,
+        A_eq=motions @ simple,
         b_eq=-load / unit / scale,
         bounds=bounds,
         method="highs",

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, TypeVar
 import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray
-from bemkit.contact.conditions import RigidMotions, as_rows, largest_components, scaled_motions
+from bemkit.contact.conditions import RigidMotions, as_rows, largest_components, of_unit_size
 from bemkit.contact.problem import ContactProblem, ContactState
 
 if TYPE_CHECKING:
@@ -108,9 +108,8 @@ def find_unsolvable_load(problem: ContactProblem, state: ContactState | None = N
     motions = as_rows(problem.body.rigid_motions())
     if not motions.shape[0]:
         return None
-    unit = largest_components(motions)
+    motions, unit = of_unit_size(motions)
     load, force_scale = _rigid_load(problem, unit)
-    motions = scaled_motions(motions, unit)
     if force_scale == 0.0:
         return None
     if state is None:
