@@ -40,48 +40,6 @@ class LocalConditions:
         return LocalConditions(self.factors[rows], self.given[rows])
 
 
-def solve_for_two(
-    on_traction: FloatArray, on_displacement: FloatArray, value: FloatArray, displacement_unit: float
-) -> tuple[LocalConditions, BoolArray]:
-    """Solve the two conditions of each node for two of its four quantities; the other two become the unknowns z.
-
-    Parameters
-    ----------
-    on_traction, on_displacement : (n, 2, 2) arrays
-        Axes node, condition, component.
-    value : (n, 2) array
-    displacement_unit : float [m/Pa]
-        Typical displacement per traction; makes the determinants of different pairs comparable.
-
-    Returns
-    -------
-    local : LocalConditions
-    is_determined : (n,) bool array
-        Whether the two conditions are independent; the local conditions of other nodes are zero.
-    """
-    conditions = np.concatenate([on_traction, on_displacement], axis=2)
-    scaled = conditions * np.array([1.0, 1.0, displacement_unit, displacement_unit])
-    sizes = np.abs(scaled).max(axis=2, keepdims=True)
-    scaled = scaled / np.where(sizes > 0.0, sizes, 1.0)
-    determinants = np.stack(
-        [np.abs(scaled[:, 0, i] * scaled[:, 1, j] - scaled[:, 0, j] * scaled[:, 1, i]) for i, j in _KNOWN], axis=1
-    )
-    best = determinants.max(axis=1)
-    of_both_directions = np.where(_KNOWN[:, 0] % 2 != _KNOWN[:, 1] % 2, determinants, 0.0)
-    is_preferred = of_both_directions.max(axis=1) >= _PREFERRED * best
-    choice = np.where(is_preferred, of_both_directions.argmax(axis=1), determinants.argmax(axis=1))
-    nodes = np.flatnonzero(best > 0.0)
-    of_known, of_unknown = (
-        np.take_along_axis(conditions[nodes], pairs[choice[nodes], None, :], axis=2) for pairs in (_KNOWN, _UNKNOWN)
-    )
-    inverse, rows = _inverse(of_known), nodes[:, None]
-    known, unknown = _KNOWN[choice[nodes]], _UNKNOWN[choice[nodes]]
-    factors, given = np.zeros((len(value), 4, 2)), np.zeros((len(value), 4))
-    factors[rows, known], factors[rows, unknown, [0, 1]] = -inverse @ of_unknown, 1.0
-    given[rows, known] = (inverse @ value[nodes, :, None])[:, :, 0]
-    return LocalConditions(factors, given), best > 0.0
-
-
 def _inverse(matrices: FloatArray) -> FloatArray:
     """Return the inverses of (n, 2, 2) matrices, exact where they are diagonal."""
     (a, b), (c, d) = matrices.transpose(1, 2, 0)
@@ -126,17 +84,40 @@ class NodeConditions:
         return NodeConditions(self.on_traction[elements], self.on_displacement[elements], self.value[elements])
 
     def solved(self, displacement_unit: float) -> LocalConditions:
-        """Solve the conditions of each element, in its frame; see `solve_for_two`.
+        """Solve the two conditions of each element for two of its four quantities, in its frame.
+
+        The other two become the unknowns z.
+
+        Parameters
+        ----------
+        displacement_unit : float [m/Pa]
+            Typical displacement per traction; makes the determinants of different pairs comparable.
 
         Raises
         ------
         UndeterminedError
             If the two conditions at an element are not independent.
         """
-        local, is_determined = solve_for_two(self.on_traction, self.on_displacement, self.value, displacement_unit)
-        if not is_determined.all():
+        conditions = np.concatenate([self.on_traction, self.on_displacement], axis=2)
+        scaled = conditions * np.array([1.0, 1.0, displacement_unit, displacement_unit])
+        sizes = np.abs(scaled).max(axis=2, keepdims=True)
+        scaled = scaled / np.where(sizes > 0.0, sizes, 1.0)
+        determinants = np.stack(
+            [np.abs(scaled[:, 0, i] * scaled[:, 1, j] - scaled[:, 0, j] * scaled[:, 1, i]) for i, j in _KNOWN], axis=1
+        )
+        best = determinants.max(axis=1)
+        if not np.all(best > 0.0):
             raise UndeterminedError("the two conditions at a contact node are not independent")
-        return local
+        of_both_directions = np.where(_KNOWN[:, 0] % 2 != _KNOWN[:, 1] % 2, determinants, 0.0)
+        is_preferred = of_both_directions.max(axis=1) >= _PREFERRED * best
+        choice = np.where(is_preferred, of_both_directions.argmax(axis=1), determinants.argmax(axis=1))
+        known, unknown = _KNOWN[choice], _UNKNOWN[choice]
+        of_known, of_unknown = (np.take_along_axis(conditions, pair[:, None], axis=2) for pair in (known, unknown))
+        inverse, n = _inverse(of_known), len(choice)
+        factors, given, rows = np.zeros((n, 4, 2)), np.zeros((n, 4)), np.arange(n)[:, None]
+        factors[rows, known], factors[rows, unknown, [0, 1]] = -inverse @ of_unknown, 1.0
+        given[rows, known] = (inverse @ self.value[:, :, None])[:, :, 0]
+        return LocalConditions(factors, given)
 
 
 class UndeterminedError(SingularMatrixError):

@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bemkit.contact.conditions import augmented, separated, slip, stick
-from bemkit.operators.hierarchy.system import solve_for_two
+from bemkit.contact.conditions import LinearConditions, augmented, separated, slip, stick
+from bemkit.operators.hierarchy.system import LocalConditions, NodeConditions, UndeterminedError
+
+
+def solved(conditions: LinearConditions, unit: float) -> LocalConditions:
+    return NodeConditions(conditions.on_traction, conditions.on_displacement, conditions.value).solved(unit)
 
 
 @given(seed=st.integers(0, 10_000), unit=st.sampled_from([1e-6, 1.0, 1e3]))
@@ -16,19 +21,22 @@ def test_whatever_the_unknowns_are_the_conditions_hold(seed: int, unit: float) -
     rng = np.random.default_rng(seed)
     on_traction, on_displacement = rng.normal(size=(2, 8, 2, 2)) * rng.integers(0, 2, (2, 8, 2, 2))
     value = rng.normal(size=(8, 2))
-    laws, is_determined = solve_for_two(on_traction, on_displacement / unit, value, unit)
     rows = np.concatenate([on_traction, on_displacement / unit], axis=2)
     rank = np.array([np.linalg.matrix_rank(each * [1, 1, unit, unit], tol=1e-9) for each in rows])
-    np.testing.assert_array_equal(is_determined[rank < 2], False)
+    conditions = NodeConditions(on_traction, on_displacement / unit, value)
+    for node in np.flatnonzero(rank < 2):
+        with pytest.raises(UndeterminedError, match="the two conditions at a contact node are not independent"):
+            conditions.take(np.array([node])).solved(unit)
     good = np.flatnonzero(rank == 2)
-    z = rng.normal(size=(8, 2, 1))
+    laws, rows, value = conditions.take(good).solved(unit), rows[good], value[good]
+    z = rng.normal(size=(good.size, 2, 1))
     state = (laws.factors @ z)[:, :, 0] + laws.given
     met = np.einsum("nrk,nk->nr", rows, state)
     size = np.einsum("nrk,nk->nr", np.abs(rows), np.abs(state)) + np.abs(value)
     # pivots are within a factor ten of the best, so that round-off is a few eps of the terms
-    assert np.all(np.abs(met - value)[good] <= 1e-11 * size[good])
+    assert np.all(np.abs(met - value) <= 1e-11 * size)
     # two unknowns, independent of each other
-    assert np.all(np.linalg.matrix_rank(laws.factors[good] * [[1], [1], [1 / unit], [1 / unit]]) == 2)
+    assert np.all(np.linalg.matrix_rank(laws.factors * [[1], [1], [1 / unit], [1 / unit]]) == 2)
 
 
 def test_contact_conditions_are_met_to_the_last_digit() -> None:
@@ -39,9 +47,8 @@ def test_contact_conditions_are_met_to_the_last_digit() -> None:
         (separated(3), {0: 0.0 * gap, 1: 0.0 * gap}),
         (slip(gap, np.ones(3), np.full(3, -2.0), np.zeros(3)), {2: gap}),
     ):
-        laws, is_determined = solve_for_two(conditions.on_traction, conditions.on_displacement, conditions.value, 1e-3)
+        laws = solved(conditions, 1e-3)
         state = (laws.factors @ z[:, :, None])[:, :, 0] + laws.given
-        assert is_determined.all()
         for component, expected in held.items():
             np.testing.assert_array_equal(state[:, component], expected)
     np.testing.assert_array_equal(state[:, 1], 2.0 * state[:, 0])  # slip along the tangent: t_t = 2 t_n
@@ -49,6 +56,6 @@ def test_contact_conditions_are_met_to_the_last_digit() -> None:
 
 def test_augmented_conditions_leave_two_unknowns() -> None:
     conditions = augmented(np.zeros(2), np.zeros(2), np.ones((2, 2)), 5.0, 7.0)
-    laws, _ = solve_for_two(conditions.on_traction, conditions.on_displacement, conditions.value, 0.1)
+    laws = solved(conditions, 0.1)
     state = (laws.factors @ np.ones((2, 2, 1)))[:, :, 0] + laws.given
     np.testing.assert_allclose(state[:, :2] + state[:, 2:] * [5.0, 7.0], 1.0, rtol=1e-14)
