@@ -62,6 +62,7 @@ def half_planes_among(seed: int, count: int) -> list[RandomCase]:
     return [case for case in cases if case.scenes[0].shape.outline().surface is not None]
 
 
+@pytest.mark.slow
 def test_random_half_planes_end_in_the_right_answer_or_a_named_failure() -> None:
     cases = half_planes_among(4, 40)
     assert len(cases) >= 3  # 12 per cent

@@ -16,6 +16,7 @@ from bemkit.solvers.lemke import LemkePivoting
 from bemkit.solvers.ssn import SemismoothNewton
 from bemkit.testing import check_law
 from tests.handmade import assert_solves, block_body
+from tests.slow import slow_except
 
 POINTS = np.stack([np.linspace(0.0, 1.0, 5), np.full(5, 2.0)], axis=1)
 PRESSURE = -np.arange(5.0)
@@ -81,7 +82,7 @@ def test_each_part_has_its_law():
 
 
 @pytest.mark.parametrize("other", [Frictionless(), Tresca(0.05), Coulomb(0.2)], ids=repr)
-@pytest.mark.parametrize("press", [1.0, 0.1])
+@pytest.mark.parametrize("press", slow_except([1.0, 0.1], 0.1))
 def test_drivers_agree_on_mixed_laws(other, press):
     body = block_body(press=press)
     problem = ContactProblem(body, np.zeros(12), PiecewiseLaw([Coulomb(0.5), other], [LEFT, RIGHT]))

@@ -19,7 +19,8 @@ from bemkit.model.free_motion import FreeBodyError
 from bemkit.model.model import build_model
 from bemkit.model.prepared import prepare
 from bemkit.operators.steklov_poincare import CondensedMap
-from bemkit.pictures import draw_boundary_traction, save_pictures
+from bemkit.pictures import draw_boundary_traction
+from bemkit.pictures.catalogue import default_pictures
 from bemkit.results.result_file import read_result, write_result
 from bemkit.results.solution import Solution
 from bemkit.results.tables import to_csv, to_json
@@ -166,10 +167,9 @@ def test_scene_files_say_nothing_of_friction_and_drivers() -> None:
     assert scene_from_toml(text) == bending()
 
 
-def test_figures_show_the_tractions_on_the_boundary(bent: Solution, tmp_path: Path) -> None:
-    paths = save_pictures(bent, tmp_path / "figures")
-    assert [path.name for path in paths] == ["deformation.png", "boundary-traction.png", "von-mises.png"]
-    axes = draw_boundary_traction(bent, units=bk.UnitNames("mm", "MPa"))
+def test_figures_show_the_tractions_on_the_boundary(bent: Solution) -> None:
+    assert [picture.name for picture in default_pictures(bent)] == ["deformation", "boundary-traction", "von-mises"]
+    axes = draw_boundary_traction(bk.run(replace(bending(), units=bk.UnitNames("mm", "MPa"))))
     (strip,) = axes.child_axes
     drawn = {line.get_label(): line.get_ydata() for line in axes.lines}
     largest = np.abs(bent.boundary.traction_dofs).max()

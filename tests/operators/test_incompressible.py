@@ -18,7 +18,7 @@ from bemkit.operators.steklov_poincare.galerkin import GalerkinElasticity
 from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions, Support, integrate_traction
 from bemkit.operators.steklov_poincare.operator import SteklovPoincareOperator
 from tests.handmade import condense, contact_along_normals
-from tests.slow import slow_only
+from tests.slow import slow_except, slow_only
 
 RUBBER = bk.Material(3.0, 0.5)  # shear modulus 1
 PURE_SHEAR = np.array([[0.4, 0.3], [-0.1, -0.4]])
@@ -115,7 +115,7 @@ def test_a_ring_under_inner_pressure_has_the_lame_solution() -> None:
     assert 1.7 < orders[-1] < 3.3
 
 
-@pytest.mark.parametrize("discretisation", [bk.Galerkin(1), bk.ConstantCollocation()])
+@pytest.mark.parametrize("discretisation", slow_except([bk.Galerkin(1), bk.ConstantCollocation()], bk.Galerkin(1)))
 def test_example_1_has_a_smooth_incompressible_limit(discretisation: object) -> None:
     import dataclasses
 
@@ -170,7 +170,7 @@ HOLES = {
 }
 
 
-@pytest.mark.parametrize("poisson_ratio", slow_only([0.3, 0.4999, 0.49999999, 0.5], 0.3, 0.4999))
+@pytest.mark.parametrize("poisson_ratio", slow_only([0.3, 0.4999, 0.49999999, 0.5], 0.3, 0.4999, 0.49999999))
 @pytest.mark.parametrize("name", HOLES)
 def test_a_pressure_in_a_hole_is_found_again_at_every_ratio(name: str, poisson_ratio: float) -> None:
     mesh = bk.discretise(HOLES[name].outline(), n_elements=80)

@@ -94,6 +94,7 @@ def test_tractions_are_drawn_as_polynomials_of_their_degree(
     assert -force == pytest.approx(solution.force_normal, rel=0.01)  # trapezoids of 8 points of an element
 
 
+@pytest.mark.slow
 def test_tractions_between_bodies_are_those_of_the_side_with_the_nodes() -> None:
     solution = run(load_scene("two-cylinders"))
     (part,) = solution.contact.parts

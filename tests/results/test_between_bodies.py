@@ -81,7 +81,7 @@ def test_tension_on_either_side_is_seen(pressed: Solution, body: str) -> None:
     assert changed(pressed, body, normal=1.0 + RISE).tension == pytest.approx(RISE / size, rel=1e-8)
 
 
-@pytest.mark.parametrize("turn", [0.0, 33.0])
+@pytest.mark.parametrize("turn", slow_except([0.0, 33.0], 33.0))
 def test_pairs_that_are_copies_of_each_other_are_measured_as_if_alone(
     turn: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -80,6 +80,7 @@ def test_a_body_that_stays_apart_is_converged(word: str) -> None:
     assert solution.contact.clearance.min() > 1e-9
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("degrees", [0.0, pytest.param(20.0, marks=pytest.mark.slow)])
 def test_rising_degrees_find_contact_between_nodes(degrees: float) -> None:
     exact = bk.run(roll(1e-6, degrees, bk.Galerkin(2), bk.MeshOptions(accuracy=4e-3)))

@@ -89,6 +89,7 @@ def test_a_killed_run_is_continued_to_the_same_bits(scene: bk.Scene | bk.Scene, 
             np.testing.assert_array_equal(one.slip, two.slip)
 
 
+@pytest.mark.slow
 def test_compressed_equations_solve_the_steps_that_are_left_to_the_same_bits(tmp_path: Path) -> None:
     """Whatever loads they have been solved under before."""
     whole = bk.run(COMPRESSED)

@@ -67,6 +67,7 @@ def test_effectivity(name: str, word: str, exponent: float) -> None:
     assert 0.4 <= solution.estimated_error / cauchy_error(solution) <= 3.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("word", ["linear", pytest.param("quadratic", marks=pytest.mark.slow)])
 def test_a_coarse_clamped_side_of_a_fine_mesh_is_seen(word: str) -> None:
     """All elements but those of the foot are cut: displacements know little of the error that is left."""

@@ -97,7 +97,7 @@ def test_the_estimates_are_near_the_errors(name: str) -> None:
 
 
 @pytest.mark.parametrize("degree", [1, 2])
-@pytest.mark.parametrize("name", slow_except(EXAMPLES, "paper-1", "wavy-obstacle"))
+@pytest.mark.parametrize("name", slow_except(EXAMPLES, "wavy-obstacle"))
 def test_low_degrees_estimate_contact_tractions(name: str, degree: int) -> None:
     """On uniform meshes nearly all of the error lies where the status changes."""
     mesh = bk.MeshOptions(elements=80)
@@ -141,7 +141,7 @@ def test_a_mesh_is_not_planned_as_the_last_where_places_of_change_still_move() -
     assert len(risen("paper-1", 1e-5)) == 4
 
 
-@pytest.mark.parametrize("name", ["paper-1", "paper-2"])
+@pytest.mark.parametrize("name", slow_except(["paper-1", "paper-2"], "paper-1"))
 def test_a_mesh_that_another_one_will_follow_is_as_coarse_as_that_one_allows(name: str) -> None:
     """Its degree is that from which three more suffice, and elements are divided for the places of change alone."""
     *_, third, last = risen(name, 1e-5)
@@ -489,6 +489,7 @@ def test_a_bolt_in_a_plate_needs_few_elements_for_five_digits() -> None:
     assert [each.s for each in rough.transitions] == pytest.approx([each.s for each in fine.transitions], abs=3e-6)
 
 
+@pytest.mark.slow
 def test_copies_have_one_mesh_as_fine_as_the_worst_needs() -> None:
     """Two feet on a base that a wall holds at one end: the pressures of the feet differ, and their mesh is one."""
     material = bk.Material(youngs_modulus=1.0, poisson_ratio=0.3)

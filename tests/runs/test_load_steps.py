@@ -242,14 +242,13 @@ def test_friction_falls_with_the_slip() -> None:
     check_balance(loading, 1e-11)
 
 
-def test_friction_grows_with_the_speed() -> None:
+@pytest.mark.parametrize("duration", slow_except([1.0, 0.5], 0.5))
+def test_friction_grows_with_the_speed(duration: float) -> None:
     """Twice as fast, all nodes sliding: the coefficients are those of the law at the speed of the top."""
-    law = bk.RateStrengthening(0.1, 0.02, 0.01)
-    for duration in (1.0, 0.5):
-        last = sliding(law, 10, duration).steps[-1]
-        speed = 0.05 / duration  # of the top, and of every node of a block that slides as a whole
-        expected = 0.1 + 0.02 * np.log1p(speed / 0.01)
-        assert -last.force_tangential / last.force_normal == pytest.approx(expected, rel=1e-9)
+    last = sliding(bk.RateStrengthening(0.1, 0.02, 0.01), 10, duration).steps[-1]
+    speed = 0.05 / duration  # of the top, and of every node of a block that slides as a whole
+    expected = 0.1 + 0.02 * np.log1p(speed / 0.01)
+    assert -last.force_tangential / last.force_normal == pytest.approx(expected, rel=1e-9)
 
 
 def test_a_bound_in_the_result_is_that_of_the_slip() -> None:
@@ -325,6 +324,7 @@ def test_work_adds_up() -> None:
     assert StepWork(1.0, 2.0, 3.0) + StepWork(0.5, 0.25, 0.125) == StepWork(1.5, 2.25, 3.125)
 
 
+@pytest.mark.slow
 def test_laws_that_depend_on_slip_share_what_does_not_depend_on_the_law(monkeypatch: pytest.MonkeyPatch) -> None:
     """Each law of an increment is another problem; the body is asked for little more than the counted solves."""
     from bemkit.contact.dense_body import DenseBody

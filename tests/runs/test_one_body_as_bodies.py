@@ -117,7 +117,18 @@ def boundary_of(solution: Any) -> Iterator[FloatArray]:
 
 
 @pytest.mark.parametrize(
-    "feature", slow_only(FEATURES, "single load", "start values", "probe", "scenes in turn", "load factors", "accuracy")
+    "feature",
+    slow_only(
+        FEATURES,
+        "single load",
+        "start values",
+        "probe",
+        "scenes in turn",
+        "load factors",
+        "accuracy",
+        "hp",
+        "slip weakening",
+    ),
 )
 def test_both_forms_have_one_answer(feature: str) -> None:
     scene, solve = FEATURES[feature]

@@ -367,7 +367,7 @@ def test_load_factors_scale_motions_and_forces() -> None:
     assert half.rigid["punch"].force_y == pytest.approx(-0.5 * FORCE, rel=1e-10)
 
 
-@pytest.mark.parametrize("scale", [1e-9, 1e9])
+@pytest.mark.parametrize("scale", slow_except([1e-9, 1e9], 1e9))
 def test_forces_and_motions_set_the_units(scale: float) -> None:
     """No other load is there to measure by: results are those of another unit of force."""
     for changes, name in (({"force_y": -scale * FORCE}, "y"), ({"force_y": None, "y": -scale * FORCE}, "force_y")):

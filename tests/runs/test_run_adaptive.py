@@ -80,6 +80,7 @@ def test_later_meshes_start_from_earlier_solutions() -> None:
     np.testing.assert_array_equal(later[-1].contact.status, cold.contact.status)
 
 
+@pytest.mark.slow
 def test_the_wavy_obstacle_has_its_closed_form() -> None:
     solutions = run_adaptive(dataclasses.replace(wavy(), mesh=bk.MeshOptions(accuracy=1e-4)))
     assert len(solutions) <= 5

@@ -33,6 +33,7 @@ from bemkit.scene.toml import load_scene, with_overrides
 from bemkit.solvers.active_sets import NodeStatus
 from bemkit.solvers.base import Status
 from tests.scenes import paper
+from tests.slow import slow_only
 from tests.solutions import changed as changed_solution
 
 WARNINGS = (
@@ -99,7 +100,10 @@ def test_large_strains_of_one_body_of_several_are_warned_of() -> None:
     assert [words.split(":")[0] for words in doubts] == [f"Body '{name}'"]
 
 
-@pytest.mark.parametrize(("elements", "approach", "is_unseen"), [(8, 2e-4, True), (8, -2e-4, False), (96, 2e-2, False)])
+@pytest.mark.parametrize(
+    ("elements", "approach", "is_unseen"),
+    slow_only([(8, 2e-4, True), (8, -2e-4, False), (96, 2e-2, False)], (96, 2e-2, False)),
+)
 def test_contact_that_falls_between_coarse_nodes_ends_by_name(elements: int, approach: float, is_unseen: bool) -> None:
     scene = with_overrides(load_scene("two-cylinders"), elements=elements, discretisation="linear")
     assert isinstance(scene, bk.Scene)

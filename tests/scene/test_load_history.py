@@ -80,6 +80,7 @@ def test_static_and_incremental_law_differ_by_a_factor_of_two_under_a_cylinder()
     assert incremental.linear_solves <= 8 * len(factors)
 
 
+@pytest.mark.slow
 def test_static_and_incremental_law_differ_on_a_coarse_mesh_too() -> None:
     static = bk.run(cylinder(0.03, (1.0,)))
     incremental = bk.run(cylinder(0.03, tuple(float(factor) for factor in (np.arange(1, 9) / 8.0) ** 2)))

@@ -45,7 +45,7 @@ DRIVEN = pytest.mark.parametrize("driver", DRIVERS, ids=lambda driver: type(driv
 @pytest.mark.parametrize(
     ("discretisation", "distance"),
     [
-        (bk.Galerkin(1), 1e-12),
+        pytest.param(bk.Galerkin(1), 1e-12, marks=pytest.mark.slow),
         pytest.param(bk.Galerkin(2), 1e-3, marks=pytest.mark.slow),
         (bk.ConstantCollocation(), 0.3),
     ],

@@ -79,7 +79,7 @@ def test_a_solution_is_its_own_start(driver):
 
 
 @pytest.mark.parametrize("driver", [*DRIVERS, LemkePivoting()], ids=repr)
-@pytest.mark.parametrize("status", list(NodeStatus), ids=lambda status: status.name)
+@pytest.mark.parametrize("status", slow_except(NodeStatus, *list(NodeStatus)[::2]), ids=lambda status: status.name)
 def test_a_floating_block_from_any_start(driver, status):
     """All open, all sliding: the tangent is singular, springs help, and the result is right."""
     problem = block_problem(Coulomb(0.5), is_held_sideways=False, push=0.1)
@@ -89,7 +89,7 @@ def test_a_floating_block_from_any_start(driver, status):
 
 
 @pytest.mark.parametrize("driver", DRIVERS, ids=repr)
-@pytest.mark.parametrize("distance", slow_except([0.1, 1e3, 1e6], 0.1, 1e6))
+@pytest.mark.parametrize("distance", slow_except([0.1, 1e3, 1e6], 1e6))
 def test_a_block_far_from_its_foundation_falls_and_lands(driver, distance):
     landed = plain_solution(0, driver)
     body = block_body()
@@ -207,6 +207,7 @@ def test_a_path_from_nearby_statuses_is_short_and_leads_to_a_solution(seed):
         assert_solves(problem, opened.state, 0.5)
 
 
+@pytest.mark.slow
 def test_most_paths_from_nearby_statuses_end():
     assert np.mean([path_from_open_nodes(seed)[2].state is not None for seed in range(40)]) > 0.9
 

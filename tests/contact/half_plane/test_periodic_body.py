@@ -129,6 +129,7 @@ def test_units_and_places_change_nothing() -> None:
     np.testing.assert_allclose(1e-6 * plain.contact.sigma_n, other.contact.sigma_n, rtol=0.0, atol=1e-9 * 1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("travel", slow_except([1e3, 1e5], 1e5))
 def test_a_gap_far_larger_than_the_deformation_changes_nothing(travel: float) -> None:
     rough = replace(bk.load_scene("rough-surface"), mesh=bk.MeshOptions(elements=128))

@@ -104,7 +104,7 @@ def test_tied_blocks_are_one_block(is_dense):
 
 
 @pytest.mark.parametrize("friction_coefficient", [0.3, 0.6])
-@pytest.mark.parametrize("moduli", [(1.0, 1.0), (1.0, 3.0, 0.5)])
+@pytest.mark.parametrize("moduli", [pytest.param((1.0, 1.0), marks=pytest.mark.slow), (1.0, 3.0, 0.5)])
 def test_drivers_agree_on_blocks_between_others(moduli, friction_coefficient):
     body = row_of_blocks(moduli, lift=0.01)
     problem = ContactProblem(body, np.full(body.n_contact, -0.2), Coulomb(friction_coefficient))

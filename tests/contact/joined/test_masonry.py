@@ -97,6 +97,7 @@ def test_the_one_block_that_slips_out_is_named():
     assert "'block 4'" in lifted.description
 
 
+@pytest.mark.slow
 def test_a_leaning_wall_stands_in_steps_up_to_its_limit():
     """On ground that slopes by q the wall slides at q = 0.6; a jump to 98 % of that stalls, four steps get there."""
     upright, sideways = (wall(5, 4, 4, gravity=gravity, is_dense=False) for gravity in ((0.0, -1e-4), (1e-4, 0.0)))

@@ -11,7 +11,7 @@ import bemkit as bk
 from bemkit.contact.mortar.facing import is_non_mortar
 from bemkit.contact.mortar.sides import ContactSide
 from bemkit.model.placed import place
-from tests.slow import slow_only
+from tests.slow import slow_except, slow_only
 
 FRICTION = bk.Coulomb(0.3)
 DISC, RING = (tuple(f"{side}-{k}" for k in range(1, 5)) for side in ("arc", "inner"))
@@ -35,7 +35,7 @@ def press_fit(n_elements: int, symmetry: bk.Symmetry | None, law: bk.FrictionLaw
     )
 
 
-@pytest.mark.parametrize("law", [FRICTION, bk.Frictionless()])
+@pytest.mark.parametrize("law", slow_except([FRICTION, bk.Frictionless()], FRICTION))
 @pytest.mark.parametrize("n_elements", slow_only([80, 160, 320], 160, 320))
 def test_the_pressure_of_a_press_fit_is_uniform(n_elements: int, law: bk.FrictionLaw) -> None:
     solution = bk.run(press_fit(n_elements, bk.Symmetry(x=0.0, y=0.0), law))

@@ -179,6 +179,7 @@ def test_groups_are_short_where_conditions_change_and_their_number_hardly_grows(
     assert counts[1] < 2.5 * counts[0]
 
 
+@pytest.mark.slow
 def test_there_are_few_groups_however_often_conditions_change() -> None:
     mesh = mesh_of("rectangle", 8000)
     assert ElementGroups(mesh, np.arange(8000) // 2 % 2).middle.size <= 1200

@@ -86,7 +86,7 @@ def assert_same(solution: Solution, length: float = 1.0, stress: float = 1.0, at
     assert solution.energy / (stress * length**2) == pytest.approx(reference.energy, rel=1e-8)
 
 
-@pytest.mark.parametrize("name", slow_except(CHANGES, "nanometres", "everything"))
+@pytest.mark.parametrize("name", slow_except(CHANGES, "everything"))
 def test_same_statuses_after_the_same_iterations(name: str) -> None:
     change = CHANGES[name]
     solution = bk.run(change.apply(assembly()))

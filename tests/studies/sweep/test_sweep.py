@@ -177,6 +177,7 @@ def test_rows_are_on_disk_and_more_can_be_added(tmp_path: Path) -> None:
         bk.sweep(SCENE, {FRICTION: [0.2]}, file=path, cold=True)
 
 
+@pytest.mark.slow
 def test_executors_give_the_same_rows() -> None:
     values = {FRICTION: [0.1, 0.3], "material.poisson_ratio": [0.0, 0.3]}
     with ThreadPoolExecutor(2) as executor:
