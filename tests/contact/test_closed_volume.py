@@ -18,7 +18,7 @@ from bemkit.model.model import build_model
 from bemkit.model.prepared import prepare
 from bemkit.solvers.fallbacks import Springs
 from bemkit.testing import check_body, check_solution
-from tests.slow import slow_except
+from tests.slow import slow_except, slow_only
 
 DISCRETISATIONS = (bk.Galerkin(1), bk.Galerkin(2), bk.ConstantCollocation())
 MOVED_DOWN = bk.PrescribedDisplacement(0.0, -1e-2)

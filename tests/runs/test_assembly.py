@@ -206,6 +206,7 @@ def test_two_cylinders_are_those_of_hertz() -> None:
     assert 0.0 < solution.estimated_error < 3e-3
 
 
+@pytest.mark.slow
 def test_meshes_follow_the_solution_on_both_sides() -> None:
     assembly = replace(bk.load_scene("two-cylinders"), mesh=bk.MeshOptions(accuracy=0.02))
     solutions = run_adaptive(assembly)

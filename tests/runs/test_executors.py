@@ -73,6 +73,7 @@ def test_meshes_that_follow_the_solution_give_the_same(processes: Executor) -> N
     assert_same(bk.run(pin), bk.run(pin, executor=processes))
 
 
+@pytest.mark.slow
 def test_load_steps_ask_nothing_of_the_executor() -> None:
     steps = coarse(load_factors=(0.5, 1.0))
     counted = Counted()

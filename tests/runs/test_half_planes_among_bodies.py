@@ -136,6 +136,7 @@ def test_a_disc_on_a_half_plane_meets_hertz() -> None:
     assert peak == pytest.approx(2.0 * solution.force_normal / (np.pi * expected), rel=1e-4)
 
 
+@pytest.mark.slow
 def test_stiff_blocks_on_each_other_are_a_punch_on_a_half_plane() -> None:
     stiff, top = bk.Material(1e4, 0.3), bk.Part("top", bk.Traction(y=-1e-3), ("top",))
     block = bk.Body(name="lower", shape=bk.Rectangle(1.0, 0.5), material=stiff, placement=bk.Placement((-0.5, 0.0)))

@@ -68,6 +68,7 @@ def test_over_a_closed_cycle_friction_takes_what_the_push_gives(
     assert cycle.external_work > one.elastic_energy
 
 
+@pytest.mark.slow
 def test_collocation_balances_up_to_its_error() -> None:
     check_balance(solved(replace(LOOP, discretisation=bk.ConstantCollocation())), 3e-2)  # of 40 constant elements
 

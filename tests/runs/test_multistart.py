@@ -57,6 +57,7 @@ def test_a_probe_takes_the_mesh_that_an_accuracy_needs() -> None:
     assert found.mesh.n_elements == bk.run(scene).mesh.n_elements
 
 
+@pytest.mark.slow
 def test_a_start_chooses_the_solution_of_the_first_of_adaptive_meshes() -> None:
     scene = dataclasses.replace(leg(3.0), mesh=bk.MeshOptions(accuracy=0.1))
     for start in distinct_solutions(leg(3.0)):

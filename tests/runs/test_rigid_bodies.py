@@ -272,6 +272,7 @@ def test_loads_that_contact_cannot_hold_name_the_rigid_body(loads: dict[str, flo
         bk.run(driven(**loads))
 
 
+@pytest.mark.slow
 def test_shapes_of_one_circle_press_alike() -> None:
     """A polygon with 400 sides and a spline through 100 points, to their accuracy; a level set to round-off."""
     centre, radius = np.array([1.0, 2.0]), 1.0

@@ -57,6 +57,7 @@ def test_everything_is_written_and_the_tables_are_printed(tmp_path: Path) -> Non
     assert picture[..., :3].std() > 0.05  # not blank
 
 
+@pytest.mark.slow
 def test_the_word_errors_may_be_left_out_and_the_other_commands_stay() -> None:
     short, long = call(*FAST, "--csv", "-"), call("study", "errors", *FAST[1:], "--csv", "-")
     names = [[line["energy"] for line in csv.DictReader(result.output.splitlines())] for result in (short, long)]
