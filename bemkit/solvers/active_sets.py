@@ -8,6 +8,7 @@ import numpy as np
 from bemkit.arrays import BoolArray, FloatArray, IntArray
 from bemkit.contact.conditions import LinearConditions, augmented, of_statuses, slip, stick
 from bemkit.contact.problem import ContactProblem, ContactState
+from bemkit.errors import InputError
 
 _FAR = float(np.finfo(float).max)
 
@@ -134,7 +135,7 @@ class ProjectionEquations:
         follows = problem.body.tangent_follows
         if follows.any():
             along_obstacle = np.where(follows, problem.given_direction(state) * _FAR, along_obstacle)
-        is_closed = positive_part_derivative(towards_obstacle)
+        is_closed = positive_part_derivative(towards_obstacle) > 0.0
         if touches is not None:
             is_closed |= touches
         predicted_sigma_n = -positive_part(towards_obstacle)
@@ -143,11 +144,11 @@ class ProjectionEquations:
             slope = problem.friction_slope(predicted_sigma_n, is_closed)
         else:
             bound, slope = self.given_bound, np.zeros_like(self.given_bound)
-        direction = clip_to_bound_derivative(along_obstacle, bound)
+        _, direction = clip_to_bound_derivative(along_obstacle, bound)
         value = state.traction.copy()
         value[:, 0] -= predicted_sigma_n
         value[:, 1] += clip_to_bound(along_obstacle, bound)
-        sets = ActiveSets(is_closed, direction)
+        sets = ActiveSets(is_closed, direction.astype(np.intp))
         return Residual(state, sets, bound, slope, predicted_sigma_n, value)
 
     def linearised(self, residual: Residual, sets: ActiveSets) -> LinearConditions:
@@ -203,24 +204,104 @@ def coheres(problem: ContactProblem, state: ContactState) -> BoolArray:
 
 
 def positive_part(a: FloatArray) -> FloatArray:
-    """Return ``[a]_+``, the projection of an array onto the non-negative numbers: equation (13) of the paper."""
+    """Project onto the non-negative numbers: ``[a]_+``.
+
+    Parameters
+    ----------
+    a : (...) array
+
+    Returns
+    -------
+    (...) array
+        `a` where ``a > 0``, zero elsewhere; equation (13) of the paper.
+    """
     return np.maximum(a, 0.0)
 
 
-def positive_part_derivative(a: FloatArray) -> BoolArray:
-    """Return one element of the generalised derivative of `positive_part`: one where ``a > 0``, zero at ``a = 0``."""
-    return np.asarray(a > 0.0)
+def positive_part_derivative(a: FloatArray) -> FloatArray:
+    """Return one element of the generalised derivative of `positive_part`.
 
+    Parameters
+    ----------
+    a : (...) array
 
-def clip_to_bound(x: FloatArray, bound: FloatArray) -> FloatArray:
-    """Return ``[x]_alpha``, the projection (n,) onto the interval of half width `bound` (n,): equation (14)."""
-    return np.clip(x, -bound, bound)
-
-
-def clip_to_bound_derivative(x: FloatArray, bound: FloatArray) -> IntArray:
-    """Return one element of the generalised derivative of `clip_to_bound` with respect to the bound, (n,).
-
-    It is the slip direction, the sign of `x` where ``|x| > bound``, and zero elsewhere. The derivative with respect to
-    `x` is zero where a node slips, and one elsewhere.
+    Returns
+    -------
+    (...) array
+        One where ``a > 0``, zero elsewhere (at ``a = 0`` the node counts as separated).
     """
-    return np.where(np.abs(x) > bound, np.copysign(1.0, x), 0.0).astype(np.intp)
+    return np.where(a > 0.0, 1.0, 0.0)
+
+
+def clip_to_bound(x: FloatArray, bound: FloatArray | float) -> FloatArray:
+    """Project onto the ball of radius `bound`: ``[x]_alpha``.
+
+    Parameters
+    ----------
+    x : (n,) array or (n, d) array
+        Tangential components of a plane problem, or one vector in each row.
+    bound : (n,) array or float
+        Radii, not negative.
+
+    Returns
+    -------
+    array of the shape of `x`
+        `x` where ``|x| <= bound``, otherwise ``bound x / |x|``; equation (14) of the paper, and zero for ``bound = 0``.
+
+    Raises
+    ------
+    ValueError
+        If a bound is negative or `x` has more than two axes.
+    """
+    bound = _checked_bound(x, bound)
+    if x.ndim == 1:
+        return np.clip(x, -bound, bound)
+    length = np.hypot.reduce(x, axis=1)
+    is_outside = length > bound
+    factor = np.where(is_outside, bound / np.where(is_outside, length, 1.0), 1.0)
+    return x * factor[:, None]
+
+
+def clip_to_bound_derivative(x: FloatArray, bound: FloatArray | float) -> tuple[FloatArray, FloatArray]:
+    """Return one element of the generalised derivative of `clip_to_bound` with respect to `x` and `bound`.
+
+    Parameters
+    ----------
+    x : (n,) array or (n, d) array
+    bound : (n,) array or float
+
+    Returns
+    -------
+    by_x : (n,) array or (n, d, d) array
+        One (the unit matrix) where ``|x| <= bound``, for sticking nodes; otherwise ``bound/|x| (I - x x^T/|x|^2)``,
+        which is zero for (n,) components.
+    by_bound : (n,) array or (n, d) array
+        Zero for sticking nodes, otherwise ``x/|x|``.
+
+    Raises
+    ------
+    ValueError
+        See `clip_to_bound`.
+    """
+    bound = _checked_bound(x, bound)
+    if x.ndim == 1:
+        is_outside = np.abs(x) > bound
+        return np.where(is_outside, 0.0, 1.0), np.where(is_outside, np.copysign(1.0, x), 0.0)
+    length = np.hypot.reduce(x, axis=1)
+    is_outside = length > bound
+    safe_length = np.where(is_outside, length, 1.0)
+    direction = np.where(is_outside[:, None], x / safe_length[:, None], 0.0)
+    unit = np.eye(x.shape[1])
+    outside = (bound / safe_length)[:, None, None] * (unit - direction[:, :, None] * direction[:, None, :])
+    return np.where(is_outside[:, None, None], outside, unit), direction
+
+
+def _checked_bound(x: FloatArray, bound: FloatArray | float) -> FloatArray:
+    if x.ndim not in (1, 2):
+        raise InputError(f"x has {x.ndim} axes; give (n,) components or (n, d) vectors")
+    radii = np.asarray(bound, dtype=float)
+    if radii.shape != x.shape[:1]:
+        radii = np.broadcast_to(radii, x.shape[:1])
+    if np.any(radii < 0.0):
+        raise InputError(f"bound has the negative value {radii.min():g}; a friction bound is zero or positive")
+    return radii

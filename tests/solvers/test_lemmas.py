@@ -1,7 +1,8 @@
 """Lemmas 1 to 4 and Theorem 1 of the paper on `ProjectionEquations.evaluate`, the function that solvers call.
 
-All solutions of (15) follow from one number a node, ``z = rho (u_n - g) - sigma_n``, and those of (16) from another:
-the tests cover all of them and need no projection of their own.
+All solutions of (15) follow from one number a node, ``z = rho (u_n - g) - sigma_n``, and those of (16) from one number
+or vector: the tests cover all of them and need no projection of their own. A plane body has one tangent; the lemmas for
+tangential vectors are tested on `clip_to_bound`, which `evaluate` calls.
 """
 
 import numpy as np
@@ -20,7 +21,7 @@ from bemkit.solvers.base import solve
 from bemkit.solvers.ssn import SemismoothNewton
 from tests.handmade import block_problem, random_body
 from tests.scenes import small_paper_scene
-from tests.solvers.test_projection import N, bounds, numbers, positive, vector
+from tests.solvers.test_projection import N, bounds, numbers, pairs, positive, vector
 
 BODY = random_body(np.random.default_rng(0), N)
 LAWS = st.one_of(st.builds(Coulomb, st.floats(0.0, 3.0)), st.builds(Tresca, st.floats(0.0, 50.0)))
@@ -86,6 +87,39 @@ def test_lemmas_3_and_4(z_n, z_t, gap, rho, law, step_n, step_t):
     check_lemmas_3_and_4(z_n, z_t, gap, rho, law, step_n, step_t)
 
 
+def vector_solution(z, bound):
+    """Return slip times rho and traction (N, 2) with given ``z = rho u_t - sigma_t`` that satisfy (7) and (8)."""
+    length = np.hypot(*z.T)
+    slips = length > bound
+    unit = z / np.where(slips, length, 1.0)[:, None]
+    traction = np.where(slips[:, None], -bound[:, None] * unit, -z)
+    return z + traction, traction
+
+
+def check_vectors(z, bound, step, clip=clip_to_bound):
+    """(16), and (36) at each node, for tangential vectors."""
+    slip, traction = vector_solution(z, bound)
+    assert np.abs(traction + clip(slip - traction, bound)).max() <= ROUND_OFF
+    change = -clip(z + step, bound) - traction
+    assert np.all(np.sum(-change * step, axis=1) >= np.sum(change**2, axis=1) - SQUARED)
+
+
+VECTORS = {"z": pairs(numbers), "bound": vector(bounds), "step": pairs(st.one_of(st.just(0.0), numbers))}
+
+
+@given(**VECTORS)
+def test_lemmas_2_and_4_for_vectors(z, bound, step):
+    check_vectors(z, bound, step)
+
+
+@given(z=pairs(numbers), bound=vector(bounds), error=pairs(st.sampled_from([-1.0, 0.0, 1e-3])))
+def test_lemma_2_backward_for_vectors(z, bound, error):
+    """With z kept, another traction leaves its difference."""
+    slip, traction = vector_solution(z, bound)
+    value = traction + error + clip_to_bound((slip + error) - (traction + error), bound)
+    assert np.allclose(value, error, atol=ROUND_OFF)
+
+
 WRONG_PARTS = {
     "identity": lambda a: a,
     "absolute value": np.abs,
@@ -101,6 +135,10 @@ WRONG_CLIPS = {
     "0.999 bound": lambda x, bound: np.clip(x, -0.999 * bound, 0.999 * bound),
     "slope inside": lambda x, bound: np.clip(0.5 * x, -bound, bound),
     "zero": lambda x, bound: np.zeros_like(x),
+}
+WRONG_BALLS = WRONG_CLIPS | {
+    "square": lambda x, bound: np.clip(x, -bound, bound),
+    "direction": lambda x, bound: np.minimum(np.hypot(*x.T)[:, None], bound) * np.array([1.0, 0.0]),
 }
 CHECKS = {
     "lemmas 1 and 2": (check_lemmas_1_and_2, DRAWN),
@@ -128,11 +166,19 @@ def test_each_pair_of_lemmas_by_itself_catches_each_wrong_projection(lemmas, nam
     fails(lambda **values: check(**values), drawn)
 
 
+@pytest.mark.parametrize("name", WRONG_BALLS)
+def test_the_lemmas_for_vectors_catch_each_wrong_projection(name):
+    def wrong(x, bound):
+        return WRONG_BALLS[name](x, bound[:, None])
+
+    fails(lambda z, bound, step: check_vectors(z, bound, step, wrong), VECTORS)
+
+
 @given(bounds, bounds)
 def test_lemma_4_fails_with_two_bounds(bound, other):
-    """Equal arguments outside both intervals: the left side is zero, the right one the squared difference of bounds."""
-    z = np.array([2.0 * (bound + other) + 1.0])
-    difference = clip_to_bound(z, np.array([other])) - clip_to_bound(z, np.array([bound]))
+    """Equal arguments outside both balls: the left side is zero, the right side is the squared difference of bounds."""
+    z = np.array([[2.0 * (bound + other) + 1.0, 0.0]])
+    difference = clip_to_bound(z, other) - clip_to_bound(z, bound)
     left, right = (difference * (z - z)).sum(), (difference * difference).sum()
     assert left == 0.0
     assert right == pytest.approx((bound - other) ** 2)

@@ -22,9 +22,9 @@ PROBLEM = block_problem(Coulomb(0.5), n=6)
 
 WRONG = {
     "positive_part": lambda a: -positive_part(a),
-    "positive_part_derivative": lambda a: ~positive_part_derivative(a),
+    "positive_part_derivative": lambda a: 1.0 - positive_part_derivative(a),
     "clip_to_bound": lambda x, bound: -clip_to_bound(x, bound),
-    "clip_to_bound_derivative": lambda x, bound: -clip_to_bound_derivative(x, bound),
+    "clip_to_bound_derivative": lambda x, bound: tuple(-part for part in clip_to_bound_derivative(x, bound)),
 }
 
 
