@@ -54,12 +54,12 @@ def test_energy_of_a_clamped_angle(word: str, exponent: float, order: tuple[floa
 @pytest.mark.parametrize("example", [1, 2])
 @pytest.mark.parametrize(
     ("word", "accuracy", "energy_order", "traction_order"),
-    # at least nearly those of smooth solutions, 3 and 5 in the energy, 1.5 and 2 in the tractions; on short sequences
-    # errors fall faster (up to 4.9 and 6.0) while meshes find the points where the status changes
-    [("linear", 8e-4, 2.5, 1.4), ("quadratic", 1e-4, 3.0, 1.7)],
+    # orders of smooth solutions: 3 and 5 in the energy, 1.5 and 2 in the tractions; these are seen on short sequences,
+    # in which errors fall faster while meshes find the points where the status changes
+    [("linear", 8e-4, (2.5, 5.5), (1.4, 3.5)), ("quadratic", 1e-4, (3.0, 7.0), (1.7, 6.5))],
 )
 def test_adapted_meshes_keep_the_orders_of_smooth_solutions(
-    example: int, word: str, accuracy: float, energy_order: float, traction_order: float
+    example: int, word: str, accuracy: float, energy_order: tuple[float, float], traction_order: tuple[float, float]
 ) -> None:
     solutions = run_adaptive(paper(example, ELEMENTS[word], bk.MeshOptions(accuracy=accuracy)))
     reference = find_reference(bk.load_scene(f"paper-{example}"))  # energies to 1e-11; those of finite elements to 3e-8
@@ -67,8 +67,8 @@ def test_adapted_meshes_keep_the_orders_of_smooth_solutions(
     sizes = [solution.mesh.n_elements for solution in solutions]
     energies = [abs(solution.energy / reference.answer.energy - 1.0) for solution in solutions]
     tractions = [contact_error(solution, example, "sigma_n", "sigma_t") for solution in solutions]
-    assert slope(sizes, energies) >= energy_order
-    assert slope(sizes, tractions) >= traction_order
+    assert energy_order[0] <= slope(sizes, energies) <= energy_order[1]
+    assert traction_order[0] <= slope(sizes, tractions) <= traction_order[1]
 
 
 def bending(points: FloatArray) -> FloatArray:
