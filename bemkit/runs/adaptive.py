@@ -170,6 +170,7 @@ def _refined(first: Level, refinement: _Refinement, options: MeshOptions) -> tup
             obstacle = f"{level.n_elements} elements cannot be solved ({error})"
             break
         solutions.append(solution)
+        level = level.with_sides_of(solution)
         now = time.perf_counter()
         is_missed = solution.status is Status.MISSED_CONTACT
         if sum(each.status is Status.MISSED_CONTACT for each in solutions) > _MOST_MISSED:

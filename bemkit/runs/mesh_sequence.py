@@ -98,6 +98,13 @@ class Level:
             return Galerkin(min(degree, LARGEST_DEGREE))
         return Galerkin(2) if degree == 2 else scene
 
+    def with_sides_of(self, solution: Solution) -> Level:
+        """Return the level with multipliers on the sides that had them in a solution.
+
+        Errors of successive meshes are then of one sequence.
+        """
+        return replace(self, asked=with_sides_of(self.asked, solution))
+
     @property
     def n_elements(self) -> int:
         """Number of elements of all bodies."""
@@ -127,6 +134,17 @@ class Level:
         for key, values in zip(self.keys.values(), bodies, strict=True):
             worst[key] = np.maximum(worst.get(key, values), values)
         return [worst[key] for key in range(len(self.partitions))]
+
+
+def with_sides_of(scene: Scene, solution: Solution) -> Scene:
+    """Return a scene whose listed contacts have their multipliers on the sides that had them in a solution."""
+    contacts = []
+    for pair in scene.contacts:
+        first = solution.contact_sides[pair.name][0]
+        sides = [side for side, place in zip(pair.elastic_sides, pair.elastic_parts, strict=True) if place == first]
+        is_open = pair.rigid_body is None and pair.multipliers_on is None
+        contacts.append(replace(pair, multipliers_on=sides[0]) if is_open else pair)
+    return replace(scene, contacts=tuple(contacts))
 
 
 def _divided_bodies(asked: Scene) -> tuple[dict[str, int], list[BodyScene], tuple[tuple[str, ...], ...]]:

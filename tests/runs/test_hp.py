@@ -471,6 +471,25 @@ def test_degrees_of_two_bodies_rise_together(accuracy: float, law: bk.FrictionLa
     assert np.abs(both.contact.sigma_n[inside] - exact).max() <= 0.02 * size  # both between nodes
 
 
+def test_all_meshes_have_the_multipliers_on_one_side() -> None:
+    """Of two half discs of nearly the same radius, the finer one of which changes from mesh to mesh."""
+    material, cut = bk.Material(1.0, 0.3), ("start", "end")
+    held = bk.Part("held", bk.Clamped(), cut)
+    pressed = bk.Part("pressed", bk.PrescribedDisplacement(0.0, -0.04), cut)
+    shape = bk.Sector(1.02, 0.0, 180.0, (0.0, -1.02))
+    lower = bk.Body(name="lower", shape=shape, material=material, parts=(held,))
+    shape = bk.Sector(1.0, 180.0, 360.0, (0.0, 1.0))
+    upper = bk.Body(name="upper", shape=shape, material=material, parts=(pressed,))
+    pair = bk.ContactPair(("lower.arc", "upper.arc"))
+    scene = bk.Scene(
+        title="two discs", bodies=(lower, upper), contacts=(pair,), law=bk.Frictionless(),
+        discretisation=bk.Galerkin(2), mesh=bk.MeshOptions(accuracy=1e-2, rising_degrees=True),
+    )  # fmt: skip
+    solutions = run_adaptive(scene)
+    assert len(solutions) > 2
+    assert {solution.contact_sides[pair.name][0].body for solution in solutions} == {"upper"}
+
+
 @pytest.mark.slow
 def test_a_bolt_in_a_plate_needs_few_elements_for_five_digits() -> None:
     """Curved sides with friction: places and energies settle faster than the accuracy asked for."""
