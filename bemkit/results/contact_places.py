@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,13 +14,25 @@ from bemkit.contact.body import SlipHistory
 from bemkit.geometry.local_values import element_degrees
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.vectors import norms
-from bemkit.results.transitions import resolved_transitions, slip_reversals, unresolved_contacts, unrolled
-from bemkit.results.zone_ends import LYING_AT, Side, ZoneEnd, transition_error
+from bemkit.results.contact_table import ContactTable
+from bemkit.results.transitions import (
+    Transition,
+    find_transitions,
+    friction_across_gaps,
+    resolved_transitions,
+    slip_reversals,
+    unresolved_contacts,
+    unrolled,
+)
+from bemkit.results.zone_ends import LYING_AT, Side, ZoneEnd, reversal_error, transition_error
 from bemkit.scene.conditions import name_at_obstacle
 
 if TYPE_CHECKING:
     from bemkit.results.singular_corners import SingularCorner
     from bemkit.results.solved_scene import SolvedScene
+
+_ErrorAt = tuple[Transition, Callable[[ZoneEnd, int], tuple[float, float]]]
+"""A place, and what gives the squared error there and its length, in an element of a degree."""
 
 LARGEST_REACH = 0.15
 """Largest length of the elements at a singular point that are excluded as near it, relative to the contact. Longer ones
@@ -92,7 +104,12 @@ class ContactPlaces:
         for one, two, point, _ in self._edges:
             reach = max(_reach(side.mesh, side.elements_at(point), point) for side in (one, two))
             points.append((point, reach, min(one.length, two.length)))
-        return [(point, reach) for point, reach, length in points if reach <= LARGEST_REACH * length]
+        long = [point for point, reach, length in points if reach > LARGEST_REACH * length]  # on one of two sides
+        return [
+            (point, reach)
+            for point, reach, length in points
+            if all(np.linalg.norm(point - other) > LYING_AT * length for other in long)
+        ]
 
     def _is_near(self, points: FloatArray, *, with_ends: bool) -> BoolArray:
         """Return whether points (n, 2) are on the elements of a singular point, whose far ends may count."""
@@ -137,22 +154,33 @@ class ContactPlaces:
         return replace(motion, slip=motion.slip[rows], last_slip=motion.last_slip[rows])
 
     @cached_property
+    def _zones(self) -> list[tuple[ContactTable, tuple[Transition, ...]]]:
+        """The table with its transitions, and where friction acts across gaps that of its status there with its own."""
+        solution = self.solution
+        zones = [(solution.contact, solution.transitions)]
+        if solution.friction_bound is not None:
+            table = friction_across_gaps(solution.contact, solution.friction_bound)
+            if table.is_closed.any():
+                found = find_transitions(table)
+                zones.append((table, tuple(each for each in found if not each.is_of_contact)))
+        return zones
+
+    @cached_property
     def zone_ends(self) -> tuple[ZoneEnd, ...]:
         """Ends of zones of one status on all sides, missed and unresolved contact.
 
         See `resolved_transitions`, `unresolved_contacts` and `Solution.missed_contacts`.
         """
-        solution = self.solution
-        table, transitions = unrolled(solution.contact, solution.transitions)
-        resolved = resolved_transitions(table, transitions)
+        resolved = [each for zones in self._zones for each in resolved_transitions(*unrolled(*zones))]
         places = [(each.part, (each.x, each.y)) for each in resolved]
+        table, _ = self.solution.contact.unrolled
         places += [*unresolved_contacts(table, resolved), *self.missed().items()]
         return tuple(side.near(np.array(place)) for name, place in places for side in self.sides(name))
 
     @cached_property
     def reversals(self) -> tuple[ZoneEnd, ...]:
         """Reversals of slip without a resolved stick zone, on all sides; see `slip_reversals`."""
-        places = [reversal.place for reversal in slip_reversals(self.solution.contact)]
+        places = [reversal.place for table, _ in self._zones for reversal in slip_reversals(table)]
         return tuple(side.near(np.array([place.x, place.y])) for place in places for side in self.sides(place.part))
 
     @cached_property
@@ -234,24 +262,33 @@ class ContactPlaces:
 
         The error has about the wave number 2 / l at the length l on which it changes its sign.
         """
-        solution, traction, energy = self.solution, 0.0, 0.0
-        table, transitions = unrolled(solution.contact, solution.transitions)
-        tractions = sticking = [table.sigma_n, table.sigma_t]
-        if solution.friction_bound is not None:  # how far friction is below its bound
-            sticking = [solution.friction_bound[solution.contact.unrolled[1]] - np.abs(table.sigma_t)]
-        for transition in transitions:
-            is_of_friction = "separated" not in (transition.from_status, transition.to_status)
-            fields = sticking if is_of_friction else tractions
-            for k, side in enumerate(self.sides(transition.part)):
-                end = side.near(np.array([transition.x, transition.y]))
-                if end.element in self._counted[side.body]:
-                    degree = int(self._degrees[side.body][end.element])
-                    squared, length = transition_error(table, fields, transition, transitions, end, degree)
-                    plane_modulus = solution.bodies[side.body].scene.material.plane_modulus
-                    energy += 0.5 * squared * length / plane_modulus
-                    if k == 0:  # the side with the nodes, for both
-                        traction += solution.n_sides(transition.part) * squared
+        traction, energy = 0.0, 0.0
+        for contact, changes in self._zones:
+            for transition, error_in in (*self._errors_at(contact, changes), *self._errors_at_reversals(contact)):
+                for k, side in enumerate(self.sides(transition.part)):
+                    end = side.near(np.array([transition.x, transition.y]))
+                    if end.element in self._counted[side.body]:
+                        squared, length = error_in(end, int(self._degrees[side.body][end.element]))
+                        plane_modulus = self.solution.bodies[side.body].scene.material.plane_modulus
+                        energy += 0.5 * squared * length / plane_modulus
+                        if k == 0:  # the side with the nodes, for both
+                            traction += self.solution.n_sides(transition.part) * squared
         return traction, energy
+
+    def _errors_at(self, contact: ContactTable, changes: tuple[Transition, ...]) -> Iterator[_ErrorAt]:
+        """Yield transitions, and what gives their `transition_error` in an element of a degree."""
+        table, transitions = unrolled(contact, changes)
+        tractions = sticking = [table.sigma_n, table.sigma_t]
+        if self.solution.friction_bound is not None:  # how far friction is below its bound
+            sticking = [self.solution.friction_bound[contact.unrolled[1]] - np.abs(table.sigma_t)]
+        for each in transitions:
+            fields = tractions if each.is_of_contact else sticking
+            yield each, partial(transition_error, table, fields, each, transitions)
+
+    def _errors_at_reversals(self, contact: ContactTable) -> Iterator[_ErrorAt]:
+        """Yield reversals of slip, and what gives their `reversal_error`."""
+        for reversal in slip_reversals(contact):
+            yield reversal.place, partial(reversal_error, reversal.jump)
 
 
 def _reach(mesh: BoundaryMesh, elements: IntArray, point: FloatArray) -> float:

@@ -39,6 +39,11 @@ class Transition:
     from_status: str
     to_status: str
 
+    @property
+    def is_of_contact(self) -> bool:
+        """Whether a zone of contact ends there, and not one of sticking only."""
+        return "separated" in (self.from_status, self.to_status)
+
     def as_dict(self) -> dict[str, str | float]:
         """Return the entries under the names of the results file."""
         return {name.removesuffix("_status"): value for name, value in vars(self).items()}
@@ -58,6 +63,8 @@ _POWERS = (1.3, 1.7)
 """Range of the power; sliding friction changes it from 3/2."""
 _MOST_STEPS = 20
 """Newton steps of the fit."""
+_AT_BOUND = 1e-9
+"""Round-off of friction at its bound."""
 _LEAST_ZONE = 0.5
 """Least length of a zone, relative to the zone that ends halfway between its own and the neighbouring nodes."""
 
@@ -100,6 +107,27 @@ def find_transitions(contact: ContactTable, slip: FloatArray | None = None) -> t
     at = zip(changes, parts, x.tolist(), y.tolist(), arc_lengths.tolist(), strict=True)
     found = [Transition(part, a, b, contact.wrapped(part, s), words[i], words[i + 1]) for i, part, a, b, s in at]
     return _in_order(contact, found) if contact.circumferences else tuple(found)
+
+
+def friction_across_gaps(contact: ContactTable, bound: FloatArray) -> ContactTable:
+    """Return the table with the status of friction at separated nodes where it acts, as by Tresca's law.
+
+    Parameters
+    ----------
+    contact : ContactTable
+    bound : (n_contact,) array [Pa]
+        Of friction, zero where it does not act.
+
+    Returns
+    -------
+    ContactTable
+        All other nodes are separated.
+    """
+    acts = ~contact.is_closed & (bound > 0.0)
+    slips = np.abs(contact.sigma_t) >= (1.0 - _AT_BOUND) * bound
+    direction = np.where(contact.sigma_t < 0.0, NodeStatus.SLIP_FORWARD, NodeStatus.SLIP_BACKWARD)
+    friction = np.where(slips, direction, NodeStatus.STICK)
+    return replace(contact, status=np.where(acts, friction, NodeStatus.SEPARATED).astype(np.intp))
 
 
 def unrolled(contact: ContactTable, transitions: Sequence[Transition]) -> tuple[ContactTable, tuple[Transition, ...]]:
@@ -225,10 +253,13 @@ class SlipReversal(NamedTuple):
         From slip to slip, where the slip changes its sign.
     n_sticking : int
         Nodes that stick in between: one or none.
+    jump : float [Pa]
+        Of friction, from one node that slips to the other.
     """
 
     place: Transition
     n_sticking: int
+    jump: float
 
 
 def slip_reversals(contact: ContactTable) -> tuple[SlipReversal, ...]:
@@ -249,7 +280,7 @@ def slip_reversals(contact: ContactTable) -> tuple[SlipReversal, ...]:
             if joined[i : i + beyond].all() and sticks[i + 1 : i + beyond].all():
                 place = _where_slip_vanishes(table, i, i + beyond)
                 wrapped = replace(place, s=contact.wrapped(place.part, place.s))
-                reversals.append(SlipReversal(wrapped, n_sticking))
+                reversals.append(SlipReversal(wrapped, n_sticking, float(table.sigma_t[i + beyond] - table.sigma_t[i])))
     return tuple(reversals)
 
 

@@ -24,6 +24,8 @@ LYING_AT = 1e-9
 """Distance within which an element ends at a point, relative to the side."""
 _MOST_STEPS = 20
 """Steps of Newton's method for the point on a curved element: two or three are enough."""
+REVERSAL_CALIBRATION = 0.4
+"""1.6 squared over 2 pi, see `reversal_error`."""
 TRANSITION_CALIBRATION = 0.09
 """The square of the 0.3 in the error of elements inside which the status changes."""
 
@@ -44,6 +46,11 @@ class ZoneEnd(NamedTuple):
     def distance(self) -> float:
         """Distance from the nearer end of the element [m]."""
         return float(min(self.fraction, 1.0 - self.fraction) * self.mesh.lengths[self.element])
+
+    def spacing(self, degree: int) -> float:
+        """Return the distance [m] of zeros of a Legendre polynomial of a degree at the place, but for a factor."""
+        length = float(self.mesh.lengths[self.element])
+        return 2.0 * length * float(np.sqrt(self.fraction * (1.0 - self.fraction))) / degree
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,6 +124,33 @@ def _nearest(mesh: BoundaryMesh, elements: IntArray, point: FloatArray) -> tuple
     return int(element[0]), fraction
 
 
+def reversal_error(jump: float, end: ZoneEnd, degree: int) -> tuple[float, float]:
+    """Estimate the error of friction that changes its sign inside an element of a degree.
+
+    Parameters
+    ----------
+    jump : float [Pa]
+    end : ZoneEnd
+        The place on the side of a body.
+    degree : int
+        Of the displacements on that element.
+
+    Returns
+    -------
+    squared : float [Pa^2 m]
+        Squared error of the contact tractions in L2.
+    length : float [m]
+        On which it changes its sign.
+
+    Notes
+    -----
+    The best polynomials of degree p miss a jump J by J sqrt(l / (2 pi)) with the length l of `transition_error`,
+    computed tractions by 1.6 times that.
+    """
+    spacing = end.spacing(degree)
+    return REVERSAL_CALIBRATION * jump**2 * spacing, spacing
+
+
 def transition_error(
     contact: ContactTable,
     fields: Sequence[FloatArray],
@@ -169,5 +203,5 @@ def transition_error(
                 at_transition, at_reach = np.interp(places, contact.s[rows], traction[rows])
                 steepest = max(steepest, (at_reach - at_transition) ** 2 / reach)
         squared += steepest
-    spacing = 2.0 * length * float(np.sqrt(end.fraction * (1.0 - end.fraction))) / degree
+    spacing = end.spacing(degree)
     return TRANSITION_CALIBRATION * squared * spacing**2, spacing

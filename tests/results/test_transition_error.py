@@ -15,7 +15,7 @@ from bemkit.arrays import FloatArray
 from bemkit.geometry import discretise
 from bemkit.results.contact_table import ContactTable
 from bemkit.results.transitions import Transition
-from bemkit.results.zone_ends import ZoneEnd, transition_error
+from bemkit.results.zone_ends import ZoneEnd, reversal_error, transition_error
 from bemkit.solvers.active_sets import NodeStatus
 from checks.calibration.true_errors import true_errors
 
@@ -59,6 +59,20 @@ def test_the_estimate_is_about_twice_the_best_approximation(fraction: float, deg
     tractions = -np.sqrt(np.maximum(s - fraction, 0.0))
     # best approximations are 0.1 to 0.2 times K l wherever the transition lies, and closer to it from degree 3 on
     assert 1.4 < estimated(fraction, degree, tractions, s) / best_error(fraction, degree) < 3.5
+
+
+@given(fraction=st.floats(0.1, 0.9), degree=st.integers(4, 14))
+def test_friction_that_changes_its_sign_is_missed_by_somewhat_more_than_the_best_approximation(
+    fraction: float, degree: int
+) -> None:
+    """Of a unit jump at the fraction of an element of length 1, by the primitives of Legendre polynomials."""
+    x, n = 2.0 * fraction - 1.0, np.arange(1, degree + 1)
+    at = legendre.legvander(np.array([x]), degree + 1)[0]
+    coefficients = (at[n - 1] - at[n + 1]) / (2 * n + 1)  # of the jump from the place to the end
+    best = fraction * (1.0 - fraction) - 0.25 * float(np.sum((2 * n + 1) * coefficients**2))
+    squared, length = reversal_error(1.0, ZoneEnd(MESH, 4.0, 0, fraction), degree)
+    assert length == pytest.approx(2.0 * np.sqrt(fraction * (1.0 - fraction)) / degree)
+    assert 1.5 < np.sqrt(squared / best) < 2.0
 
 
 def test_a_zone_of_one_element_is_not_measured_beyond_its_middle() -> None:
