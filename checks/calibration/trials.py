@@ -12,6 +12,7 @@ import numpy as np
 from bemkit.errors import BemkitError
 from bemkit.geometry.meshing.discretise import Algebraic, Grading, Uniform
 from bemkit.results.solution import Solution
+from bemkit.runs.mesh_sequence import with_sides_of
 from bemkit.runs.run import run
 from bemkit.scene.discretisation import Galerkin, MeshOptions
 from bemkit.scene.scene import Scene
@@ -82,10 +83,7 @@ def try_scene(n_bodies: int, seed: int, index: int) -> Trial:
     scene, draw = drawn_scene(n_bodies, seed, index)
     discretisations = {degree: _discretised(scene, draw, degree) for degree in DEGREES}
     fine = _solved(_with_accuracy(scene, FINEST))
-    if isinstance(fine, str):
-        rows = tuple(Row(index, degree, reason=f"fine solution {fine}") for degree in DEGREES)
-    else:
-        rows = tuple(_row(index, degree, coarse, fine) for degree, coarse in discretisations.items())
+    rows = tuple(_row(index, degree, coarse, fine) for degree, coarse in discretisations.items())
     return Trial((n_bodies, seed, index), rows)
 
 
@@ -125,13 +123,19 @@ def _solved(scene: Scene) -> Solution | str:
     return solution if solution.is_converged else solution.status.name.lower()
 
 
-def _row(index: int, degree: str, scene: Scene, fine: Solution) -> Row:
+def _row(index: int, degree: str, scene: Scene, fine: Solution | str) -> Row:
+    if isinstance(fine, str):
+        return Row(index, degree, reason=f"fine solution {fine}")
     coarse = _solved(scene)
     if isinstance(coarse, str):
         return Row(index, degree, reason=coarse)
     is_coarse = any(warning.kind == "coarse curve" for warning in coarse.warnings)
     if is_coarse or int(np.count_nonzero(coarse.contact.sigma_n < 0.0)) < FEWEST:
         return Row(index, degree, reason="unresolved")
+    if coarse.contact_sides != fine.contact_sides:  # tractions of one side would be compared to those of the other
+        fine = _solved(_with_accuracy(with_sides_of(scene, coarse), FINEST))
+        if isinstance(fine, str):
+            return Row(index, degree, reason=f"fine solution {fine}")
     energy, tractions = true_errors(coarse, fine)
     estimates = coarse.estimated_error, coarse.estimated_traction_error
     limits = fine.estimated_error, fine.estimated_traction_error

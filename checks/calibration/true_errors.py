@@ -12,7 +12,7 @@ from bemkit.geometry.local_values import values_on_elements
 from bemkit.geometry.quadrature import gauss_legendre
 from bemkit.geometry.spaces import dof_points
 from bemkit.results.solution import Solution
-from checks.calibration.common_mesh import CommonMesh, Located, located, space_of, values_at
+from checks.calibration.common_mesh import CommonMesh, Located, space_of, values_at
 
 _N_POINTS = 8
 
@@ -20,8 +20,13 @@ _N_POINTS = 8
 def true_errors(coarse: Solution, fine: Solution) -> tuple[float, float]:
     """Return the errors that `estimated_error` and `estimated_traction_error` estimate.
 
-    Elements that the estimate of tractions excludes, at singular corners and edges, are excluded here, too.
+    Elements that the estimate of tractions excludes, at singular corners and edges, are excluded here, too. Both
+    solutions must have the contact nodes on the same sides: tractions of the other one differ by the ratio of lengths.
     """
+    if coarse.contact_sides != fine.contact_sides:
+        raise ValueError(
+            f"contact nodes are on {coarse.contact_sides} and {fine.contact_sides}: solve with multipliers_on one side"
+        )
     meshes = {name: CommonMesh(body, fine.bodies[name]) for name, body in coarse.bodies.items()}
     energy = sum(common.squared_error() for common in meshes.values())
     miss = sum(_squared_miss(coarse, fine, contact, meshes) for contact in coarse.contact.parts)
@@ -31,16 +36,13 @@ def true_errors(coarse: Solution, fine: Solution) -> tuple[float, float]:
 
 def _squared_miss(coarse: Solution, fine: Solution, contact: str, meshes: Mapping[str, CommonMesh]) -> float:
     """Return the squared error of the tractions of a contact [Pa^2 m]; between two bodies it counts for both."""
-    (name, part), (other, other_part) = coarse.contact_sides[contact][0], fine.contact_sides[contact][0]
+    name, part = coarse.contact_sides[contact][0]
     common = meshes[name]
     elements = np.intersect1d(coarse.bodies[name].mesh.part(part), coarse.places.elements(name))
     pieces = np.flatnonzero(np.isin(common.parents, elements))
     xi, weights = gauss_legendre(_N_POINTS)
-    places = common.on_fine(pieces, xi)
-    if other != name:  # contact is decided on the nodes of the other body
-        mesh = fine.bodies[other].mesh
-        places = located(mesh, common.mesh.points(pieces, xi), mesh.part(other_part))
-    misses = _tractions_at(coarse, contact, common.on_coarse(pieces, xi)) - _tractions_at(fine, contact, places)
+    on_coarse, on_fine = common.on_coarse(pieces, xi), common.on_fine(pieces, xi)
+    misses = _tractions_at(coarse, contact, on_coarse) - _tractions_at(fine, contact, on_fine)
     lengths = common.mesh.jacobian(pieces, xi) * weights
     return coarse.n_sides(contact) * float(np.sum(lengths * np.sum(misses**2, axis=2)))
 

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import bemkit as bk
+from bemkit.scene.toml import with_overrides
 from checks.calibration.__main__ import HIGH, LOW, main, table
 from checks.calibration.trials import Row, drawn_scene, try_scene
 from checks.calibration.true_errors import true_errors
@@ -31,6 +32,21 @@ def test_true_errors_of_a_known_problem() -> None:
     assert 0.5 < energy / true_error(coarse) < 2.0
     assert 0.0 < tractions < 0.1
     assert max(true_errors(fine, fine)) < 1e-7
+
+
+def test_tractions_of_different_sides_are_not_compared() -> None:
+    scene = bk.load_scene("two-cylinders")
+    (pair,) = scene.contacts
+    one, two = (
+        bk.run(
+            with_overrides(
+                dataclasses.replace(scene, contacts=(dataclasses.replace(pair, multipliers_on=side),)), elements=40
+            )
+        )
+        for side in pair.sides
+    )
+    with pytest.raises(ValueError, match=r"contact nodes are on .*: solve with multipliers_on one side"):
+        true_errors(one, two)
 
 
 def test_the_table_says_which_scenes_count() -> None:
