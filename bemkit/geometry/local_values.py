@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from bemkit.arrays import FloatArray, IntArray
+from bemkit.arrays import BoolArray, FloatArray, IntArray
 from bemkit.geometry.quadrature import gauss_legendre, gauss_lobatto
 from bemkit.geometry.spaces import BoundarySpace, LagrangeSpace, lagrange_polynomials
 
@@ -41,6 +41,33 @@ def from_own_nodes(space: BoundarySpace, at_dofs: FloatArray, elements: IntArray
         return at_dofs
     own = _values_of_own_functions(space, elements)
     return np.asarray(np.einsum("ekl,ek...->el...", own, at_dofs))
+
+
+def continued_to_ends(space: BoundarySpace, elements: IntArray, is_known: BoolArray) -> FloatArray:
+    """Return matrices (m, n_local, n_local) that replace values at unknown dofs of elements.
+
+    Parameters
+    ----------
+    space : BoundarySpace
+    elements : (m,) int array
+    is_known : (m, n_local) bool array
+        The dofs of each element where a function is known.
+
+    Returns
+    -------
+    (m, n_local, n_local) array
+        Unknown values follow from the polynomial through all known ones; elements without a known value keep theirs.
+    """
+    degrees, n_local = element_degrees(space)[elements], is_known.shape[1]
+    matrices = np.tile(np.eye(n_local), (elements.size, 1, 1))
+    for k in np.flatnonzero(~is_known.all(axis=1) & is_known.any(axis=1)).tolist():
+        nodes = gauss_lobatto(int(degrees[k]))
+        own = np.array([*range(nodes.size - 1), n_local - 1])
+        known, unknown = is_known[k, own], ~is_known[k, own]
+        if known.any():
+            matrices[k, own[unknown]] = 0.0
+            matrices[np.ix_([k], own[unknown], own[known])] = lagrange_polynomials(nodes[known], nodes[unknown]).T
+    return matrices
 
 
 def summed_at_dofs(space: BoundarySpace, integrals: FloatArray, elements: IntArray) -> FloatArray:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bemkit.arrays import FloatArray, IntArray
-from bemkit.geometry.local_values import from_own_nodes, projector
+from bemkit.geometry.local_values import continued_to_ends, from_own_nodes, projector
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.quadrature import gauss_legendre
 from bemkit.geometry.spaces import BoundarySpace, dof_points
@@ -79,7 +79,8 @@ class TractionRecovery:
     The nodal forces of a side over the integrals of its basis functions: with Gauss-Lobatto nodes that is exact for
     tractions of a degree less than the displacements, for any meshes. The integrals are those over all elements
     that the partner covers at least in part: an element where a partner ends carries its whole force, spread over its
-    length. Forces of all contacts of a side are added up first.
+    length. Forces of all contacts of a side are added up first. A node at an obstacle that a support holds has no
+    contact force: tractions beside it are continued to it.
     """
 
     sides: tuple[RecoveredSide, ...]
@@ -149,6 +150,7 @@ class _Side:
         self.projection = _projection(placed.space, placed.traction_space)
         nodes, local = np.unique(placed.space.element_dofs[elements], return_inverse=True)
         self.local, self.reached = local.reshape(elements.size, -1), np.zeros(nodes.size)
+        self.is_held = np.zeros(nodes.size, bool)
         self.position = np.zeros(placed.space.n_dofs // 2, np.intp)
         self.position[nodes] = np.arange(nodes.size)
         self.entries: list[_Entries] = []
@@ -161,6 +163,7 @@ class _Side:
         self.entries.append((shares, contact_nodes, nodes))
         np.add.at(self.reached, nodes, np.abs(shares) * rows.weights[contact_nodes - first])
         if rows.couplings is None:  # an obstacle ends nowhere
+            self.is_held = self.reached == 0.0
             self.reached[:] = 1.0 + self.reached.max()
 
     def recovered(self) -> RecoveredSide:
@@ -180,7 +183,8 @@ class _Side:
         integrals = half_lengths * np.einsum("l,elk->ek", self.space.basis(xi) @ weights, lifting)
         totals = np.bincount(self.local[is_covered].ravel(), integrals[is_covered].ravel(), self.reached.size)
         shares = is_covered[:, None] / np.where(totals > 0.0, totals, np.inf)[self.local]
-        values = (self.projection @ lifting) * shares[:, None]  # (m, n_values, n_local)
+        continued = continued_to_ends(self.space, self.elements, ~self.is_held[self.local])
+        values = self.projection @ lifting @ (continued * shares[:, None])  # (m, n_values, n_local)
         shares, contact_nodes, nodes = (np.concatenate(each) for each in zip(*self.entries, strict=True))
         return RecoveredSide(self.body, self.elements, shares, contact_nodes, nodes, values, self.local)
 

@@ -8,13 +8,15 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from bemkit.arrays import FloatArray
-from bemkit.geometry.local_values import values_on_elements
+from bemkit.geometry.local_values import continued_to_ends, from_own_nodes
 from bemkit.geometry.quadrature import gauss_legendre
 from bemkit.geometry.spaces import dof_points
 from bemkit.results.solution import Solution
 from checks.calibration.common_mesh import CommonMesh, Located, space_of, values_at
 
 _N_POINTS = 8
+_SAME = 1e-12
+"""Distance of a contact node from its dof, relative to the body."""
 
 
 def true_errors(coarse: Solution, fine: Solution) -> tuple[float, float]:
@@ -53,6 +55,8 @@ def _tractions_at(solution: Solution, contact: str, places: Located) -> FloatArr
     body, rows = solution.bodies[solution.contact_sides[contact][0].body], table.rows(contact)
     space = space_of(body)
     tree = KDTree(np.column_stack([table.x, table.y])[rows])
-    _, nearest = tree.query(dof_points(space))  # on the contact boundary the node itself
+    distances, nearest = tree.query(dof_points(space))  # on the contact boundary the node itself, unless it is held
     at_dofs = np.column_stack([table.sigma_n, table.sigma_t])[rows][nearest]
-    return values_at(space, values_on_elements(space, at_dofs), places)
+    is_known, elements = distances <= _SAME * body.mesh.diameter, np.arange(body.mesh.n_elements)
+    continued = continued_to_ends(space, elements, is_known[space.element_dofs])
+    return values_at(space, from_own_nodes(space, continued @ at_dofs[space.element_dofs]), places)

@@ -9,10 +9,11 @@ import pytest
 
 import bemkit as bk
 from bemkit.errors import GeometryError, InputError
-from bemkit.geometry.local_values import dof_weights, summed_at_dofs, values_on_elements
+from bemkit.geometry.local_values import continued_to_ends, dof_weights, summed_at_dofs, values_on_elements
+from bemkit.geometry.quadrature import gauss_lobatto
 from bemkit.geometry.reflection import antisymmetric_dofs
 from bemkit.geometry.series import series
-from bemkit.geometry.spaces import LagrangeSpace, dof_points
+from bemkit.geometry.spaces import LagrangeSpace, dof_points, lagrange_polynomials
 from bemkit.operators.boundary import hypersingular
 from bemkit.runs.element_degrees import LEAST_DEGREE, below_layers, few_kinds, sufficient_degrees
 from bemkit.scene.toml import scene_from_toml, scene_to_toml
@@ -53,6 +54,22 @@ def test_every_element_holds_the_polynomials_of_its_degree() -> None:
     np.testing.assert_allclose(
         values_on_elements(space, points[:, 0]) @ space.basis(xi), mesh.points(np.arange(8), xi)[:, :, 0], atol=1e-14
     )
+
+
+def test_unknown_values_continue_the_polynomial_of_the_others() -> None:
+    """On each element a polynomial of a degree less, unknown at the start; with nothing known zeros stay."""
+    space, xi = mixed(square()), np.linspace(-1.0, 1.0, 9)
+    elements = np.arange(len(DEGREES))
+    for element, degree in enumerate(DEGREES):
+        of_degree = lagrange_polynomials(gauss_lobatto(degree), xi)
+        own = [*range(degree), space.degree]
+        at_dofs, is_known = np.zeros((len(DEGREES), space.degree + 1)), np.zeros((len(DEGREES), space.degree + 1), bool)
+        is_known[element, own[1:]] = True
+        at_dofs[element, own] = gauss_lobatto(degree) ** (degree - 1) + 1.0
+        at_dofs[element, 0] = 17.0
+        continued = np.einsum("ekl,el->ek", continued_to_ends(space, elements, is_known), at_dofs)
+        np.testing.assert_allclose(continued[element, own] @ of_degree, xi ** (degree - 1) + 1.0, atol=1e-12)
+        assert not np.delete(continued, element, axis=0).any()
 
 
 def test_integrals_are_summed_up_by_the_transpose() -> None:

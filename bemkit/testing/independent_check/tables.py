@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 
 import numpy as np
+from numpy.polynomial import legendre
 
-from bemkit.arrays import BoolArray
+from bemkit.arrays import BoolArray, FloatArray, IntArray
+from bemkit.geometry.quadrature import gauss_lobatto
 from bemkit.results.solution import Solution
 from bemkit.testing.independent_check.bodies import MeasuredBody
 from bemkit.testing.independent_check.contacts import MeasuredContact, gap_of
@@ -62,6 +64,8 @@ def resultant_mismatch(solution: Solution, contacts: Iterable[MeasuredContact]) 
 def nodal_mismatch(measured: MeasuredBody, contacts: Iterable[MeasuredContact]) -> float:
     """Return the largest difference [-] of mean tractions of elements at obstacles from those that nodes interpolate.
 
+    To nodes that a support holds, which have no force of contact, the polynomials of elements are continued.
+
     A node at a corner between two contact parts belongs to one of them, with the lengths of both: its force makes other
     tractions on the elements there than the node says, and so on their neighbours, which are excluded.
     """
@@ -78,7 +82,8 @@ def nodal_mismatch(measured: MeasuredBody, contacts: Iterable[MeasuredContact]) 
         # supports hold the other nodes, and whole elements that have no node of the table
         is_own = np.isin(owners, ["", part]).all(axis=1) & (owners == part).any(axis=1)
         own = elements[is_own & ~beside[elements]]
-        mean = np.einsum("eqc,eq->ec", boundary.interpolated(nodal)[own], boundary.shares[own])
+        values = _continued(nodal[boundary.nodes[own]], owner[boundary.nodes[own]] == part, boundary.nodes[own])
+        mean = np.einsum("enc,enq,eq->ec", values, boundary.basis[own], boundary.shares[own])
         mean /= boundary.lengths[own][:, None]
         stated = body.boundary.traction[own]
         # elements as short as the round-off of coordinates have lengths, and tractions, of few digits
@@ -86,6 +91,18 @@ def nodal_mismatch(measured: MeasuredBody, contacts: Iterable[MeasuredContact]) 
         off = np.abs(mean - stated) - round_off[:, None] * np.abs(stated)
         worst.append(largest(off / measured.scales.stress))
     return float(np.max(worst))
+
+
+def _continued(values: FloatArray, is_known: BoolArray, nodes: IntArray) -> FloatArray:
+    """Return values (m, n_local, 2) whose unknown ones are those of the polynomial through the others."""
+    result = values.copy()
+    for k in np.flatnonzero(~is_known.all(axis=1)).tolist():
+        degree = np.unique(nodes[k]).size - 1  # rows of lower degrees repeat their last node
+        own = np.array([*range(degree), nodes.shape[1] - 1])
+        xi, known = gauss_lobatto(degree), is_known[k, own]
+        fitted = legendre.legfit(xi[known], values[k, own[known]], int(known.sum()) - 1)
+        result[k, own[~known]] = legendre.legval(xi[~known], fitted).T
+    return result
 
 
 def _beside_corners(measured: MeasuredBody) -> BoolArray:
