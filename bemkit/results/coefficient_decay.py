@@ -143,13 +143,12 @@ def _missing(coefficients: FloatArray, degrees: IntArray, at_break: BoolArray) -
     """Continue the Legendre coefficients (n, largest degree, 2) of elements.
 
     A geometric sequence is fitted to the second half of the coefficients. Each is taken as large as any after it, since
-    every other coefficient of an odd or even field is zero.
+    every other coefficient of an odd or even field is zero: see `_without_gaps`.
     """
     energy, mean_square, decay = np.empty((3, degrees.size))
     for n_known in np.unique(degrees).tolist():
         chosen = degrees == n_known
-        sizes = np.linalg.norm(coefficients[chosen, :n_known], axis=2)
-        bounds = np.maximum.accumulate(sizes[:, ::-1], axis=1)[:, ::-1]
+        bounds = _without_gaps(np.linalg.norm(coefficients[chosen, :n_known], axis=2))
         n_fitted = max(2, min(n_known - 1, n_known // 2 + 1))
         k = np.arange(n_fitted) - 0.5 * (n_fitted - 1)
         logarithms = np.log(np.maximum(bounds[:, n_known - n_fitted :], np.finfo(float).tiny))
@@ -161,6 +160,22 @@ def _missing(coefficients: FloatArray, degrees: IntArray, at_break: BoolArray) -
         singular = np.where(at_break[chosen, None], np.maximum(missing, algebraic), missing)
         energy[chosen], mean_square[chosen], decay[chosen] = missing**2 @ odd**-2.0, singular**2 @ (1.0 / odd), ratio
     return _Missing(energy, mean_square, decay)
+
+
+def _without_gaps(sizes: FloatArray) -> FloatArray:
+    """Return bounds (n, n_known) of coefficients that never rise, from sizes of which every other one may be zero.
+
+    The last one is at least half of what three before it lead to; of three, the middle one at least the geometric mean
+    of its neighbours. Otherwise an element in whose middle a field is symmetric had no error, or one that hardly falls.
+    """
+    known, n_known = sizes.copy(), sizes.shape[1]
+    if n_known >= 4:
+        before, next_to_last = sizes[:, -4:].max(axis=1), sizes[:, -2]
+        expected = next_to_last * np.sqrt(next_to_last / np.maximum(before, np.finfo(float).tiny))
+        known[:, -1] = np.maximum(known[:, -1], 0.5 * expected)
+    if n_known == 3:
+        known[:, 1] = np.maximum(known[:, 1], np.sqrt(known[:, 0] * known[:, 2]))
+    return np.asarray(np.maximum.accumulate(known[:, ::-1], axis=1)[:, ::-1])
 
 
 def _algebraic(n_known: int) -> FloatArray:

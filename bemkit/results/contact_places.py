@@ -251,6 +251,12 @@ class ContactPlaces:
         bodies = self.solution.bodies.values()
         return min(body.scene.discretisation.displacement_space(body.mesh).degree for body in bodies)
 
+    @property
+    def is_curved(self) -> bool:
+        """Whether elements that may touch are curved."""
+        meshes = ((body.mesh, self._touching(name)) for name, body in self.solution.bodies.items())
+        return any(not mesh.is_straight[elements].all() for mesh, elements in meshes)
+
     @cached_property
     def _counted(self) -> dict[str, IntArray]:
         """`elements` of all bodies."""

@@ -34,11 +34,13 @@ wave number k, of saw teeth h^3 |step|^2 / 115 for each element and of parabolas
 are wrong nearby leave more."""
 CONTACT_CALIBRATION = (1.0 / 8.0, 1.0 / 16.0)
 """Factors between second differences of nodal contact tractions and their squared errors."""
-PAIR_CALIBRATION = (1.0, 2.0)
+PAIR_CALIBRATION = (1.0, 1.25)
 """Further factors between two elastic bodies, where tractions follow the elements of both sides."""
-STIFFNESS_CALIBRATION = (4.0, 0.15)
+STIFFNESS_CALIBRATION = (1.0, 0.15)
 """Factors between squared relative errors in the energy norm and relative errors of contact tractions, for degree 1 and
-for higher ones: linear displacements along an arc also miss a part of a uniform radial displacement."""
+for higher ones."""
+ARC_CALIBRATION = 4.0
+"""A further factor of linear elements on curves, which also miss a part of a uniform radial displacement."""
 LARGEST_STIFFNESS_SHARE = 1.0 / 3.0
 """Largest error of contact tractions that errors in the energy norm cause, relative to these."""
 MEAN_CALIBRATION = 1.25
@@ -176,13 +178,15 @@ def contact_errors(contact: ContactTable, degree: int) -> FloatArray:
     return errors
 
 
-def stiffness_error(energy_error: float, degree: int) -> float:
+def stiffness_error(energy_error: float, degree: int, *, is_curved: bool) -> float:
     """Estimate the relative error of contact tractions that errors in the energy norm anywhere on the bodies cause.
 
     Bodies that are moved by given amounts are too stiff by the square of the relative error, and so are their
-    reactions; under given loads they are right. Large errors are not of that order yet.
+    reactions; under given loads they are right. Large errors are not of that order yet. Of `is_curved` contacts linear
+    elements miss more.
     """
-    return min(STIFFNESS_CALIBRATION[min(degree, 2) - 1] * energy_error**2, LARGEST_STIFFNESS_SHARE * energy_error)
+    factor = STIFFNESS_CALIBRATION[min(degree, 2) - 1] * (ARC_CALIBRATION if is_curved and degree == 1 else 1.0)
+    return min(factor * energy_error**2, LARGEST_STIFFNESS_SHARE * energy_error)
 
 
 def nodal_error(contact: ContactTable, degree: int, n_sides: Callable[[str], int], share: FloatArray) -> float | None:

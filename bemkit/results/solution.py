@@ -179,7 +179,8 @@ class Solution(SolvedScene, Explorable):
         squared = self.places.squared_traction_error()
         if squared is None:
             return None
-        stiffness = stiffness_error(self.estimated_error or 0.0, self.places.lowest_degree)
+        energy, degree = self.estimated_error or 0.0, self.places.lowest_degree
+        stiffness = stiffness_error(energy, degree, is_curved=self.places.is_curved)
         return float(np.hypot(np.sqrt(squared) / size, stiffness))
 
     @cached_property

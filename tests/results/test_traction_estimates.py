@@ -180,3 +180,24 @@ def test_singular_corners_are_excluded() -> None:
     assert counted is not None
     assert solution.places.squared_traction_error() == counted
     assert counted < (nodal_error(table, 2, solution.n_sides, np.ones(table.n_contact)) or 0.0)
+
+
+def test_linear_elements_on_flat_sides_are_not_much_too_stiff() -> None:
+    """A block on another that is wider, moved by given amounts; on curves the estimate is four times that."""
+    material = bk.Material(1.0, 0.25)
+    held, pressed = (
+        bk.Part("held", bk.Clamped(), ("bottom",)),
+        bk.Part("pressed", bk.PrescribedDisplacement(0, -2e-4), ("top",)),
+    )
+    lower = bk.Body(name="lower", shape=bk.Rectangle(1.0, 0.73), material=material, parts=(held,))
+    shape = bk.Rectangle(0.84, 0.84, corner=(0.08, 0.73))
+    upper = bk.Body(name="upper", shape=shape, material=material, parts=(pressed,))
+    contact = bk.ContactPair(("upper.bottom", "lower.top"), multipliers_on="upper.bottom")
+    scene = bk.Scene(
+        title="blocks", bodies=(lower, upper), contacts=(contact,), law=bk.Frictionless(),
+        discretisation=bk.Galerkin(1), mesh=bk.MeshOptions(elements=44),
+    )  # fmt: skip
+    coarse, fine = bk.run(scene), bk.run(replace(scene, discretisation=bk.Galerkin(2), mesh=LAYERS))
+    _, tractions = true_errors(coarse, fine)
+    assert coarse.estimated_traction_error is not None
+    assert 0.5 < coarse.estimated_traction_error / tractions < 3.0
