@@ -70,7 +70,7 @@ def test_the_plan_says_what_is_used_and_that_it_takes_less_memory() -> None:
     assert "fast multipole" in items["boundary equations"].reason
     assert "GMRES to 1e-10" in items["linear solver of the body"].reason
     assert items["algebraic multigrid (pyamg)"].is_needed
-    assert free.memory < 0.3 * direct.memory  # the equations of the groups weigh here
+    assert free.memory < 0.4 * direct.memory  # the equations of the groups weigh here
     assert free.seconds > direct.seconds
 
 

@@ -14,6 +14,8 @@ _MOST_LOOPS = 20
 """Largest number of closed curves: each adds an equation that is evaluated for each product."""
 _BYTES, _BYTES_OF_GROUPS = 1.5e3, 5e6
 """Bytes of each element (mesh, search directions, series, conditions, fields), and of the coarse equations."""
+_BYTES_IN_NUMPY, _BYTES_OF_BLOCKS = 0.9e3, 2e6
+"""Further bytes without compiled kernels, for integrals of blocks of near elements."""
 _EVALUATIONS, _EVALUATIONS_COMPILED = 4.5e3, 0.3e3
 """Evaluations of integrals for each element and product."""
 _STEPS = 17.0
@@ -41,8 +43,10 @@ def why_stored(case: BodyCase) -> str:
 def matrix_free_cost(case: BodyCase, options: MatrixFree, *, takes_slopes: bool) -> BodyCost:
     """Return the costs of equations that are not stored, for a typical number of iterations."""
     n = case.mesh.n_elements
-    memory = int(_BYTES * n + _BYTES_OF_GROUPS)
     is_compiled, _ = compiled.expected(n)
+    memory = int(_BYTES * n + _BYTES_OF_GROUPS)
+    if not is_compiled:
+        memory += int(_BYTES_IN_NUMPY * n + _BYTES_OF_BLOCKS)
     of_product = n * (_EVALUATIONS_COMPILED if is_compiled else _EVALUATIONS)
     items = (
         PlanItem("boundary equations", True, f"products by the fast multipole method: {case.linear_solver.reason}"),
