@@ -7,7 +7,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from bemkit.results.result_file import ResultWriter, check_result_target, read_result
+from bemkit.results.solution import Solution
 from bemkit.runs.adaptive import run_adaptive
+from bemkit.runs.mesh_sequence import with_sides_of
 from bemkit.runs.steps import joined, solved_history
 from bemkit.scene.scene import Scene
 from bemkit.scene.toml import scene_to_toml
@@ -55,10 +57,9 @@ def run_to_file(
         As `bemkit.run`.
     """
     solution: Any
-    text, target = scene_to_toml(scene), check_result_target(path)
+    target = check_result_target(path)
     known = read_result(target) if target.exists() else None
-    is_begun = known is not None and known.status is Status.UNFINISHED and scene_to_toml(known.stated) == text
-    done: Any = known if is_begun else None
+    done: Any = known if known is not None and _is_begun(scene, known) else None
 
     with ResultWriter(target) as writer:
         if scene.mesh.accuracy is not None:
@@ -67,3 +68,11 @@ def run_to_file(
             solution = joined(*solved_history([scene], None, callback, done, writer.append, None, executor))
         writer.finish(solution)
     return solution
+
+
+def _is_begun(scene: Scene, known: Solution) -> bool:
+    """Whether an earlier run has begun a scene; on later meshes it states the sides of the multipliers, too."""
+    if known.status is not Status.UNFINISHED:
+        return False
+    begun = scene_to_toml(known.stated)
+    return scene_to_toml(scene) == begun or scene_to_toml(with_sides_of(scene, known)) == begun

@@ -140,10 +140,10 @@ def with_sides_of(scene: Scene, solution: Solution) -> Scene:
     """Return a scene whose listed contacts have their multipliers on the sides that had them in a solution."""
     contacts = []
     for pair in scene.contacts:
-        first = solution.contact_sides[pair.name][0]
+        first = solution.contact_sides.get(pair.name, (None,))[0]
         sides = [side for side, place in zip(pair.elastic_sides, pair.elastic_parts, strict=True) if place == first]
         is_open = pair.rigid_body is None and pair.multipliers_on is None
-        contacts.append(replace(pair, multipliers_on=sides[0]) if is_open else pair)
+        contacts.append(replace(pair, multipliers_on=sides[0]) if is_open and sides else pair)
     return replace(scene, contacts=tuple(contacts))
 
 

@@ -505,7 +505,8 @@ def test_a_bolt_in_a_plate_needs_few_elements_for_five_digits() -> None:
     assert fine.is_converged
     assert fine.n_elements <= 300
     assert rough.energy == pytest.approx(fine.energy, rel=1e-8)
-    assert [each.s for each in rough.transitions] == pytest.approx([each.s for each in fine.transitions], abs=3e-6)
+    # 1e-4 of the zone, as accurate as the tractions
+    assert [each.s for each in rough.transitions] == pytest.approx([each.s for each in fine.transitions], abs=2e-5)
 
 
 @pytest.mark.slow
