@@ -91,3 +91,14 @@ def test_sources_lie_in_holes_of_any_shape_and_in_cavities() -> None:
         # a source outside of the hole would carry no volume through it
         flux = found.fields[:, 0] @ (mesh.lengths[:, None] * mesh.normals).ravel()
         assert 2.0 * np.pi * least < abs(flux) < 2.0 * np.pi * most
+
+
+@pytest.mark.parametrize("begin", [1, 37])
+def test_sources_do_not_depend_on_the_numbers_of_elements(begin: int) -> None:
+    """Of more elements than the search takes: those that it took began at the first one."""
+    mesh = discretise(ExteriorOf(Rectangle(2.0, 1.3)).outline(), n_elements=150)
+    order = np.roll(np.arange(mesh.n_elements), begin)
+    other = BoundaryMesh(mesh.nodes, mesh.elements[order], is_exterior=True, follows_outline=True)
+    one, two = (Reciprocity(each, Material(2.0, 0.3), takes_slopes=False) for each in (mesh, other))
+    for rows, permuted in ((one.on_traction, two.on_traction), (one.on_displacement, two.on_displacement)):
+        np.testing.assert_allclose(permuted, rows.reshape(1, -1, 2)[:, order].reshape(1, -1), atol=1e-14)

@@ -157,6 +157,8 @@ def _largest_circle(mesh: BoundaryMesh, loop: IntArray) -> tuple[FloatArray, flo
     """
     whole = mesh.whole
     around = next(other for other in whole.loops if loop[0] in other)
+    x, y = whole.centres[around].T
+    around = np.roll(around, -int(np.lexsort((y, x))[0]))  # independent of the numbers of elements
     touching = around[:: 1 + around.size // _CANDIDATES]
     points = np.concatenate([whole.centres[around], whole.start[around]])
     arms = points - whole.centres[touching, None]

@@ -67,7 +67,7 @@ class IterativeFactor:
         )
         self._material, self._options = material, options
         order = np.arange(mesh.n_elements)
-        border = collocation_border(self._mesh, material, order, takes_slopes=takes_slopes)
+        border = collocation_border(mesh, material, self.tree.order, takes_slopes=takes_slopes)
         self.equations = CollocationEquations(self._mesh, material, order, border, takes_slopes=takes_slopes)
         self._layers = FastMultipole(self.equations, material, self.tree, max(_PRODUCTS * options.tolerance, _FINEST))
         self._traction_unit = material.plane_modulus / mesh.diameter
