@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -66,6 +67,24 @@ def insert_loads(
     traction[is_free] = 0.0
 
 
+class HeldForces(NamedTuple):
+    """Forces of contact at nodes that supports hold, where contact has no node: of the tractions beside them.
+
+    Parameters
+    ----------
+    bodies, nodes : (n,) int arrays
+    neighbours : (n,) int array
+        The contact node beside each.
+    forces : (n, 2) array [N/m]
+        On the body, in x and y.
+    """
+
+    bodies: IntArray
+    nodes: IntArray
+    neighbours: IntArray
+    forces: FloatArray
+
+
 @dataclass(frozen=True, eq=False)
 class TractionRecovery:
     """How the forces of contact nodes are spread over the elements of all contact sides.
@@ -109,6 +128,39 @@ class TractionRecovery:
         """
         return [(side.body, side.elements, side.tractions(forces)) for side in self.sides]
 
+    def held_forces(self, forces: FloatArray) -> HeldForces:
+        """Return the forces at held nodes, from those of contact nodes as for `tractions`."""
+        none = np.zeros(0, np.intp)
+        return HeldForces(
+            np.concatenate([none, *(np.full(side.held.nodes.size, side.body) for side in self.sides)]),
+            np.concatenate([none, *(side.held.nodes for side in self.sides)]),
+            np.concatenate([none, *(side.held.neighbours for side in self.sides)]),
+            np.concatenate([np.zeros((0, 2)), *(side.held_forces(forces) for side in self.sides)]),
+        )
+
+
+class _HeldNodes(NamedTuple):
+    """Nodes at an obstacle that supports hold, to which the tractions of their elements go on.
+
+    Parameters
+    ----------
+    nodes, neighbours, elements : (h,) int arrays
+        Dofs, the contact node beside each, and positions of the elements.
+    by_force : (h, n_local) array [1/m]
+        Traction at the node by forces on the nodes of the element.
+    shapes : (h, n_values) array [-]
+        Tractions of the element by that at the node.
+    lengths : (h,) array [m]
+        Force by that traction; zero at rigid bodies, which are in equilibrium with the forces of contact nodes.
+    """
+
+    nodes: IntArray
+    neighbours: IntArray
+    elements: IntArray
+    by_force: FloatArray
+    shapes: FloatArray
+    lengths: FloatArray
+
 
 @dataclass(frozen=True, eq=False)
 class RecoveredSide:
@@ -125,6 +177,7 @@ class RecoveredSide:
         Tractions at the local nodes of the traction space by forces on the nodes of an element.
     local : (m, n_local) array
         The nodes of each element.
+    held : _HeldNodes
     """
 
     body: int
@@ -134,12 +187,30 @@ class RecoveredSide:
     nodes: IntArray
     by_force: FloatArray
     local: IntArray
+    held: _HeldNodes
 
     def tractions(self, forces: FloatArray) -> FloatArray:
         """Return the tractions (m, n_values, 2) [Pa] under forces (n_contact, 2) [N/m] of contact nodes."""
+        tractions = np.asarray(self.by_force @ self._on_side(forces)[self.local])
+        np.add.at(tractions, self.held.elements, self.held.shapes[:, :, None] * self._at_held(forces)[:, None])
+        return tractions
+
+    def held_forces(self, forces: FloatArray) -> FloatArray:
+        """Return the forces (h, 2) [N/m] at held nodes under those of contact nodes."""
+        return np.asarray(self.held.lengths[:, None] * self._at_held(forces))
+
+    def _at_held(self, forces: FloatArray) -> FloatArray:
+        """Return the tractions (h, 2) [Pa] at held nodes: none against that of the contact node beside it."""
+        at_nodes = self._on_side(forces)[self.local[self.held.elements]]
+        tractions = np.einsum("hl,hlc->hc", self.held.by_force, at_nodes)
+        is_along = np.sum(tractions * forces[self.held.neighbours], axis=1) > 0.0
+        return np.where(is_along[:, None], tractions, 0.0)
+
+    def _on_side(self, forces: FloatArray) -> FloatArray:
+        """Return the forces on the nodes of the side."""
         on_side = np.zeros((int(self.local.max()) + 1, 2))
         np.add.at(on_side, self.nodes, self.shares[:, None] * forces[self.contact_nodes])
-        return np.asarray(self.by_force @ on_side[self.local])
+        return on_side
 
 
 class _Side:
@@ -150,7 +221,7 @@ class _Side:
         self.projection = _projection(placed.space, placed.traction_space)
         nodes, local = np.unique(placed.space.element_dofs[elements], return_inverse=True)
         self.local, self.reached = local.reshape(elements.size, -1), np.zeros(nodes.size)
-        self.is_held = np.zeros(nodes.size, bool)
+        self.dofs, self.is_held, self.is_fixed = nodes, np.zeros(nodes.size, bool), False
         self.position = np.zeros(placed.space.n_dofs // 2, np.intp)
         self.position[nodes] = np.arange(nodes.size)
         self.entries: list[_Entries] = []
@@ -163,7 +234,7 @@ class _Side:
         self.entries.append((shares, contact_nodes, nodes))
         np.add.at(self.reached, nodes, np.abs(shares) * rows.weights[contact_nodes - first])
         if rows.couplings is None:  # an obstacle ends nowhere
-            self.is_held = self.reached == 0.0
+            self.is_held, self.is_fixed = self.reached == 0.0, rows.other < 0
             self.reached[:] = 1.0 + self.reached.max()
 
     def recovered(self) -> RecoveredSide:
@@ -183,10 +254,29 @@ class _Side:
         integrals = half_lengths * np.einsum("l,elk->ek", self.space.basis(xi) @ weights, lifting)
         totals = np.bincount(self.local[is_covered].ravel(), integrals[is_covered].ravel(), self.reached.size)
         shares = is_covered[:, None] / np.where(totals > 0.0, totals, np.inf)[self.local]
-        continued = continued_to_ends(self.space, self.elements, ~self.is_held[self.local])
-        values = self.projection @ lifting @ (continued * shares[:, None])  # (m, n_values, n_local)
+        shapes = self.projection @ lifting  # (m, n_values, n_local)
+        held = self._held(shapes, integrals, shares)
+        values = shapes * shares[:, None]
         shares, contact_nodes, nodes = (np.concatenate(each) for each in zip(*self.entries, strict=True))
-        return RecoveredSide(self.body, self.elements, shares, contact_nodes, nodes, values, self.local)
+        return RecoveredSide(self.body, self.elements, shares, contact_nodes, nodes, values, self.local, held)
+
+    def _held(self, shapes: FloatArray, integrals: FloatArray, shares: FloatArray) -> _HeldNodes:
+        continued = continued_to_ends(self.space, self.elements, ~self.is_held[self.local])
+        element, k = np.nonzero(np.diagonal(continued, axis1=1, axis2=2) == 0.0)
+        contact_node = np.zeros(self.is_held.size, np.intp)
+        for _, contact_nodes, nodes in self.entries:
+            contact_node[nodes] = contact_nodes
+        local, each = self.local[element], np.arange(k.size)
+        # the nearest node of the element that is not held
+        distances = np.where(self.is_held[local], np.inf, np.abs(np.arange(local.shape[1]) - k[:, None]))
+        return _HeldNodes(
+            nodes=self.dofs[local[each, k]],
+            neighbours=contact_node[local[each, distances.argmin(axis=1)]],
+            elements=element,
+            by_force=continued[element, k] * shares[element],
+            shapes=shapes[element, :, k],
+            lengths=integrals[element, k] * self.is_fixed,
+        )
 
 
 def _sides(rows: ContactInterface, first: int) -> list[tuple[int, IntArray, _Entries]]:

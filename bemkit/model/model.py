@@ -17,7 +17,7 @@ from bemkit.arrays import FloatArray, IntArray, blended
 from bemkit.contact.body import ContactState
 from bemkit.contact.problem import ContactProblem
 from bemkit.errors import InputError
-from bemkit.model.fields import elastic_energy, insert_loads
+from bemkit.model.fields import HeldForces, elastic_energy, insert_loads
 from bemkit.model.given import loaded_map, with_far_motion, without_body_forces
 from bemkit.model.placed import groups, shape_numbers
 from bemkit.model.prepared import Prepared, PreparedBody
@@ -207,6 +207,25 @@ class Model:
             begin += rows.n_contact
         return [body.turn.turned_back(force) for body, force in zip(prepared.bodies, forces, strict=True)]
 
+    def _forces_of_nodes(self, state: ContactState) -> FloatArray:
+        """Return the forces (n_contact, 2) [N/m] of contact nodes on the bodies with these nodes, in x and y."""
+        stress = self.prepared.units.stress * np.einsum("nk,nkc->nc", state.traction, self.prepared.frame)
+        return np.asarray(self.prepared.column("weights")[:, None] * stress)
+
+    def held_forces(self, state: ContactState) -> HeldForces:
+        """Return the forces of contact at nodes that supports hold in both directions; `reactions` contain them."""
+        prepared = self.prepared
+        held = prepared.recovery.held_forces(self._forces_of_nodes(state))
+        bodies, nodes = held.bodies.tolist(), held.nodes.tolist()
+        touching = {
+            (rows.body, node) for rows in prepared.rows if rows.couplings is None for node in rows.nodes.tolist()
+        }
+        is_held = [
+            bool(prepared.bodies[body].conditions.is_supported[node].all()) and (body, node) not in touching
+            for body, node in zip(bodies, nodes, strict=True)
+        ]
+        return HeldForces(*(column[np.array(is_held, bool)] for column in held))
+
     def boundary_fields(self, state: ContactState) -> list[tuple[FloatArray, FloatArray, float]]:
         """Return the physical fields of a contact state on the boundary of each body.
 
@@ -218,9 +237,8 @@ class Model:
             elastic energy of the stresses in the plane [J/m], without heat 1/2 a(u, u).
         """
         prepared, units = self.prepared, self.prepared.units
-        in_place = prepared.column("weights")[:, None] * np.einsum("nk,nkc->nc", state.traction, prepared.frame)
         of_contacts: list[list[tuple[IntArray, FloatArray]]] = [[] for _ in prepared.bodies]
-        for number, elements, values in prepared.recovery.tractions(units.stress * in_place):
+        for number, elements, values in prepared.recovery.tractions(self._forces_of_nodes(state)):
             of_contacts[number].append((elements, values))
         fields: list[tuple[FloatArray, FloatArray, float]] = []
         bodies = zip(prepared.bodies, self.elastic, self.nodal_fields(state), strict=True)

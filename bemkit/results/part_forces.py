@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 
 import numpy as np
@@ -179,6 +179,7 @@ def contact_forces(
     resultants: Sequence[PartForce],
     lengths: Sequence[float],
     transitions: Sequence[Transition],
+    at_held_nodes: Mapping[str, FloatArray],
 ) -> tuple[ContactForce, ...]:
     """Return the forces and sizes of each contact.
 
@@ -193,11 +194,14 @@ def contact_forces(
         Of the same parts; weights of a corner node may include a share of the next part.
     transitions : sequence of Transition
         Of the same table.
+    at_held_nodes : mapping of str to (2,) array [N/m]
+        Normal and tangential force at nodes of a contact that supports hold.
     """
     zones, forces = unrolled(table, transitions), []
     for resultant, length in zip(resultants, lengths, strict=True):
         closed = min(length, _contact_length(*zones, resultant.name))
-        entries = vars(resultant) | _sizes(table, depth, resultant.name)
+        further = at_held_nodes.get(resultant.name, np.zeros(2))
+        entries = vars(resultant) | _sizes(table, depth, resultant.name, further)
         forces.append(ContactForce(**entries, contact_length=closed))
     return tuple(forces)
 
@@ -211,13 +215,13 @@ def forces_on_parts(on_sides: Iterable[tuple[tuple[str, str], PartForce]]) -> di
     return forces
 
 
-def _sizes(table: ContactTable, depth: float, part: str) -> dict[str, float]:
+def _sizes(table: ContactTable, depth: float, part: str, further: FloatArray) -> dict[str, float]:
     """Return the entries of `ContactForce` besides the resultant and the contact length."""
     nodes = table.rows(part)
     closed = nodes & table.is_closed
     return {
-        "force_normal": -depth * float(table.weight[nodes] @ table.sigma_n[nodes]),
-        "force_tangential": depth * float(table.weight[nodes] @ table.sigma_t[nodes]),
+        "force_normal": -depth * float(table.weight[nodes] @ table.sigma_n[nodes] + further[0]),
+        "force_tangential": depth * float(table.weight[nodes] @ table.sigma_t[nodes] + further[1]),
         "peak_pressure": max(0.0, float(np.max(-table.sigma_n[nodes], initial=0.0))),  # not -0
         "largest_slip": float(np.abs(table.u_t[closed]).max(initial=0.0)),
     }

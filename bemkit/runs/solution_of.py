@@ -9,11 +9,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bemkit.arrays import IntArray
+from bemkit.arrays import FloatArray, IntArray
 from bemkit.contact.body import ContactState, SlipHistory
 from bemkit.errors import ResultWarning
 from bemkit.geometry.local_values import mean_tractions
 from bemkit.geometry.spaces import dof_points
+from bemkit.model.fields import HeldForces
 from bemkit.model.model import Model
 from bemkit.model.solved_contact import contact_warnings
 from bemkit.plan import Plan
@@ -42,6 +43,9 @@ def solution_of(
     prepared = model.prepared
     state, node_status = result.state, result.node_status
     solved, reactions, depth = model.boundary_fields(state), model.reactions(state), model.depth
+    held = model.held_forces(state)
+    for number, node, force in zip(held.bodies, held.nodes, held.forces, strict=True):
+        reactions[number][node] -= force
     table = _contact_table(model, state, node_status)
     displacements = [displacement for displacement, _, _ in solved]
     of_contact = contact_warnings(model, displacements, node_status) if result.is_converged else ()
@@ -62,7 +66,7 @@ def solution_of(
         result = replace(result, status=Status.NOT_FINITE, message=Status.NOT_FINITE.value)
     law = prepared.law if motion is None else prepared.law.at_slip(motion)
     sides = _contact_sides(prepared)
-    resultants = _resultants(prepared, table)
+    resultants = _resultants(prepared, table, held)
     on_first = [_on_first_side(own, sides[own[0].name]) for own in resultants]
     on_parts = forces_on_parts(
         pair
@@ -81,7 +85,7 @@ def solution_of(
         contact_sides=sides,
         contact_directions=prepared.frame[:, 0].copy(),
         friction_bound=bound_at(table, law),
-        contacts=contact_forces(table, depth, on_first, lengths, transitions),
+        contacts=contact_forces(table, depth, on_first, lengths, transitions, _along_contacts(prepared, held)),
         rigid={
             body.name: RigidResult(body.name, *(depth * reaction).tolist(), *moved.tolist())
             for body, (moved, reaction) in zip(prepared.scene.rigid, model.rigid_bodies(state), strict=True)
@@ -102,8 +106,11 @@ def solution_of(
     )
 
 
-def _resultants(prepared: Prepared, table: ContactTable) -> list[list[PartForce]]:
-    """Return the resultants of each contact with nodes on its elastic sides, first on the one with the nodes."""
+def _resultants(prepared: Prepared, table: ContactTable, held: HeldForces) -> list[list[PartForce]]:
+    """Return the resultants of each contact with nodes on its elastic sides, first on the one with the nodes.
+
+    Those at nodes that supports hold belong to contacts with fixed obstacles.
+    """
     traction = np.stack([table.sigma_n, table.sigma_t], axis=1)
     areas = prepared.scene.depth * table.weight
     forces = np.einsum("nk,nkc->nc", areas[:, None] * traction, prepared.frame)
@@ -112,7 +119,25 @@ def _resultants(prepared: Prepared, table: ContactTable) -> list[list[PartForce]
         own, begin = forces[begin : begin + rows.n_contact], begin + rows.n_contact
         signed = zip((own, -own), rows.acting_at(prepared.bodies), strict=False)  # a rigid partner has no points
         resultants.append([nodal_resultant(rows.name, each, points) for each, points in signed])
+    for number, node, name, force in zip(*held[:2], _contacts_of(prepared, held), held.forces, strict=True):
+        own = next(each for each in resultants if each[0].name == name)
+        point = dof_points(prepared.bodies[number].space)[node]
+        own[0] += nodal_resultant(name, prepared.scene.depth * force[None], point[None])
     return resultants
+
+
+def _contacts_of(prepared: Prepared, held: HeldForces) -> list[str]:
+    """Return the contact of each held node."""
+    return [prepared.names[neighbour] for neighbour in held.neighbours.tolist()]
+
+
+def _along_contacts(prepared: Prepared, held: HeldForces) -> dict[str, FloatArray]:
+    """Return the normal and tangential force (2,) [N/m] at held nodes, along the directions beside them, by contact."""
+    along = np.einsum("nkc,nc->nk", prepared.frame[held.neighbours], held.forces)
+    sums: dict[str, FloatArray] = {}
+    for name, force in zip(_contacts_of(prepared, held), along, strict=True):
+        sums[name] = sums.get(name, np.zeros(2)) + force
+    return sums
 
 
 def _on_first_side(own: Sequence[PartForce], sides: Sequence[SideName]) -> PartForce:

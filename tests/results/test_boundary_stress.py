@@ -12,6 +12,7 @@ from bemkit.errors import InputError
 from bemkit.geometry.mesh import UnknownPartError
 from bemkit.operators.somigliana.locate import PointNotInsideError
 from bemkit.results.tables import table_of
+from bemkit.testing import check_solution
 from tests.perforated_plate import NOMINAL, plate
 from tests.slow import slow_except
 
@@ -147,3 +148,29 @@ def test_contact_tractions_go_on_to_a_node_that_a_support_holds(degree: int) -> 
     # 0.5 to 0.86 of the pressure was missing at the corner; the condition of high degrees costs three digits
     np.testing.assert_allclose(tractions[:, :, 1], pressure, rtol=1e-12)
     assert solution.contact.n_contact < body.mesh.part("floor").size * degree + 1
+    # the corner's share of the force is the floor's, and no reaction of the wall
+    forces = {force.name: force.force_y for force in body.part_forces}
+    assert forces["floor"] == pytest.approx(pressure, rel=1e-12)
+    assert solution.force_normal == pytest.approx(pressure, rel=1e-12)
+    assert abs(forces["wall"]) < 1e-12 * pressure
+    assert check_solution(solution).is_good
+
+
+def test_contact_does_not_pull_at_a_node_that_a_support_holds() -> None:
+    """The wall lifts the end of the block: tractions of separated nodes do not go on to the corner."""
+    parts = (
+        bk.Part("floor", bk.Contact(bk.RigidHalfPlane()), sides=("bottom",)),
+        bk.Part("wall", bk.PrescribedDisplacement(x=0.0, y=2e-3), sides=("left",)),
+        bk.Part("load", bk.Pressure(1e-3), sides=("top",)),
+    )
+    scene = bk.Scene(
+        title="lifted", shape=bk.Rectangle(2.0, 0.5), material=bk.Material(1.0, 0.3), parts=parts,
+        law=bk.Coulomb(0.2), discretisation=bk.Galerkin(6), mesh=bk.MeshOptions(elements=20),
+    )  # fmt: skip
+    solution = bk.run(scene)
+    table, body = solution.contact, solution.body
+    assert not table.is_closed[np.argmin(table.x)]
+    tractions = body.boundary.traction_dofs.reshape(body.mesh.n_elements, -1, 2)
+    first = body.mesh.part("floor")[np.argmin(body.mesh.centres[body.mesh.part("floor"), 0])]
+    assert not tractions[first].any()
+    assert check_solution(solution).is_good

@@ -66,7 +66,7 @@ def test_transitions_do_not_depend_on_the_first_node(begin: int) -> None:
 def test_lengths_and_estimates_do_not_depend_on_the_first_node(begin: int) -> None:
     table = hole(begin)
     transitions = find_transitions(table)
-    (force,) = contact_forces(table, 1.0, [PartForce("hole", 0.0, 0.0, 0.0)], [2.0 * np.pi], transitions)
+    (force,) = contact_forces(table, 1.0, [PartForce("hole", 0.0, 0.0, 0.0)], [2.0 * np.pi], transitions, {})
     assert force.contact_length == pytest.approx(2.0 * HALF_ANGLE, abs=1e-3)
     unrolled_table, on_it = unrolled(table, transitions)
     assert len(resolved_transitions(unrolled_table, on_it)) == 4

@@ -197,7 +197,7 @@ def test_each_run_of_nodes_with_partners_has_its_own_contact_length() -> None:
     rows = table([STICK] * 3 + [SEPARATED] * 3 + [SEPARATED, FORWARD], s=s, x=s)
     (end,) = find_transitions(rows)
     assert end.s == 21.0
-    (force,) = contact_forces(rows, 1.0, [PartForce("a", 0.0, 0.0, 0.0)], [30.0], (end,))
+    (force,) = contact_forces(rows, 1.0, [PartForce("a", 0.0, 0.0, 0.0)], [30.0], (end,), {})
     assert force.contact_length == pytest.approx(3.0 + 1.0, rel=1e-12)
 
 
