@@ -221,7 +221,8 @@ class _Side:
         self.projection = _projection(placed.space, placed.traction_space)
         nodes, local = np.unique(placed.space.element_dofs[elements], return_inverse=True)
         self.local, self.reached = local.reshape(elements.size, -1), np.zeros(nodes.size)
-        self.dofs, self.is_held, self.is_fixed = nodes, np.zeros(nodes.size, bool), False
+        self.dofs, self.has_force = nodes, np.zeros(nodes.size, bool)
+        self.is_at_obstacle = self.is_fixed = False
         self.position = np.zeros(placed.space.n_dofs // 2, np.intp)
         self.position[nodes] = np.arange(nodes.size)
         self.entries: list[_Entries] = []
@@ -231,10 +232,11 @@ class _Side:
     ) -> None:
         """Take a contact whose nodes count on from the given one."""
         nodes = self.position[nodes]
+        self.has_force[nodes] = True
         self.entries.append((shares, contact_nodes, nodes))
         np.add.at(self.reached, nodes, np.abs(shares) * rows.weights[contact_nodes - first])
         if rows.couplings is None:  # an obstacle ends nowhere
-            self.is_held, self.is_fixed = self.reached == 0.0, rows.other < 0
+            self.is_at_obstacle, self.is_fixed = True, rows.other < 0
             self.reached[:] = 1.0 + self.reached.max()
 
     def recovered(self) -> RecoveredSide:
@@ -261,14 +263,14 @@ class _Side:
         return RecoveredSide(self.body, self.elements, shares, contact_nodes, nodes, values, self.local, held)
 
     def _held(self, shapes: FloatArray, integrals: FloatArray, shares: FloatArray) -> _HeldNodes:
-        continued = continued_to_ends(self.space, self.elements, ~self.is_held[self.local])
+        has_force = self.has_force[self.local] | (not self.is_at_obstacle)
+        continued = continued_to_ends(self.space, self.elements, has_force)
         element, k = np.nonzero(np.diagonal(continued, axis1=1, axis2=2) == 0.0)
-        contact_node = np.zeros(self.is_held.size, np.intp)
+        contact_node = np.zeros(self.has_force.size, np.intp)
         for _, contact_nodes, nodes in self.entries:
             contact_node[nodes] = contact_nodes
         local, each = self.local[element], np.arange(k.size)
-        # the nearest node of the element that is not held
-        distances = np.where(self.is_held[local], np.inf, np.abs(np.arange(local.shape[1]) - k[:, None]))
+        distances = np.where(has_force[element], np.abs(np.arange(local.shape[1]) - k[:, None]), np.inf)
         return _HeldNodes(
             nodes=self.dofs[local[each, k]],
             neighbours=contact_node[local[each, distances.argmin(axis=1)]],
