@@ -77,12 +77,15 @@ class HeldForces(NamedTuple):
         The contact node beside each.
     forces : (n, 2) array [N/m]
         On the body, in x and y.
+    lengths : (n,) array [m]
+        Of boundary on which they act.
     """
 
     bodies: IntArray
     nodes: IntArray
     neighbours: IntArray
     forces: FloatArray
+    lengths: FloatArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,6 +139,7 @@ class TractionRecovery:
             np.concatenate([none, *(side.held.nodes for side in self.sides)]),
             np.concatenate([none, *(side.held.neighbours for side in self.sides)]),
             np.concatenate([np.zeros((0, 2)), *(side.held_forces(forces) for side in self.sides)]),
+            np.concatenate([np.zeros(0), *(side.held.lengths for side in self.sides)]),
         )
 
 

@@ -194,13 +194,13 @@ def contact_forces(
         Of the same parts; weights of a corner node may include a share of the next part.
     transitions : sequence of Transition
         Of the same table.
-    at_held_nodes : mapping of str to (2,) array [N/m]
-        Normal and tangential force at nodes of a contact that supports hold.
+    at_held_nodes : mapping of str to (3,) array [N/m], [N/m], [m]
+        Normal and tangential force, and closed length, at nodes of a contact that supports hold.
     """
     zones, forces = unrolled(table, transitions), []
     for resultant, length in zip(resultants, lengths, strict=True):
-        closed = min(length, _contact_length(*zones, resultant.name))
-        further = at_held_nodes.get(resultant.name, np.zeros(2))
+        further = at_held_nodes.get(resultant.name, np.zeros(3))
+        closed = min(length, _contact_length(*zones, resultant.name) + float(further[2]))
         entries = vars(resultant) | _sizes(table, depth, resultant.name, further)
         forces.append(ContactForce(**entries, contact_length=closed))
     return tuple(forces)

@@ -85,7 +85,7 @@ def solution_of(
         contact_sides=sides,
         contact_directions=prepared.frame[:, 0].copy(),
         friction_bound=bound_at(table, law),
-        contacts=contact_forces(table, depth, on_first, lengths, transitions, _along_contacts(prepared, held)),
+        contacts=contact_forces(table, depth, on_first, lengths, transitions, _along_contacts(prepared, table, held)),
         rigid={
             body.name: RigidResult(body.name, *(depth * reaction).tolist(), *moved.tolist())
             for body, (moved, reaction) in zip(prepared.scene.rigid, model.rigid_bodies(state), strict=True)
@@ -131,12 +131,16 @@ def _contacts_of(prepared: Prepared, held: HeldForces) -> list[str]:
     return [prepared.names[neighbour] for neighbour in held.neighbours.tolist()]
 
 
-def _along_contacts(prepared: Prepared, held: HeldForces) -> dict[str, FloatArray]:
-    """Return the normal and tangential force (2,) [N/m] at held nodes, along the directions beside them, by contact."""
+def _along_contacts(prepared: Prepared, table: ContactTable, held: HeldForces) -> dict[str, FloatArray]:
+    """Return normal and tangential force [N/m] and closed length [m] at held nodes, (3,) by contact.
+
+    Directions and statuses are those of the contact nodes beside them.
+    """
     along = np.einsum("nkc,nc->nk", prepared.frame[held.neighbours], held.forces)
+    lengths = np.where(table.is_closed[held.neighbours], held.lengths, 0.0)
     sums: dict[str, FloatArray] = {}
-    for name, force in zip(_contacts_of(prepared, held), along, strict=True):
-        sums[name] = sums.get(name, np.zeros(2)) + force
+    for name, values in zip(_contacts_of(prepared, held), np.column_stack([along, lengths]), strict=True):
+        sums[name] = sums.get(name, np.zeros(3)) + values
     return sums
 
 

@@ -153,6 +153,7 @@ def test_contact_tractions_go_on_to_a_node_that_a_support_holds(degree: int) -> 
     assert forces["floor"] == pytest.approx(pressure, rel=1e-12)
     assert solution.force_normal == pytest.approx(pressure, rel=1e-12)
     assert abs(forces["wall"]) < 1e-12 * pressure
+    assert solution.contacts[0].contact_length == pytest.approx(1.0, rel=1e-12)
     assert check_solution(solution).is_good
 
 
