@@ -196,11 +196,14 @@ class RecoveredSide:
     def tractions(self, forces: FloatArray) -> FloatArray:
         """Return the tractions (m, n_values, 2) [Pa] under forces (n_contact, 2) [N/m] of contact nodes."""
         tractions = np.asarray(self.by_force @ self._on_side(forces)[self.local])
-        np.add.at(tractions, self.held.elements, self.held.shapes[:, :, None] * self._at_held(forces)[:, None])
+        if self.held.nodes.size:
+            np.add.at(tractions, self.held.elements, self.held.shapes[:, :, None] * self._at_held(forces)[:, None])
         return tractions
 
     def held_forces(self, forces: FloatArray) -> FloatArray:
         """Return the forces (h, 2) [N/m] at held nodes under those of contact nodes."""
+        if not self.held.nodes.size:
+            return np.zeros((0, 2))
         return np.asarray(self.held.lengths[:, None] * self._at_held(forces))
 
     def _at_held(self, forces: FloatArray) -> FloatArray:

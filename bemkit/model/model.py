@@ -216,13 +216,11 @@ class Model:
         """Return the forces of contact at nodes that supports hold in both directions; `reactions` contain them."""
         prepared = self.prepared
         held = prepared.recovery.held_forces(self._forces_of_nodes(state))
-        bodies, nodes = held.bodies.tolist(), held.nodes.tolist()
-        touching = {
-            (rows.body, node) for rows in prepared.rows if rows.couplings is None for node in rows.nodes.tolist()
-        }
+        at_obstacles = [rows for rows in prepared.rows if rows.couplings is None]
         is_held = [
-            bool(prepared.bodies[body].conditions.is_supported[node].all()) and (body, node) not in touching
-            for body, node in zip(bodies, nodes, strict=True)
+            bool(prepared.bodies[body].conditions.is_supported[node].all())
+            and not any(rows.body == body and node in rows.nodes for rows in at_obstacles)
+            for body, node in zip(held.bodies.tolist(), held.nodes.tolist(), strict=True)
         ]
         return HeldForces(*(column[np.array(is_held, bool)] for column in held))
 
