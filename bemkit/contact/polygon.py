@@ -9,7 +9,7 @@ import numpy as np
 from bemkit.arrays import BoolArray, FloatArray
 from bemkit.contact.obstacle import check_pair, unit_vectors
 from bemkit.errors import InputError
-from bemkit.geometry.vectors import turned_left
+from bemkit.geometry.vectors import turned_left, winding_numbers
 
 _ROUND_OFF = 1e-12
 """Largest distance from a corner, relative to the coordinates, that may be round-off."""
@@ -90,11 +90,6 @@ class RigidPolygon:
         return _ROUND_OFF * float(np.abs(np.concatenate([np.array(self.vertices, dtype=float), points])).max())
 
     def _holds(self, points: FloatArray) -> BoolArray:
-        """Return a mask (n,) of points inside, from the number of sides that a ray to the right crosses."""
-        start, along = self._sides()
-        x, y = points[:, :1], points[:, 1:]
-        end = np.roll(start, -1, axis=0)  # exactly the start of the next side
-        spans = (start[:, 1] > y) != (end[:, 1] > y)
-        rise = np.where(along[:, 1] == 0.0, 1.0, along[:, 1])
-        crossings = spans & (x < start[:, 0] + along[:, 0] * (y - start[:, 1]) / rise)
-        return np.asarray(crossings.sum(axis=1) % 2 == 1)
+        """Return a mask (n,) of points inside."""
+        start, _ = self._sides()
+        return winding_numbers(points, start, np.roll(start, -1, axis=0)) != 0

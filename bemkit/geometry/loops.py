@@ -21,7 +21,7 @@ from bemkit.geometry.pieces import (
     split_until_flat,
 )
 from bemkit.geometry.quadrature import gauss_legendre
-from bemkit.geometry.vectors import angles_between, check_magnitude, cross, norms
+from bemkit.geometry.vectors import check_magnitude, cross, norms, winding_numbers
 
 if TYPE_CHECKING:
     from bemkit.geometry.symmetry import Symmetry
@@ -105,16 +105,14 @@ def swept_areas(pieces: Pieces) -> FloatArray:
 def is_inside(point: FloatArray, loop: Pieces) -> bool:
     """Return whether a point (2,), not on the loop, lies inside of it, whichever way the loop runs.
 
-    The winding number is the sum of the angles under which the pieces are seen. That of a curved piece is that of its
-    chord unless the point lies between them; then the piece is halved.
+    Curved pieces are halved until the point does not lie between them and their chords.
     """
-    total = 0.0
+    number = 0
     while len(loop):
-        p = np.broadcast_to(point, loop.start.shape)
-        is_near = (point_distances(p, loop.start, loop.end) <= loop.deviation) & (loop.deviation > loop.resolution)
-        total += float(angles_between(loop.start - point, loop.end - point)[~is_near].sum())
+        is_near = (point_distances(point, loop.start, loop.end) <= loop.deviation) & (loop.deviation > loop.resolution)
+        number += int(winding_numbers(point[None], loop.start[~is_near], loop.end[~is_near])[0])
         loop = concatenate(list(loop.take(np.flatnonzero(is_near)).halves()))
-    return round(total / (2.0 * np.pi)) != 0
+    return number != 0
 
 
 def _meeting_message(first: int, second: int, describe: Callable[[int], str]) -> str:

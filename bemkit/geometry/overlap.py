@@ -12,7 +12,7 @@ from scipy.spatial import cKDTree
 from bemkit.arrays import BoolArray, FloatArray, IntArray
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.pieces import overlapping_boxes, point_distances
-from bemkit.geometry.vectors import norms
+from bemkit.geometry.vectors import norms, winding_numbers
 
 ROUND_OFF = 1e-6
 """Depth that may be round-off of curves, relative to the size of the smaller body."""
@@ -93,8 +93,7 @@ class Polyline:
 
         Notes
         -----
-        A point is inside of loops if a ray along x crosses them an odd number of times. Its depth is the distance to
-        the nearest piece; that to the pieces at the nearest vertex is a bound.
+        The depth is the distance to the nearest piece; that to the pieces at the nearest vertex is a bound.
         """
         low, high = self.box
         rows = np.flatnonzero(((points > low) & (points < high)).all(axis=1))
@@ -126,14 +125,9 @@ class Polyline:
 
     def _holds(self, points: FloatArray) -> BoolArray:
         """Return (n,) bool: whether loops go around points (n, 2)."""
-        (x0, y0), (x1, y1) = (ends.T for ends in self.pieces)
         # off the lines through nodes, whose coordinates differ by round-off from one image to the next
         shifted = points + _SHIFT * np.ptp(self.points, axis=(0, 1)).max()
-        x, y = shifted[:, :1], shifted[:, 1:]
-        is_beside = (y0 > y) != (y1 > y)
-        rise = np.where(y1 == y0, 1.0, y1 - y0)
-        crosses = is_beside & (x < x0 + (y - y0) / rise * (x1 - x0))
-        return np.asarray(np.count_nonzero(crosses, axis=1) % 2 == 1)
+        return winding_numbers(shifted, *self.pieces) != 0
 
 
 def near_pairs(outlines: Sequence[Polyline]) -> list[tuple[int, int]]:

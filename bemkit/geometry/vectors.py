@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from bemkit.arrays import FloatArray
+from bemkit.arrays import FloatArray, IntArray
 from bemkit.errors import GeometryError
 
 SMALLEST, LARGEST = 1e-140, 1e140
@@ -31,6 +31,16 @@ def enclosed_area(points: FloatArray) -> float:
     """Return the area of the polygon through points (n, 2), negative if it runs clockwise."""
     arms = points - points[0]
     return float(0.5 * cross(arms, np.roll(arms, -1, axis=0)).sum())
+
+
+def winding_numbers(points: FloatArray, start: FloatArray, end: FloatArray) -> IntArray:
+    """Return how often (n,) closed loops of segments (m, 2) run anticlockwise around points (n, 2).
+
+    Segments that cross the ray from a point to the right count 1 upwards, -1 downwards.
+    """
+    to_start, to_end = start - points[:, None], end - points[:, None]
+    rise = np.subtract(to_end[..., 1] > 0.0, to_start[..., 1] > 0.0, dtype=int)
+    return np.asarray(np.sum(rise * (rise * cross(to_start, to_end) > 0.0), axis=1))
 
 
 def circle_centre(first: FloatArray, second: FloatArray, third: FloatArray) -> FloatArray | None:

@@ -12,7 +12,7 @@ from bemkit.errors import GeometryError
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.neighbours import along_boundary
 from bemkit.geometry.spaces import BoundarySpace
-from bemkit.geometry.vectors import angles_between, norms, turned_right
+from bemkit.geometry.vectors import norms, turned_right, winding_numbers
 
 _RESOLUTION = 32.0 * np.finfo(float).eps
 """Largest difference of equal positions, relative to the largest coordinate."""
@@ -205,11 +205,8 @@ class ContactSide:
 
 
 def encloses(mesh: BoundaryMesh, points: FloatArray) -> BoolArray:
-    """Return a mask (k,) of points (k, 2) inside the body bounded by the chords of a mesh, by winding numbers."""
-    whole = mesh.whole
-    to_points = points[:, None]
-    angles = angles_between(whole.start - to_points, whole.end - to_points).sum(axis=1)
-    return np.asarray(angles > (-np.pi if mesh.is_exterior else np.pi))
+    """Return a mask (k,) of points (k, 2) inside the body bounded by the chords of a mesh."""
+    return winding_numbers(points, mesh.whole.start, mesh.whole.end) == (0 if mesh.is_exterior else 1)
 
 
 def faces_away(
