@@ -38,7 +38,11 @@ _SEVERAL = ("parts", "steps", "load_factors", "body_forces", "bodies", "rigid", 
 
 
 def outline_of(shape: Shape) -> Outline:
-    """Return the outline of a shape; InputError if its method takes arguments or returns no outline."""
+    """Return the outline of a shape; InputError if it has no such method, or one that returns anything else."""
+    if not callable(getattr(shape, "outline", None)):
+        raise InputError(
+            f"shape is {shape!r}, which has no method outline(): give one as bemkit.geometry.shapes.Shape describes it"
+        )
     outline: object = called(shape, "outline", (), "outline(self), which returns a bemkit.geometry.outline.Outline")
     if not isinstance(outline, Outline):
         raise InputError(
@@ -76,12 +80,6 @@ def check_objects(owner: Any, name: str = "") -> None:
         raise InputError(
             f"{begin}obstacle is {obstacle!r}, which has no method gap(points, normals): give one as "
             "bemkit.contact.obstacle.Obstacle describes it"
-        )
-    shape = getattr(owner, "shape", None)
-    if shape is not None and not callable(getattr(shape, "outline", None)):
-        raise InputError(
-            f"{begin}shape is {shape!r}, which has no method outline(): give one as bemkit.geometry.shapes.Shape "
-            "describes it"
         )
     for attribute in _SEVERAL:
         value = getattr(owner, attribute, ())

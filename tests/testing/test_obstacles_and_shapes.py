@@ -171,7 +171,7 @@ def wandering_circle() -> Outline:
 @pytest.mark.parametrize(
     ("outline", "complaint"),
     [
-        (lambda: 3, "Own.outline returns a int, not an Outline"),
+        (lambda: 3, "Own.outline fails: .*outline returned a int: return a bemkit.geometry.outline.Outline"),
         (lambda: circle(end=6.0), "Own.outline fails: .*make every side start where the one before it ends"),
         (wandering_circle, r"Own.outline has side 'arc-1' [\d.]+ away the next"),
     ],
