@@ -48,6 +48,14 @@ def arc_lengths(mesh: BoundaryMesh, elements: IntArray, xi: FloatArray) -> Float
     return np.asarray(starts[:, None] + 0.5 * lengths[:, None] * (xi + 1.0))
 
 
+def at_arc_lengths(mesh: BoundaryMesh, elements: IntArray, s: FloatArray) -> tuple[IntArray, FloatArray]:
+    """Invert `arc_lengths`: positions (n,) among `elements` and xi (n,) of s (n,) [m]; a node starts its element."""
+    lengths = mesh.lengths[elements]
+    ends = np.cumsum(lengths)
+    position = np.minimum(np.searchsorted(ends, s, side="right"), elements.size - 1)
+    return position, np.clip(1.0 - 2.0 * (ends[position] - s) / lengths[position], -1.0, 1.0)
+
+
 def drawn_points(mesh: BoundaryMesh, degree: int) -> FloatArray:
     """Return the local coordinates (q,) by which elements with fields of a degree are drawn: ends of straight ones."""
     is_straight = degree <= 1 and bool(mesh.is_straight.all())

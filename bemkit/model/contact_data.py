@@ -12,7 +12,7 @@ from bemkit.contact.contact_nodes import ContactNodes, contact_frame, nodes_on
 from bemkit.contact.obstacle import Obstacle, measure_contact
 from bemkit.geometry.local_values import dof_weights
 from bemkit.geometry.mesh import BoundaryMesh
-from bemkit.geometry.neighbours import along_boundary
+from bemkit.geometry.neighbours import along_boundary, arc_lengths
 from bemkit.geometry.spaces import BoundarySpace, dof_points, element_nodes
 from bemkit.scene.body_scene import BodyScene
 
@@ -166,15 +166,14 @@ class _Side:
         nodes, normals = nodes_on(space, elements)
         points = dof_points(space, mesh)[nodes]
         gap, directions = measure_contact(obstacle, points, normals)
-        lengths, ends = mesh.lengths[elements], mesh.elements[elements]
+        ends = mesh.elements[elements]
         element_runs = np.cumsum(ends[:, 0] != np.roll(ends[:, 1], 1))
-        begin = np.concatenate([[0.0], np.cumsum(lengths)[:-1]])
         dofs = space.element_dofs[elements]
         places = element_nodes(space)[elements]
         arc_length, facing = np.full(space.n_dofs // 2, np.inf), np.full(space.n_dofs // 2, -1.0)
         runs = np.zeros(space.n_dofs // 2, np.intp)
         runs[dofs] = element_runs[:, None]
-        np.minimum.at(arc_length, dofs, begin[:, None] + 0.5 * lengths[:, None] * (places + 1.0))
+        np.minimum.at(arc_length, dofs, arc_lengths(mesh, elements, places))
         towards = np.zeros((space.n_dofs // 2, 2))
         towards[nodes] = directions
         np.maximum.at(facing, dofs, np.sum(mesh.normals_at(elements, places) * towards[dofs], axis=2))

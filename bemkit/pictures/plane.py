@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from bemkit.arrays import FloatArray, IntArray
-from bemkit.geometry.neighbours import along_boundary
+from bemkit.geometry.neighbours import along_boundary, at_arc_lengths
 from bemkit.geometry.symmetry import Symmetry
 from bemkit.pictures.drawing import BLUE, GREY, Axes, axes_or_new
 from bemkit.pictures.shown import DrawnBody, DrawnScene
@@ -148,12 +148,10 @@ def evenly_spaced(body: DrawnBody, elements: IntArray, spacing: float, factor: f
         Distance [m] of neighbours, and by how much displacements are enlarged.
     """
     elements = along_boundary(body.mesh, elements)
-    ends = np.cumsum(body.mesh.lengths[elements])
-    n = max(1, round(ends[-1] / spacing))
-    s = (np.arange(n) + 0.5) * ends[-1] / n
-    place = np.searchsorted(ends, s).clip(max=ends.size - 1)
-    elements = elements[place]
-    xi = (1.0 - 2.0 * (ends[place] - s) / body.mesh.lengths[elements])[:, None]
+    length = body.mesh.lengths[elements].cumsum()[-1]
+    n = max(1, round(length / spacing))
+    position, xi = at_arc_lengths(body.mesh, elements, (np.arange(n) + 0.5) * length / n)
+    elements, xi = elements[position], xi[:, None]
     points = body.mesh.points(elements, xi)
     drawn = points + factor * body.displacement_at(elements, xi)
     return BoundaryPoints(points[:, 0], drawn[:, 0], body.mesh.normals_at(elements, xi)[:, 0])

@@ -15,7 +15,7 @@ from bemkit.arrays import FloatArray, read_only
 from bemkit.errors import InputError
 from bemkit.geometry.local_values import from_own_nodes
 from bemkit.geometry.meshing.discretise import Algebraic
-from bemkit.geometry.neighbours import along_boundary, arc_lengths
+from bemkit.geometry.neighbours import along_boundary, arc_lengths, at_arc_lengths
 from bemkit.geometry.quadrature import gauss_legendre
 from bemkit.geometry.spaces import element_nodes
 from bemkit.results.solution import Solution
@@ -256,14 +256,11 @@ def _along(solution: Solution, places: SamplePoints) -> FloatArray:
     mesh, table = solution.mesh, solution.contact
     space = solution.scene.discretisation.displacement_space(mesh)
     elements = along_boundary(mesh, mesh.part(places.part))
-    lengths = mesh.lengths[elements]
-    ends = np.cumsum(lengths)
-    element_index = np.clip(np.searchsorted(ends, places.s), 0, elements.size - 1)
-    basis = space.basis(np.clip(2.0 * (places.s - ends[element_index]) / lengths[element_index] + 1.0, -1.0, 1.0))
+    element_index, xi = at_arc_lengths(mesh, elements, places.s)
     at_dofs = arc_lengths(mesh, elements, element_nodes(space)[elements])
     rows = table.rows(places.part)
     columns = np.stack([np.interp(at_dofs, table.s[rows], getattr(table, name)[rows]) for name in COLUMNS], axis=2)
-    return np.asarray(np.einsum("pn,npc->cn", basis, from_own_nodes(space, columns, elements)[element_index]))
+    return np.asarray(np.einsum("pn,npc->cn", space.basis(xi), from_own_nodes(space, columns, elements)[element_index]))
 
 
 def _gauss_places(solution: Solution, part: str) -> SamplePoints:

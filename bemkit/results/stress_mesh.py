@@ -16,7 +16,7 @@ from scipy.spatial import Delaunay, KDTree
 
 from bemkit.arrays import BoolArray, FloatArray, IntArray
 from bemkit.geometry.mesh import BoundaryMesh
-from bemkit.geometry.neighbours import corner_nodes
+from bemkit.geometry.neighbours import at_arc_lengths, corner_nodes
 from bemkit.geometry.vectors import cross, norms
 from bemkit.operators.somigliana.potentials import PotentialFields
 from bemkit.results.boundary_stress import BoundaryStress
@@ -164,10 +164,8 @@ class _Ring:
     @property
     def places(self) -> tuple[IntArray, FloatArray]:
         """Elements (n,) and local coordinates (n, 1) of the places, starts of elements at -1."""
-        ends = np.cumsum(self.mesh.lengths[self.loop])
-        number = np.minimum(np.searchsorted(ends, self.s, side="right"), len(ends) - 1)
-        lengths = self.mesh.lengths[self.loop[number]]
-        return self.loop[number], np.clip(1.0 - 2.0 * (ends[number] - self.s) / lengths, -1.0, 1.0)[:, None]
+        position, xi = at_arc_lengths(self.mesh, self.loop, self.s)
+        return self.loop[position], xi[:, None]
 
     @property
     def points(self) -> FloatArray:

@@ -10,7 +10,7 @@ import numpy as np
 from bemkit.arrays import BoolArray, FloatArray, IntArray
 from bemkit.errors import GeometryError
 from bemkit.geometry.mesh import BoundaryMesh
-from bemkit.geometry.neighbours import along_boundary
+from bemkit.geometry.neighbours import along_boundary, arc_lengths
 from bemkit.geometry.spaces import BoundarySpace
 from bemkit.geometry.vectors import norms, turned_right, winding_numbers
 
@@ -94,8 +94,7 @@ class ContactSide:
     @cached_property
     def arc_length(self) -> FloatArray:
         """(m, n_local) array [m]: arc length of the nodes from the start of the side."""
-        before = np.cumsum(self.lengths) - self.lengths
-        return before[:, None] + 0.5 * self.lengths[:, None] * (1.0 + self.space.local_nodes)
+        return arc_lengths(self.mesh, self.elements, self.space.local_nodes)
 
     @cached_property
     def knots(self) -> FloatArray:
