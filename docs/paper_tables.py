@@ -18,8 +18,9 @@ from typing import NamedTuple
 import numpy as np
 
 from bemkit.arrays import IntArray, read_only
+from bemkit.contact.body import ContactState
 from bemkit.contact.certificate import Scales
-from bemkit.contact.problem import ContactProblem, ContactState
+from bemkit.contact.problem import ContactProblem
 from bemkit.errors import NoResultError
 from bemkit.geometry.meshing.discretise import Algebraic
 from bemkit.model.model import Model, build_model

@@ -4,10 +4,12 @@ import zlib
 
 import numpy as np
 
+from bemkit.contact.body import ContactState, LinearBody
 from bemkit.contact.contact_nodes import ContactNodes, approaches, contact_frame, nodes_on, opened
+from bemkit.contact.dense_body import DenseBody
 from bemkit.contact.direct_body import DirectBody, WholeBody
 from bemkit.contact.laws import Coulomb
-from bemkit.contact.problem import ContactProblem, ContactState, DenseBody, LinearBody
+from bemkit.contact.problem import ContactProblem
 from bemkit.geometry.local_values import dof_weights
 from bemkit.geometry.spaces import dof_points
 from bemkit.operators.steklov_poincare.nodal_conditions import supported

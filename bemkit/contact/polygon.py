@@ -92,4 +92,4 @@ class RigidPolygon:
     def _holds(self, points: FloatArray) -> BoolArray:
         """Return a mask (n,) of points inside."""
         start, _ = self._sides()
-        return winding_numbers(points, start, np.roll(start, -1, axis=0)) != 0
+        return np.asarray(winding_numbers(points, start, np.roll(start, -1, axis=0)) != 0)

@@ -11,19 +11,8 @@ import numpy as np
 from bemkit.arrays import BoolArray, FloatArray, read_only
 from bemkit.contact.body import ClosedVolume, ContactState, LinearBody, SingularResponse
 from bemkit.contact.conditions import LinearConditions, separated, stick
-from bemkit.contact.dense_body import DenseBody
 from bemkit.contact.laws import FrictionLaw, LawError
 from bemkit.errors import InputError
-
-__all__ = [
-    "ClosedVolume",
-    "ContactProblem",
-    "ContactState",
-    "DenseBody",
-    "LawError",
-    "LinearBody",
-    "SingularResponse",
-]
 
 Result = TypeVar("Result")
 

@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, TypeVar
 import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray
+from bemkit.contact.body import ContactState
 from bemkit.contact.conditions import RigidMotions, as_rows, largest_components, of_unit_size
-from bemkit.contact.problem import ContactProblem, ContactState
+from bemkit.contact.problem import ContactProblem
 
 if TYPE_CHECKING:
     from scipy.sparse import csc_array, csr_array

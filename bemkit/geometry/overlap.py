@@ -127,7 +127,7 @@ class Polyline:
         """Return (n,) bool: whether loops go around points (n, 2)."""
         # off the lines through nodes, whose coordinates differ by round-off from one image to the next
         shifted = points + _SHIFT * np.ptp(self.points, axis=(0, 1)).max()
-        return winding_numbers(shifted, *self.pieces) != 0
+        return np.asarray(winding_numbers(shifted, *self.pieces) != 0)
 
 
 def near_pairs(outlines: Sequence[Polyline]) -> list[tuple[int, int]]:

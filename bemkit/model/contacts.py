@@ -10,9 +10,8 @@ import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray, IntArray
 from bemkit.contact.contact_nodes import approaches
-from bemkit.contact.laws import FrictionLaw, Frictionless, LawOfCoefficients
+from bemkit.contact.laws import FrictionLaw, Frictionless, LawError, LawOfCoefficients
 from bemkit.contact.obstacle import RigidHalfPlane
-from bemkit.contact.problem import LawError
 from bemkit.errors import InputError
 from bemkit.geometry.spaces import dof_points
 from bemkit.model.contact_data import ContactData, FacingPart, find_contact

@@ -11,7 +11,8 @@ import numpy as np
 from bemkit.arrays import BoolArray
 from bemkit.contact.body import SingularResponse
 from bemkit.contact.critical_friction import critical_coefficient, sliding_response
-from bemkit.contact.problem import ContactProblem, LawError
+from bemkit.contact.laws import LawError
+from bemkit.contact.problem import ContactProblem
 from bemkit.errors import NoResultError
 from bemkit.operators.threads import blas_threads_for
 from bemkit.results.solution import Solution

@@ -6,8 +6,9 @@ from enum import IntEnum
 import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray, IntArray
+from bemkit.contact.body import ContactState
 from bemkit.contact.conditions import LinearConditions, augmented, of_statuses, slip, stick
-from bemkit.contact.problem import ContactProblem, ContactState
+from bemkit.contact.problem import ContactProblem
 from bemkit.errors import InputError
 
 _FAR = float(np.finfo(float).max)

@@ -6,8 +6,9 @@ from enum import Enum
 import numpy as np
 
 from bemkit.arrays import FloatArray
+from bemkit.contact.body import ContactState
 from bemkit.contact.certificate import Scales
-from bemkit.contact.problem import ContactProblem, ContactState
+from bemkit.contact.problem import ContactProblem
 from bemkit.solvers.active_sets import ProjectionEquations
 from bemkit.solvers.base import Iterate, Status, check_max_steps, check_rho
 from bemkit.solvers.newton import negligible

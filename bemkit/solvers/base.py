@@ -9,8 +9,9 @@ from typing import Protocol
 import numpy as np
 
 from bemkit.arrays import IntArray
+from bemkit.contact.body import ClosedVolume, ContactState, SingularResponse
 from bemkit.contact.certificate import Certificate, certify
-from bemkit.contact.problem import ClosedVolume, ContactProblem, ContactState, SingularResponse
+from bemkit.contact.problem import ContactProblem
 from bemkit.contact.solvability import find_long_motion, find_unsolvable_load, needs_contact
 from bemkit.errors import InputError, NoResultError
 from bemkit.interrupts import interruptible, raise_missed_interrupt
@@ -362,14 +363,13 @@ class _Run:
     def _solution(
         self, iterate: Iterate, status: Status, sets: ActiveSets, certificate: Certificate, history: list[StepRecord]
     ) -> ContactSolution:
-        last = history[-1]
-        worst = f"worst certificate entry {certificate.worst:.1e} after {last.step} steps"
+        worst = f"worst certificate entry {certificate.worst:.1e} after {history[-1].step} steps"
         return ContactSolution(
             state=iterate.state,
             status=status,
             certificate=certificate,
             node_status=sets.node_status,
-            steps=last.step,
+            steps=history[-1].step,
             linear_solves=iterate.linear_solves,
             message=f"{status.value} [{worst}]" + (f" ({iterate.message})" if iterate.message else ""),
             history=tuple(history),

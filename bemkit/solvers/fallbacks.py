@@ -5,7 +5,8 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from bemkit.contact.problem import ContactProblem, ContactState
+from bemkit.contact.body import ContactState
+from bemkit.contact.problem import ContactProblem
 from bemkit.errors import InputError
 from bemkit.solvers.active_sets import ActiveSets, ProjectionEquations, Residual, contact_sets
 from bemkit.solvers.base import ContactSolver, Iterate, Status, check_max_steps

@@ -2,8 +2,9 @@
 
 from dataclasses import dataclass, field
 
+from bemkit.contact.body import ContactState
 from bemkit.contact.laws import Tresca
-from bemkit.contact.problem import ContactProblem, ContactState
+from bemkit.contact.problem import ContactProblem
 from bemkit.errors import InputError
 from bemkit.solvers.base import ContactSolver, Iterate, check_max_steps, solve
 from bemkit.solvers.fallbacks import Fallbacks

@@ -5,8 +5,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from bemkit.arrays import IntArray
+from bemkit.contact.body import ContactState
 from bemkit.contact.certificate import Scales
-from bemkit.contact.problem import ContactProblem, ContactState
+from bemkit.contact.problem import ContactProblem
 from bemkit.errors import InputError
 from bemkit.solvers.base import ContactSolution, ContactSolver, solve
 

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray
+from bemkit.contact.body import ClosedVolume, ContactState, LinearBody, SingularResponse
 from bemkit.contact.certificate import DEFORMED, Scales
 from bemkit.contact.conditions import (
     LinearConditions,
@@ -19,7 +20,7 @@ from bemkit.contact.conditions import (
     separated,
     stick,
 )
-from bemkit.contact.problem import ClosedVolume, ContactProblem, ContactState, LinearBody, SingularResponse
+from bemkit.contact.problem import ContactProblem
 from bemkit.errors import InputError
 from bemkit.solvers.active_sets import ActiveSets, ProjectionEquations, Residual, coheres
 

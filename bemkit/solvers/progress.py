@@ -4,7 +4,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from bemkit.contact.problem import ContactProblem, ContactState
+from bemkit.contact.body import ContactState
+from bemkit.contact.problem import ContactProblem
 from bemkit.solvers.active_sets import ProjectionEquations
 from bemkit.solvers.base import Iterate, Status
 from bemkit.solvers.newton import merit

@@ -2,7 +2,8 @@
 
 from dataclasses import dataclass, replace
 
-from bemkit.contact.problem import ContactProblem, ContactState
+from bemkit.contact.body import ContactState
+from bemkit.contact.problem import ContactProblem
 from bemkit.solvers.active_sets import ActiveSets, ProjectionEquations, Residual
 from bemkit.solvers.base import Iterate, Status, check_max_steps, check_rho
 from bemkit.solvers.newton import WEAKEST_AFTER, carried_on, merit, negligible, respond

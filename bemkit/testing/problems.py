@@ -10,8 +10,9 @@ import numpy as np
 import numpy.typing as npt
 
 from bemkit.arrays import FloatArray
+from bemkit.contact.dense_body import DenseBody
 from bemkit.contact.laws import Coulomb, FrictionLaw, Frictionless, Tresca
-from bemkit.contact.problem import ContactProblem, DenseBody
+from bemkit.contact.problem import ContactProblem
 
 
 @dataclass(frozen=True, eq=False)

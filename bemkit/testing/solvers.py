@@ -8,7 +8,9 @@ from dataclasses import is_dataclass
 import numpy as np
 
 from bemkit.arrays import FloatArray
-from bemkit.contact.problem import ContactProblem, ContactState, DenseBody
+from bemkit.contact.body import ContactState
+from bemkit.contact.dense_body import DenseBody
+from bemkit.contact.problem import ContactProblem
 from bemkit.solvers.base import ContactSolution, ContactSolver, Iterate, Status, solve
 from bemkit.testing.failure import demand
 from bemkit.testing.problems import KNOWN_PROBLEMS, KnownProblem

@@ -3,10 +3,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from bemkit.contact.body import ContactState
 from bemkit.contact.certificate import Certificate, certify
+from bemkit.contact.dense_body import DenseBody
 from bemkit.contact.further_laws import CohesiveCoulomb
 from bemkit.contact.laws import Coulomb, Tresca
-from bemkit.contact.problem import ContactProblem, ContactState, DenseBody
+from bemkit.contact.problem import ContactProblem
 from bemkit.solvers.base import solve
 from bemkit.solvers.ssn import SemismoothNewton
 from tests.handmade import block_body, block_problem

@@ -8,12 +8,13 @@ import numpy as np
 import pytest
 
 from bemkit.arrays import FloatArray, IntArray
+from bemkit.contact.body import ContactState
 from bemkit.contact.conditions import LinearConditions, separated, stick
 from bemkit.contact.contact_nodes import ContactNodes
 from bemkit.contact.direct_body import DirectBody
 from bemkit.contact.equilibrium import resultant_imbalance
 from bemkit.contact.laws import Coulomb, FrictionLaw, Frictionless
-from bemkit.contact.problem import ContactProblem, ContactState
+from bemkit.contact.problem import ContactProblem
 from bemkit.geometry import BoundaryMesh, Polygon, Rectangle, Selection, Shape, discretise
 from bemkit.geometry.spaces import BoundarySpace, LinearSpace, dof_points
 from bemkit.model.contact_free_body import ContactFreeBody, certified

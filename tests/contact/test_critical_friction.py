@@ -7,8 +7,9 @@ import pytest
 
 from bemkit.contact.body import SingularResponse
 from bemkit.contact.critical_friction import critical_coefficient, sliding_response
+from bemkit.contact.dense_body import DenseBody
 from bemkit.contact.laws import Coulomb
-from bemkit.contact.problem import ContactProblem, DenseBody
+from bemkit.contact.problem import ContactProblem
 from bemkit.solvers.multistart import probe
 from bemkit.solvers.ssn import SemismoothNewton
 

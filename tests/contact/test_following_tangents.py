@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 import bemkit as bk
+from bemkit.contact.body import ContactState, SingularResponse
 from bemkit.contact.conditions import slip, stick
 from bemkit.contact.held_friction import HeldFriction
-from bemkit.contact.problem import ContactState, SingularResponse
 from bemkit.model.model import build_model
 from bemkit.model.prepared import prepare
 from bemkit.runs.run import UnsolvableSceneError

@@ -3,8 +3,8 @@ import pytest
 
 from bemkit.contact import further_laws, laws
 from bemkit.contact.further_laws import CohesiveCoulomb, PiecewiseLaw, RateStrengthening, SlipWeakening
-from bemkit.contact.laws import Coulomb, FrictionLaw, Frictionless, LawOfCoefficients, RescaledLaw, Tresca
-from bemkit.contact.problem import ContactProblem, LawError
+from bemkit.contact.laws import Coulomb, FrictionLaw, Frictionless, LawError, LawOfCoefficients, RescaledLaw, Tresca
+from bemkit.contact.problem import ContactProblem
 from bemkit.formulas import Expression
 from bemkit.testing import check_law
 from tests.handmade import random_problem

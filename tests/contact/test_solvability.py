@@ -4,9 +4,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from bemkit.contact.body import ContactState, LinearBody
+from bemkit.contact.dense_body import DenseBody
 from bemkit.contact.further_laws import CohesiveCoulomb
 from bemkit.contact.laws import Coulomb, Frictionless, Tresca
-from bemkit.contact.problem import ContactProblem, ContactState, DenseBody, LinearBody
+from bemkit.contact.problem import ContactProblem
 from bemkit.contact.solvability import find_unsolvable_load, needs_contact
 from bemkit.solvers.newton import contact_free_response
 from tests.handmade import block_problem

@@ -5,9 +5,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from bemkit.contact.body import ContactState
 from bemkit.contact.further_laws import CohesiveCoulomb
 from bemkit.contact.laws import Coulomb, Frictionless, Tresca
-from bemkit.contact.problem import ContactProblem, ContactState
+from bemkit.contact.problem import ContactProblem
 from bemkit.solvers.alm import AugmentedLagrangian, BoundUpdate
 from bemkit.solvers.base import solve
 from bemkit.solvers.fixed_point import FixedPoint

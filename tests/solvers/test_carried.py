@@ -10,9 +10,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import bemkit as bk
+from bemkit.contact.body import ContactState
 from bemkit.contact.equilibrium import NOISE_FACTOR, Unbalanced
 from bemkit.contact.laws import Coulomb, Frictionless
-from bemkit.contact.problem import ContactState
 from bemkit.model.model import build_model
 from bemkit.model.prepared import prepare
 from bemkit.solvers.base import ContactSolver

@@ -4,9 +4,11 @@ import numpy as np
 import pytest
 
 import bemkit as bk
+from bemkit.contact.body import ContactState
 from bemkit.contact.certificate import certify
+from bemkit.contact.dense_body import DenseBody
 from bemkit.contact.laws import Coulomb
-from bemkit.contact.problem import ContactProblem, ContactState, DenseBody
+from bemkit.contact.problem import ContactProblem
 from bemkit.solvers.active_sets import NodeStatus, contact_sets
 from bemkit.testing.independent_check import violations_of
 from tests.slow import slow_except

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 from scipy.optimize import nnls
 
+from bemkit.contact.body import ContactState
 from bemkit.contact.conditions import separated, slip, stick
 from bemkit.contact.laws import Coulomb, Frictionless
-from bemkit.contact.problem import ContactProblem, ContactState
+from bemkit.contact.problem import ContactProblem
 from bemkit.solvers.alm import AugmentedLagrangian
 from bemkit.solvers.base import solve
 from bemkit.solvers.fixed_point import FixedPoint

@@ -5,8 +5,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from bemkit.contact.body import ContactState
+from bemkit.contact.dense_body import DenseBody
 from bemkit.contact.laws import Coulomb, Frictionless, Tresca
-from bemkit.contact.problem import ContactProblem, ContactState, DenseBody
+from bemkit.contact.problem import ContactProblem
 from bemkit.solvers.active_sets import NodeStatus
 from bemkit.solvers.alm import AugmentedLagrangian, BoundUpdate
 from bemkit.solvers.base import solve

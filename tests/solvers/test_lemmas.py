@@ -10,8 +10,9 @@ import pytest
 from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 
+from bemkit.contact.body import ContactState
 from bemkit.contact.laws import Coulomb, Tresca
-from bemkit.contact.problem import ContactProblem, ContactState
+from bemkit.contact.problem import ContactProblem
 from bemkit.model.model import build_model
 from bemkit.model.prepared import prepare
 from bemkit.solvers import active_sets

@@ -6,10 +6,12 @@ from functools import cache
 import numpy as np
 import pytest
 
+from bemkit.contact.body import ContactState
 from bemkit.contact.certificate import certify
+from bemkit.contact.dense_body import DenseBody
 from bemkit.contact.further_laws import CohesiveCoulomb
 from bemkit.contact.laws import Coulomb, Frictionless, Tresca
-from bemkit.contact.problem import ContactProblem, ContactState, DenseBody
+from bemkit.contact.problem import ContactProblem
 from bemkit.solvers import lemke as lemke_solver
 from bemkit.solvers.active_sets import ActiveSets, NodeStatus, contact_sets
 from bemkit.solvers.alm import AugmentedLagrangian, BoundUpdate

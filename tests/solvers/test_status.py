@@ -5,9 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from bemkit.contact.body import ContactState, LinearBody, SingularResponse
+from bemkit.contact.dense_body import DenseBody
 from bemkit.contact.equilibrium import Imbalance
-from bemkit.contact.laws import Coulomb, FrictionLaw
-from bemkit.contact.problem import ContactProblem, ContactState, DenseBody, LawError, LinearBody, SingularResponse
+from bemkit.contact.laws import Coulomb, FrictionLaw, LawError
+from bemkit.contact.problem import ContactProblem
 from bemkit.solvers.alm import AugmentedLagrangian, InnerNewton
 from bemkit.solvers.base import ContactFailure, Status, solve
 from bemkit.solvers.fallbacks import Fallbacks, SolutionPath, Springs

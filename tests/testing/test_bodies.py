@@ -7,8 +7,9 @@ import pytest
 
 import bemkit as bk
 from bemkit.contact.body import ContactState, LinearBody
+from bemkit.contact.dense_body import DenseBody
 from bemkit.contact.equilibrium import Imbalance
-from bemkit.contact.problem import ContactProblem, DenseBody
+from bemkit.contact.problem import ContactProblem
 from bemkit.model.model import build_model
 from bemkit.model.prepared import prepare
 from bemkit.testing import CheckFailed, check_body

@@ -9,7 +9,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import pytest
 
-from bemkit.contact.problem import ContactProblem, ContactState
+from bemkit.contact.body import ContactState
+from bemkit.contact.problem import ContactProblem
 from bemkit.scene.registry import SOLVERS
 from bemkit.solvers.alm import AugmentedLagrangian, BoundUpdate
 from bemkit.solvers.base import Iterate, Status, solve

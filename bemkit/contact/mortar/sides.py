@@ -205,7 +205,8 @@ class ContactSide:
 
 def encloses(mesh: BoundaryMesh, points: FloatArray) -> BoolArray:
     """Return a mask (k,) of points (k, 2) inside the body bounded by the chords of a mesh."""
-    return winding_numbers(points, mesh.whole.start, mesh.whole.end) == (0 if mesh.is_exterior else 1)
+    number = 0 if mesh.is_exterior else 1
+    return np.asarray(winding_numbers(points, mesh.whole.start, mesh.whole.end) == number)
 
 
 def faces_away(
