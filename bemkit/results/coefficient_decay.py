@@ -23,14 +23,14 @@ from bemkit.geometry.quadrature import gauss_legendre
 from bemkit.geometry.spaces import BoundarySpace, dof_points, local_coefficients
 from bemkit.operators.rigid_modes import without_motion
 
-SLOWEST = 0.95
-"""Upper limit of the ratio of successive missing coefficients."""
 _N_MISSING = 64
-"""Number of missing coefficients that are summed: at the largest ratio the rest is a thousandth."""
+"""Number of missing coefficients that are summed: of sequences that fall like 1 / k the rest is a hundredth."""
 FASTEST = 0.05
 """Lower limit of the factor by which one more degree reduces the error."""
 POWER = 0.3
 """Power of the distance from a corner or end of a part in tractions there: about the least of those with a bound."""
+BOUNDED, LEAST_POWER = 0.0, -0.45
+"""Powers that bound the missing coefficients: of fields with a bound, and of those whose square has an integral."""
 _MORE_POINTS = 2
 
 
@@ -46,12 +46,15 @@ class CoefficientErrors:
         Squared errors of the tractions in L2.
     energy_decay, traction_decay : (n_elements,) arrays
         Factors by which one more degree reduces the errors (not squared); 1 where the field is singular.
+    last_traction : (n_elements,) array [Pa]
+        Bounds of the last coefficients of the tractions.
     """
 
     energy: FloatArray
     traction: FloatArray
     energy_decay: FloatArray
     traction_decay: FloatArray
+    last_traction: FloatArray
 
     @classmethod
     def joined(cls, several: Sequence[CoefficientErrors]) -> CoefficientErrors:
@@ -64,8 +67,8 @@ class CoefficientErrors:
     def at_worst(cls, copies: Sequence[CoefficientErrors]) -> CoefficientErrors:
         """Return the largest error of all copies of a body on each element, multiplied by the number of copies."""
         columns = zip(*(vars(errors).values() for errors in copies), strict=True)
-        energy, traction, *decays = (np.max(column, axis=0) for column in columns)
-        return cls(len(copies) * energy, len(copies) * traction, *decays)
+        energy, traction, *others = (np.max(column, axis=0) for column in columns)
+        return cls(len(copies) * energy, len(copies) * traction, *others)
 
     def at_higher_degrees(self, rise: IntArray) -> CoefficientErrors:
         """Return the estimated errors with `rise` (n_elements,) degrees more."""
@@ -73,6 +76,22 @@ class CoefficientErrors:
             np.clip(decay, FASTEST, 1.0) ** (2 * rise) for decay in (self.energy_decay, self.traction_decay)
         )
         return replace(self, energy=self.energy * energy, traction=self.traction * traction)
+
+
+def singular_error(last: float, length: float, degree: int, power: float) -> float:
+    """Return the squared error [Pa^2 m] of tractions that are like a power of the distance from the end of an element.
+
+    Parameters
+    ----------
+    last : float [Pa]
+        Last Legendre coefficient of the tractions.
+    length : float [m]
+    degree : int
+        Of the displacements.
+    power : float
+    """
+    missing = last * _algebraic(degree, max(power, LEAST_POWER))
+    return float(length * (missing**2 @ _odd(degree) ** -1.0))
 
 
 def coefficient_errors(
@@ -116,6 +135,7 @@ def coefficient_errors(
         # weighted by the errors: coefficients of tractions that vanish are round-off, which does not fall
         energy_decay=np.sqrt(squared_decay / np.maximum(total, np.finfo(float).tiny)),
         traction_decay=of_tractions.decay,
+        last_traction=of_tractions.last,
     )
 
 
@@ -132,20 +152,22 @@ def _slope_coefficients(space: BoundarySpace, displacement: FloatArray) -> Float
 
 
 class _Missing(NamedTuple):
-    """Sums (n,) of a^2 / (2 k + 1)^2 and a^2 / (2 k + 1) of the missing coefficients a, and their ratio (n,)."""
+    """Sums (n,) of a^2 / (2 k + 1)^2 and a^2 / (2 k + 1) of the missing coefficients a, their ratio, the last known."""
 
     energy: FloatArray
     mean_square: FloatArray
     decay: FloatArray
+    last: FloatArray
 
 
 def _missing(coefficients: FloatArray, degrees: IntArray, at_break: BoolArray) -> _Missing:
     """Continue the Legendre coefficients (n, largest degree, 2) of elements.
 
     A geometric sequence is fitted to the second half of the coefficients. Each is taken as large as any after it, since
-    every other coefficient of an odd or even field is zero: see `_without_gaps`.
+    every other coefficient of an odd or even field is zero: see `_without_gaps`. Missing ones fall at least like 1 / k,
+    as where a field has a square root inside an element.
     """
-    energy, mean_square, decay = np.empty((3, degrees.size))
+    energy, mean_square, decay, last = np.empty((4, degrees.size))
     for n_known in np.unique(degrees).tolist():
         chosen = degrees == n_known
         bounds = _without_gaps(np.linalg.norm(coefficients[chosen, :n_known], axis=2))
@@ -153,13 +175,12 @@ def _missing(coefficients: FloatArray, degrees: IntArray, at_break: BoolArray) -
         k = np.arange(n_fitted) - 0.5 * (n_fitted - 1)
         logarithms = np.log(np.maximum(bounds[:, n_known - n_fitted :], np.finfo(float).tiny))
         ratio = np.exp(np.minimum(logarithms @ k / (k @ k), 0.0))
-        following = np.arange(_N_MISSING)
-        missing = (bounds[:, -1] * ratio)[:, None] * np.minimum(ratio, SLOWEST)[:, None] ** following
-        odd = 2.0 * (n_known + following) + 1.0
-        algebraic = bounds[:, -1, None] * _algebraic(n_known)
-        singular = np.where(at_break[chosen, None], np.maximum(missing, algebraic), missing)
-        energy[chosen], mean_square[chosen], decay[chosen] = missing**2 @ odd**-2.0, singular**2 @ (1.0 / odd), ratio
-    return _Missing(energy, mean_square, decay)
+        relative = np.minimum(ratio[:, None] ** (1.0 + np.arange(_N_MISSING)), _algebraic(n_known, BOUNDED))
+        singular = np.where(at_break[chosen, None], np.maximum(relative, _algebraic(n_known, POWER)), relative)
+        last[chosen], decay[chosen] = bounds[:, -1], ratio
+        energy[chosen] = bounds[:, -1] ** 2 * (relative**2 @ _odd(n_known) ** -2.0)
+        mean_square[chosen] = bounds[:, -1] ** 2 * (singular**2 @ _odd(n_known) ** -1.0)
+    return _Missing(energy, mean_square, decay, last)
 
 
 def _without_gaps(sizes: FloatArray) -> FloatArray:
@@ -178,7 +199,12 @@ def _without_gaps(sizes: FloatArray) -> FloatArray:
     return np.asarray(np.maximum.accumulate(known[:, ::-1], axis=1)[:, ::-1])
 
 
-def _algebraic(n_known: int) -> FloatArray:
-    """Return the missing coefficients of d**POWER, d the distance from the end of an element, over the last known."""
+def _odd(n_known: int) -> FloatArray:
+    """Return 2 k + 1 of the missing coefficients."""
+    return np.asarray(2.0 * (n_known + np.arange(_N_MISSING)) + 1.0)
+
+
+def _algebraic(n_known: int, power: float) -> FloatArray:
+    """Return the missing coefficients of d**power, d the distance from the end of an element, over the last known."""
     k = n_known - 1.0 + np.arange(_N_MISSING)
-    return np.asarray(np.cumprod((2.0 * k + 3.0) / (2.0 * k + 1.0) * (k - POWER) / (k + POWER + 2.0)))
+    return np.asarray(np.cumprod((2.0 * k + 3.0) / (2.0 * k + 1.0) * (k - power) / (k + power + 2.0)))

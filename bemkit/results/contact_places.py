@@ -222,11 +222,19 @@ class ContactPlaces:
     def _squared_error_on(self, name: str, part: str) -> float:
         """Return the squared error [Pa^2 m] on the counted elements of a part, by its coefficients and its neighbours.
 
-        The neighbour of an excluded element has a share of its error.
+        Elements at singular corners that are not excluded have the errors of the power of the distance there. The
+        neighbour of an excluded element has a share of its error.
         """
+        from bemkit.results.coefficient_decay import singular_error
+
         body = self.solution.bodies[name]
         assert body.coefficient_errors is not None
-        errors, elements = body.coefficient_errors.traction, body.mesh.part(part)
+        errors, elements = body.coefficient_errors.traction.copy(), body.mesh.part(part)
+        for corner in self.corners[name]:
+            for k in corner.elements:
+                last, length = body.coefficient_errors.last_traction[k], body.mesh.lengths[k]
+                singular = singular_error(last, length, int(self._degrees[name][k]), corner.exponent - 1.0)
+                errors[k] = max(errors[k], singular)
         counted = np.intersect1d(elements, self._counted[name])
         pairs = np.concatenate([body.mesh.node_elements, body.mesh.node_elements[:, ::-1]])
         excluded = np.setdiff1d(elements, counted)

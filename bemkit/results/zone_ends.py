@@ -165,7 +165,7 @@ def transition_error(
     ----------
     contact : ContactTable
     fields : sequence of (n_contact,) arrays [Pa]
-        Tractions that are not smooth at the transition.
+        Tractions that vanish at the transition and are not smooth there.
     transition : Transition
     transitions : sequence of Transition
         All of the table.
@@ -199,9 +199,8 @@ def transition_error(
             far = min([length, *(sign * ends[sign * ends > 0.0])])
             near = min([far, *(sign * halfway[sign * halfway > 0.0])])
             for reach in (near, max(near, min(far, 0.5 * length))):
-                places = transition.s + np.array([0.0, sign * reach])
-                at_transition, at_reach = np.interp(places, contact.s[rows], traction[rows])
-                steepest = max(steepest, (at_reach - at_transition) ** 2 / reach)
+                at_reach = float(np.interp(transition.s + sign * reach, contact.s[rows], traction[rows]))
+                steepest = max(steepest, at_reach**2 / reach)
         squared += steepest
     spacing = end.spacing(degree)
     return TRANSITION_CALIBRATION * squared * spacing**2, spacing

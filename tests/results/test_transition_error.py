@@ -84,6 +84,14 @@ def test_a_zone_of_one_element_is_not_measured_beyond_its_middle() -> None:
     assert estimated(0.25, 6, pressure, s, (0.75,)) == pytest.approx(expected, rel=1e-3)  # between the places s
 
 
+def test_a_transition_beyond_a_node_with_pressure_counts_with_all_of_it() -> None:
+    """The place follows from clearances, and may lie behind the last node in contact: there pressure vanishes, too."""
+    s = np.linspace(-1.0, 2.0, 31)
+    pressure = np.where(s > 1.0, -1.0, np.where(s > 0.3, -0.5, 0.0))
+    expected = 0.3 * 1.0 * 2.0 * np.sqrt(0.5 * 0.5) / 4  # K l with K the pressure an element's length away
+    assert estimated(0.5, 4, pressure, s) == pytest.approx(expected, rel=1e-12)
+
+
 def test_where_sticking_ends_pressure_is_smooth() -> None:
     """A cylinder pressed on a floor: only friction below its bound has an error there, but pressure varies more."""
     parts = (
