@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bemkit.arrays import BoolArray, FloatArray, IntArray
+from bemkit.arrays import FloatArray, IntArray
 from bemkit.contact.body import SlipHistory
 from bemkit.geometry.local_values import element_degrees
 from bemkit.geometry.mesh import BoundaryMesh
+from bemkit.geometry.neighbours import along_boundary
 from bemkit.geometry.vectors import norms
 from bemkit.results.contact_table import ContactTable
 from bemkit.results.transitions import (
@@ -78,8 +79,11 @@ class ContactPlaces:
     def elements(self, name: str) -> IntArray:
         """Return the elements of a body that may touch others or obstacles, without those near `singular_points`."""
         mesh, elements = self.solution.bodies[name].mesh, self._touching(name)
-        near = (self._is_near(ends[elements], with_ends=False) for ends in (mesh.start, mesh.end))
-        return elements[~np.logical_or(*near)]
+        is_near = np.zeros(elements.size, bool)
+        for point, reach in self.singular_points:
+            for ends in (mesh.start, mesh.end):
+                is_near |= norms(ends[elements] - point) < (1.0 - LYING_AT) * reach
+        return elements[~is_near]
 
     def _touching(self, name: str) -> IntArray:
         body = self.solution.bodies[name]
@@ -110,13 +114,6 @@ class ContactPlaces:
             for point, reach, length in points
             if all(np.linalg.norm(point - other) > LYING_AT * length for other in long)
         ]
-
-    def _is_near(self, points: FloatArray, *, with_ends: bool) -> BoolArray:
-        """Return whether points (n, 2) are on the elements of a singular point, whose far ends may count."""
-        is_near = np.zeros(len(points), bool)
-        for point, reach in self.singular_points:
-            is_near |= norms(points - point) < (1.0 + (LYING_AT if with_ends else -LYING_AT)) * reach
-        return is_near
 
     @cached_property
     def corners(self) -> Mapping[str, tuple[SingularCorner, ...]]:
@@ -205,11 +202,9 @@ class ContactPlaces:
 
         solution, degree = self.solution, self.lowest_degree
         if degree <= 2:
-            # the second difference at the far end of an element takes nodes nearer to the singular point
-            is_near, with_ends = (
-                self._is_near(solution.contact.points, with_ends=with_ends) for with_ends in (False, True)
-            )
-            share = np.where(is_near, 0.0, np.where(with_ends, FAR_END_SHARE[degree - 1], 1.0))
+            share = np.ones(solution.contact.n_contact)
+            for contact in solution.contact.parts:
+                share[solution.contact.rows(contact)] = self._counted_shares(contact, FAR_END_SHARE[degree - 1])
             return nodal_error(solution.contact, degree, solution.n_sides, share)
         if not any(chosen.size for chosen in self._counted.values()):
             return None
@@ -218,6 +213,21 @@ class ContactPlaces:
             name, part = solution.contact_sides[contact][0]
             squared += solution.n_sides(contact) * self._squared_error_on(name, part)
         return squared
+
+    def _counted_shares(self, contact: str, far_end_share: float) -> FloatArray:
+        """Return the share of the squared error of the nodes of a contact: of none on excluded elements only.
+
+        At the far end of an excluded element the second difference takes nodes nearer to the singular point.
+        """
+        (name, part), table = self.solution.contact_sides[contact][0], self.solution.contact
+        mesh, s = self.solution.bodies[name].mesh, table.s[table.rows(contact)]
+        elements = along_boundary(mesh, mesh.part(part))
+        ends, is_excluded = np.cumsum(mesh.lengths[elements]), ~np.isin(elements, self._counted[name])
+        margin = LYING_AT * ends[-1]
+        before, after = (
+            is_excluded[np.clip(np.searchsorted(ends, s + side), 0, elements.size - 1)] for side in (-margin, margin)
+        )
+        return np.where(before & after, 0.0, np.where(before | after, far_end_share, 1.0))
 
     def _squared_error_on(self, name: str, part: str) -> float:
         """Return the squared error [Pa^2 m] on the counted elements of a part, by its coefficients and its neighbours.

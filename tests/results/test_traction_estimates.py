@@ -119,6 +119,25 @@ def test_estimates_of_linear_elements_exclude_the_neighbours_of_a_singular_corne
     assert 0.5 < coarse.estimated_traction_error / tractions < 2.0  # 3.6 with that node
 
 
+def test_linear_elements_that_a_longer_one_of_the_other_body_excludes_have_no_estimate() -> None:
+    """At the edges of a punch; the next second difference takes a node at the end of the longer element."""
+    material = bk.Material(1.0, 0.3)
+    held = bk.Part("held", bk.Clamped(), sides=("bottom",))
+    press = bk.Part("press", bk.PrescribedDisplacement(0.0, -1e-4), sides=("top",))
+    scene = bk.Scene(
+        title="punch", law=bk.Frictionless(), discretisation=bk.Galerkin(1), mesh=bk.MeshOptions(elements=38),
+        bodies=(
+            bk.Body(name="lower", shape=bk.Rectangle(1.0, 0.63), material=material, parts=(held,)),
+            bk.Body(name="upper", shape=bk.Rectangle(0.702, 0.537, (0.149, 0.63)), material=material, parts=(press,)),
+        ),
+        contacts=(bk.ContactPair(("upper.bottom", "lower.top")),),
+    )  # fmt: skip
+    coarse = bk.run(scene)
+    _, tractions = true_errors(coarse, bk.run(replace(scene, discretisation=bk.Galerkin(2), mesh=LAYERS)))
+    assert coarse.estimated_traction_error is not None
+    assert 0.5 < coarse.estimated_traction_error / tractions < 6.0  # 5.6: stiffness alone, 22 with that node
+
+
 @pytest.mark.slow
 def test_ends_of_contact_inside_elements_count_in_the_energy() -> None:
     """A single element of degree 6 touches, where pressures vanish like a root."""
