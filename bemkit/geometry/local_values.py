@@ -11,7 +11,7 @@ import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray, IntArray
 from bemkit.geometry.quadrature import gauss_legendre, gauss_lobatto
-from bemkit.geometry.spaces import BoundarySpace, LagrangeSpace, lagrange_polynomials
+from bemkit.geometry.spaces import BoundarySpace, LagrangeSpace, element_nodes, lagrange_polynomials
 
 
 def element_degrees(space: BoundarySpace) -> IntArray:
@@ -43,31 +43,33 @@ def from_own_nodes(space: BoundarySpace, at_dofs: FloatArray, elements: IntArray
     return np.asarray(np.einsum("ekl,ek...->el...", own, at_dofs))
 
 
-def continued_to_ends(space: BoundarySpace, elements: IntArray, is_known: BoolArray) -> FloatArray:
-    """Return matrices (m, n_local, n_local) that replace values at unknown dofs of elements.
+def continued_to_ends(
+    space: BoundarySpace, elements: IntArray, is_known: BoolArray
+) -> tuple[IntArray, IntArray, FloatArray]:
+    """Continue a function that is known at some dofs of elements only, by the polynomial through all known values.
 
     Parameters
     ----------
     space : BoundarySpace
     elements : (m,) int array
     is_known : (m, n_local) bool array
-        The dofs of each element where a function is known.
+        The dofs of each element where the function is known; there are no results for elements without any.
 
     Returns
     -------
-    (m, n_local, n_local) array
-        Unknown values follow from the polynomial through all known ones; elements without a known value keep theirs.
+    row, position : (n,) int arrays
+        The unknown values: rows of `elements` and local dofs.
+    factors : (n, n_local) array
+        By which the values of that element are multiplied.
     """
-    degrees, n_local = element_degrees(space)[elements], is_known.shape[1]
-    matrices = np.tile(np.eye(n_local), (elements.size, 1, 1))
-    for k in np.flatnonzero(~is_known.all(axis=1) & is_known.any(axis=1)).tolist():
-        nodes = gauss_lobatto(int(degrees[k]))
-        own = np.array([*range(nodes.size - 1), n_local - 1])
-        known, unknown = is_known[k, own], ~is_known[k, own]
-        if known.any():
-            matrices[k, own[unknown]] = 0.0
-            matrices[np.ix_([k], own[unknown], own[known])] = lagrange_polynomials(nodes[known], nodes[unknown]).T
-    return matrices
+    nodes, position = element_nodes(space)[elements], np.arange(is_known.shape[1])
+    is_own = (position < element_degrees(space)[elements, None]) | (position == position[-1])
+    is_known = is_known & is_own
+    row, unknown = np.nonzero(is_own & ~is_known & is_known.any(axis=1, keepdims=True))
+    factors = np.zeros((row.size, position.size))
+    for own, known, own_nodes, at in zip(factors, is_known[row], nodes[row], unknown, strict=True):
+        own[known] = lagrange_polynomials(own_nodes[known], own_nodes[[at]])[:, 0]
+    return row, unknown, factors
 
 
 def summed_at_dofs(space: BoundarySpace, integrals: FloatArray, elements: IntArray) -> FloatArray:

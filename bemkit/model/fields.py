@@ -271,8 +271,7 @@ class _Side:
 
     def _held(self, shapes: FloatArray, integrals: FloatArray, shares: FloatArray) -> _HeldNodes:
         has_force = self.has_force[self.local] | (not self.is_at_obstacle)
-        continued = continued_to_ends(self.space, self.elements, has_force)
-        element, k = np.nonzero(np.diagonal(continued, axis1=1, axis2=2) == 0.0)
+        element, k, factors = continued_to_ends(self.space, self.elements, has_force)
         contact_node = np.zeros(self.has_force.size, np.intp)
         for _, contact_nodes, nodes in self.entries:
             contact_node[nodes] = contact_nodes
@@ -282,7 +281,7 @@ class _Side:
             nodes=self.dofs[local[each, k]],
             neighbours=contact_node[local[each, distances.argmin(axis=1)]],
             elements=element,
-            by_force=continued[element, k] * shares[element],
+            by_force=factors * shares[element],
             shapes=shapes[element, :, k],
             lengths=integrals[element, k] * self.is_fixed,
         )

@@ -125,26 +125,9 @@ def _nearest(mesh: BoundaryMesh, elements: IntArray, point: FloatArray) -> tuple
 
 
 def reversal_error(jump: float, end: ZoneEnd, degree: int) -> tuple[float, float]:
-    """Estimate the error of friction that changes its sign inside an element of a degree.
+    """Estimate the error of friction that jumps, by `jump` [Pa], inside an element, as `transition_error` does.
 
-    Parameters
-    ----------
-    jump : float [Pa]
-    end : ZoneEnd
-        The place on the side of a body.
-    degree : int
-        Of the displacements on that element.
-
-    Returns
-    -------
-    squared : float [Pa^2 m]
-        Squared error of the contact tractions in L2.
-    length : float [m]
-        On which it changes its sign.
-
-    Notes
-    -----
-    The best polynomials of degree p miss a jump J by J sqrt(l / (2 pi)) with the length l of `transition_error`,
+    The best polynomials of degree p miss a jump J by J sqrt(l / (2 pi)) with the length l given there,
     computed tractions by 1.6 times that.
     """
     spacing = end.spacing(degree)

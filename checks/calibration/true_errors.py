@@ -56,7 +56,8 @@ def _tractions_at(solution: Solution, contact: str, places: Located) -> FloatArr
     space = space_of(body)
     tree = KDTree(np.column_stack([table.x, table.y])[rows])
     distances, nearest = tree.query(dof_points(space))  # on the contact boundary the node itself, unless it is held
-    at_dofs = np.column_stack([table.sigma_n, table.sigma_t])[rows][nearest]
+    at_dofs = np.column_stack([table.sigma_n, table.sigma_t])[rows][nearest][space.element_dofs]
     is_known, elements = distances <= _SAME * body.mesh.diameter, np.arange(body.mesh.n_elements)
-    continued = continued_to_ends(space, elements, is_known[space.element_dofs])
-    return values_at(space, from_own_nodes(space, continued @ at_dofs[space.element_dofs]), places)
+    row, unknown, factors = continued_to_ends(space, elements, is_known[space.element_dofs])
+    at_dofs[row, unknown] = np.einsum("nl,nlc->nc", factors, at_dofs[row])
+    return values_at(space, from_own_nodes(space, at_dofs), places)
