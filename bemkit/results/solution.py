@@ -140,10 +140,10 @@ class Solution(SolvedScene, Explorable):
         errors = [
             float(np.sum(body.element_errors)) for body in self.bodies.values() if body.element_errors is not None
         ]
-        unit = sum(body.error_unit for body in self.bodies.values())
+        unit = self.error_unit
         if len(errors) < len(self.bodies):
             return None
-        if max(sum(errors), unit) <= sum(body.energy_of_round_off for body in self.bodies.values()):
+        if max(sum(errors), unit) <= self.energy_of_round_off:
             return 0.0
         squared = sum(errors) + self.places.squared_energy_error()
         return float(np.sqrt(squared / unit)) if unit > 0.0 else None

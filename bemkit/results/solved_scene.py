@@ -133,6 +133,11 @@ class SolvedScene:
         return sum(body.error_unit for body in self.bodies.values())
 
     @property
+    def energy_of_round_off(self) -> float:
+        """Elastic energy [J/m] that may be round-off of rigid motions."""
+        return sum(body.energy_of_round_off for body in self.bodies.values())
+
+    @property
     def force_normal(self) -> float:
         """Sum of the pressing forces of all contacts [N/m], positive."""
         return sum((contact.force_normal for contact in self.contacts), 0.0)

@@ -63,11 +63,14 @@ class StepErrors:
 
     @property
     def energy(self) -> float:
-        """Relative error in the energy norm; infinite without an estimate, and if it is measured by nothing."""
+        """Relative error in the energy norm; zero for bodies at rest or in rigid motion, infinite without an estimate.
+
+        Infinite, too, without an energy to which it is relative.
+        """
         if self.bodies is None:
             return float("inf")
         squared = sum(float(body_errors.sum()) for body_errors in self.bodies)
-        if squared == 0.0:
+        if max(squared, self.unit) <= max(step.energy_of_round_off for step in self.steps):
             return 0.0
         return float(np.sqrt(squared / self.unit)) if self.unit > 0.0 else float("inf")
 

@@ -109,6 +109,31 @@ def test_a_body_that_only_moves_as_a_whole_has_no_error(degree: int, motion: tup
     assert bk.run(pressed).estimated_error > 0.0
 
 
+def test_an_accuracy_needs_no_finer_mesh_for_a_body_that_only_moves_as_a_whole() -> None:
+    parts = (
+        bk.Part("floor", bk.Contact(bk.RigidHalfPlane()), sides=("bottom",)),
+        bk.Part("lid", bk.PrescribedDisplacement(x=0.002, y=bk.Expression("0.01 + 0.06 * x")), sides=("top",)),
+    )
+    scene = bk.Scene(
+        title="lifted", shape=bk.Rectangle(1.0, 0.7), material=bk.Material(100.0, 0.3), parts=parts,
+        mesh=bk.MeshOptions(accuracy=0.02, most_elements=100),
+    )  # fmt: skip
+    solution = bk.run(scene)
+    assert solution.is_converged, solution.message
+    assert solution.estimated_error == 0.0
+
+
+def test_a_graded_mesh_of_a_body_that_turns_has_no_error() -> None:
+    """Round-off of displacements is strain over the shortest elements, and grows with the number of elements."""
+    lid = bk.PrescribedDisplacement(x=0.002, y=bk.Expression("-0.01 + 0.06 * x"))
+    scene = bk.Scene(
+        title="turned", shape=bk.Rectangle(1.0, 0.7, (1.0, 1.0)), material=bk.Material(100.0, 0.3),
+        parts=(bk.Part("lid", lid, sides=("top",)),), discretisation=bk.Galerkin(2),
+        mesh=bk.MeshOptions(elements=400, grading=bk.Geometric(levels=20)),
+    )  # fmt: skip
+    assert bk.run(scene).estimated_error == 0.0
+
+
 def test_the_largest_error_leaves_out_an_equally_small_share() -> None:
     lengths = np.array([0.5, 0.3, 0.19, 0.01])
     assert ky_fan_distance(np.array([0.1, 0.2, 0.15, 0.05]), lengths) == 0.2
