@@ -125,6 +125,6 @@ class Sliding(LinearBody):
 
 
 def test_the_linear_programme_takes_memory_in_proportion_to_the_nodes():
-    few, many = memory_of_the_programme(800), memory_of_the_programme(3200)
+    few, many = memory_of_the_programme(400), memory_of_the_programme(1600)
     assert many < 6.0 * few  # four times the nodes; dense blocks would take sixteen times
-    assert many < 3200 * 4096  # bytes a node: about a hundred numbers for each of thirty arrays
+    assert many < 1600 * 4096  # bytes a node: about a hundred numbers for each of thirty arrays

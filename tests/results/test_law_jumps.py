@@ -7,6 +7,7 @@ from dataclasses import replace
 import pytest
 
 import bemkit as bk
+from bemkit.scene.toml import with_overrides
 from tests.scenes import paper
 
 
@@ -28,7 +29,7 @@ def test_what_varies_without_a_jump_is_not(formula: str) -> None:
 
 
 def test_a_jump_between_two_bodies_is_named() -> None:
-    scene = bk.load_scene("pin-in-plate")
+    scene = with_overrides(bk.load_scene("pin-in-plate"), elements=60)
     texts = warned(bk.Expression("where(x < 0.15, 0.1, 0.6)"), scene)
     assert texts
     assert all("Friction of contact 'pin.surface / plate.hole' jumps at (" in text for text in texts), texts

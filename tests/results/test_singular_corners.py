@@ -160,6 +160,7 @@ def test_what_is_asked_for_is_reached_but_at_the_corners(accuracy: float) -> Non
     assert abs(solution.energy / exact.energy - 1.0) <= accuracy**2
 
 
+@pytest.mark.slow
 def test_six_digits_take_few_elements() -> None:
     solution = solved(1e-6)
     assert solution.is_converged
@@ -168,6 +169,7 @@ def test_six_digits_take_few_elements() -> None:
 
 def test_what_is_left_out_is_near_the_corners_and_told() -> None:
     solution = solved(1e-4)
+    assert solution.n_elements <= 120
     lengths, floor = solution.mesh.lengths, solution.mesh.part("floor")
     left_out = np.setdiff1d(floor, solution.places.elements(""))
     assert set(left_out.tolist()) == {k for corner in solution.singular_corners for k in corner.elements}

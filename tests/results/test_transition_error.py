@@ -105,7 +105,7 @@ def test_where_sticking_ends_pressure_is_smooth() -> None:
     )  # fmt: skip
     coarse = bk.run(scene)
     assert [each.from_status for each in coarse.transitions] == ["separated", "slip", "stick", "slip"]
-    fine = bk.run(replace(scene, mesh=bk.MeshOptions(accuracy=5e-3, rising_degrees=True)))
+    fine = bk.run(replace(scene, mesh=bk.MeshOptions(accuracy=1e-2, rising_degrees=True)))
     _, tractions = true_errors(coarse, fine)
     assert coarse.estimated_traction_error is not None
     assert 0.5 < coarse.estimated_traction_error / tractions < 3.0
