@@ -8,9 +8,11 @@ from typing import Protocol
 import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray, IntArray
-from bemkit.contact.conditions import LinearConditions, RigidMotions, as_rows, largest_components, separated, stick
+from bemkit.contact.conditions import separated, stick
 from bemkit.contact.equilibrium import Imbalance
 from bemkit.errors import BemkitError, InputError
+from bemkit.operators.boundary_equations import LinearConditions
+from bemkit.operators.rigid_modes import RigidMotions, as_rows, largest_components
 
 
 class SingularResponse(BemkitError, ArithmeticError):  # noqa: N818 - a response, not a mistake of the caller

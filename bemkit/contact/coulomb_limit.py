@@ -11,10 +11,10 @@ from scipy.optimize import linprog
 from scipy.sparse import csc_array
 
 from bemkit.arrays import FloatArray
-from bemkit.contact.conditions import RigidMotions, of_unit_size
 from bemkit.contact.limit_load import WITHOUT_BOUND, largest_factor
 from bemkit.contact.solvability import with_violated_nodes
 from bemkit.errors import InputError
+from bemkit.operators.rigid_modes import RigidMotions, of_unit_size
 
 MOST_PROGRAMMES = 60
 """Largest number of linear programmes with given friction bounds; walls of 30 to 60 blocks take 10 to 50."""

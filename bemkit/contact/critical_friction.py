@@ -6,7 +6,8 @@ import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray
 from bemkit.contact.body import LinearBody, SingularResponse
-from bemkit.contact.conditions import LinearConditions, of_statuses, separated, stick
+from bemkit.contact.conditions import of_statuses, separated, stick
+from bemkit.operators.boundary_equations import LinearConditions
 
 LARGEST_COEFFICIENT = 1e3
 """Largest coefficient; larger ones are round-off of a vanishing coupling, as between bodies of equal material."""

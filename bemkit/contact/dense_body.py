@@ -11,9 +11,10 @@ import numpy as np
 
 from bemkit.arrays import AnyArray, BoolArray, FloatArray, IntArray, read_only, spread_fractions
 from bemkit.contact.body import ClosedVolume, ContactState, FreeMotion, LinearBody, SingularResponse
-from bemkit.contact.conditions import LinearConditions, orthonormal
 from bemkit.contact.equilibrium import Imbalance, Unbalanced
 from bemkit.errors import InputError
+from bemkit.operators.boundary_equations import LinearConditions
+from bemkit.operators.rigid_modes import orthonormal
 from bemkit.operators.steklov_poincare.nodal_conditions import SLIDES
 
 if TYPE_CHECKING:
@@ -166,8 +167,6 @@ class DenseBody(LinearBody):
     def respond(self, conditions: LinearConditions) -> ContactState:
         """Return the response; one LU factorisation of the order of the displacements that are not given.
 
-        Notes
-        -----
         Prescribed displacements, zero tractions and slip tractions are met exactly, not just to round-off, so that
         ties such as ``|sigma_t| = s |sigma_n|`` are decided alike in all units.
         """

@@ -14,8 +14,8 @@ import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray, IntArray
 from bemkit.contact.body import ContactState, SingularResponse
-from bemkit.contact.conditions import LinearConditions
 from bemkit.errors import InputError
+from bemkit.operators.boundary_equations import LinearConditions
 
 _JAMS = 1e-9
 """Effective pressure by normal traction that friction cancels, relative to its two terms."""

@@ -9,13 +9,13 @@ import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray, IntArray, spread_fractions
 from bemkit.contact.body import ContactState, FreeMotion, LinearBody, SingularResponse
-from bemkit.contact.conditions import LinearConditions, stick
+from bemkit.contact.conditions import stick
 from bemkit.contact.contact_nodes import ContactNodes, NoContactNodesError, free_motions, held_nodes
 from bemkit.contact.equilibrium import NOISE_FACTOR, Imbalance, resultant_imbalance
 from bemkit.contact.held_friction import HeldFriction
 from bemkit.geometry.spaces import dof_points
+from bemkit.operators.boundary_equations import LinearConditions
 from bemkit.operators.counts import OperationCounts
-from bemkit.operators.hierarchy.system import NodeConditions
 from bemkit.operators.linear_solvers import SingularMatrixError
 from bemkit.operators.rigid_modes import admissible_modes, without_motion
 from bemkit.operators.steklov_poincare.forces_inside import ForcesInside
@@ -76,14 +76,14 @@ class ElementConditions:
             given=np.sum(support * conditions.displacement[nodes], axis=1),
         )
 
-    def at_elements(self, conditions: LinearConditions) -> NodeConditions:
+    def at_elements(self, conditions: LinearConditions) -> LinearConditions:
         """Return contact conditions in the frames of the elements; a support replaces those of held directions."""
         on_traction = conditions.on_traction @ self.of_traction
         on_displacement = conditions.on_displacement @ self.of_displacement
         value, is_held = conditions.value.copy(), self.is_held
         on_traction[is_held, 1], on_displacement[is_held, 1] = 0.0, self.support[is_held]
         value[is_held, 1] = self.given[is_held]
-        return NodeConditions(on_traction, on_displacement, value)
+        return LinearConditions(on_displacement, on_traction, value)
 
     def of_contact(self, traction: FloatArray, displacement: FloatArray) -> ContactState:
         """Return the contact state of tractions and displacements (n_contact, 2) in the frames of the elements."""

@@ -8,9 +8,9 @@ from functools import partial
 import numpy as np
 
 from bemkit.arrays import FloatArray
-from bemkit.contact.conditions import RigidMotions, of_unit_size
 from bemkit.contact.solvability import contact_forces, with_violated_nodes
 from bemkit.errors import InputError
+from bemkit.operators.rigid_modes import RigidMotions, of_unit_size
 
 WITHOUT_BOUND = 1e6
 """Multiple of all other forces above which a load counts as unbounded."""

@@ -10,9 +10,10 @@ import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray, read_only
 from bemkit.contact.body import ClosedVolume, ContactState, LinearBody, SingularResponse
-from bemkit.contact.conditions import LinearConditions, separated, stick
+from bemkit.contact.conditions import separated, stick
 from bemkit.contact.laws import FrictionLaw, LawError
 from bemkit.errors import InputError
+from bemkit.operators.boundary_equations import LinearConditions
 
 Result = TypeVar("Result")
 

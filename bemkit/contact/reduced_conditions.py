@@ -12,7 +12,7 @@ import numpy as np
 
 from bemkit.arrays import ComplexArray, FloatArray, IntArray
 from bemkit.contact.body import SingularResponse
-from bemkit.contact.conditions import LinearConditions
+from bemkit.operators.boundary_equations import LinearConditions
 
 
 def as_complex(pairs: FloatArray) -> ComplexArray:

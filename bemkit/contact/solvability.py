@@ -10,8 +10,8 @@ import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray
 from bemkit.contact.body import ContactState
-from bemkit.contact.conditions import RigidMotions, as_rows, largest_components, of_unit_size
 from bemkit.contact.problem import ContactProblem
+from bemkit.operators.rigid_modes import RigidMotions, as_rows, largest_components, of_unit_size
 
 if TYPE_CHECKING:
     from scipy.sparse import csc_array, csr_array

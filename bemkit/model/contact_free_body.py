@@ -10,9 +10,9 @@ import numpy as np
 from bemkit.arrays import FloatArray
 from bemkit.contact.body import ContactState, LinearBody
 from bemkit.contact.certificate import Certificate
-from bemkit.contact.conditions import LinearConditions
 from bemkit.contact.equilibrium import Imbalance, resultant_imbalance, round_off_of
 from bemkit.geometry.spaces import BoundarySpace, dof_points
+from bemkit.operators.boundary_equations import LinearConditions
 from bemkit.operators.counts import OperationCounts
 from bemkit.operators.rigid_modes import admissible_modes
 from bemkit.operators.steklov_poincare import CondensedMap

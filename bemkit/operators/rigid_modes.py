@@ -1,11 +1,20 @@
-"""Rigid motions of the plane."""
+"""Rigid motions of the plane, and those of bodies at their contact nodes."""
 
 from __future__ import annotations
+
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
 from bemkit.arrays import FloatArray
 from bemkit.geometry.mesh import BoundaryMesh
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_array
+
+    RigidMotions: TypeAlias = FloatArray | csr_array
+else:
+    RigidMotions = "FloatArray | csr_array"
 
 NULL_TOLERANCE = 1e-9
 """Largest singular value of conditions that leave a motion free. Round-off of normals gives 1e-16, one held node in a
@@ -82,3 +91,35 @@ def without_motion(mesh: BoundaryMesh, points: FloatArray, displacement: FloatAr
         return displacement
     nearest = np.linalg.lstsq(motions, displacement.ravel(), rcond=None)[0]
     return displacement - (motions @ nearest).reshape(-1, 2)
+
+
+def as_rows(motions: RigidMotions) -> RigidMotions:
+    """Return motions, dense or sparse, with one row (2 n_contact,) for each motion."""
+    if isinstance(motions, np.ndarray) and motions.ndim == 3:
+        return motions.reshape(len(motions), 2 * motions.shape[1])
+    return motions
+
+
+def as_dense(motions: RigidMotions, n_contact: int) -> FloatArray:
+    """Return motions as a dense array (n_motions, n_contact, 2)."""
+    return motions if isinstance(motions, np.ndarray) else np.asarray(motions.toarray()).reshape(-1, n_contact, 2)
+
+
+def largest_components(motions: RigidMotions) -> FloatArray:
+    """Return the largest component (n_motions,) of each motion."""
+    rows = as_rows(motions)
+    if isinstance(rows, np.ndarray):
+        return np.asarray(np.abs(rows).max(axis=1, initial=0.0))
+    return np.asarray(abs(rows).max(axis=1).toarray(), dtype=float).ravel()
+
+
+def of_unit_size(motions: RigidMotions) -> tuple[RigidMotions, FloatArray]:
+    """Return motions, one in each row, of largest component one, and the sizes (n_motions,) that divide them."""
+    sizes = largest_components(motions)
+    sizes = np.where(sizes > 0.0, sizes, 1.0)  # motions of bodies that touch nothing stay zero
+    return motions / sizes[:, None] if isinstance(motions, np.ndarray) else (motions.T / sizes).T.tocsr(), sizes
+
+
+def orthonormal(motions: FloatArray) -> FloatArray:
+    """Return orthonormal motions (n_motions, n_contact, 2) with the span of linearly independent ones."""
+    return np.asarray(np.linalg.qr(motions.reshape(len(motions), 2 * motions.shape[1]).T)[0]).T.reshape(motions.shape)

@@ -10,10 +10,11 @@ import numpy as np
 
 from bemkit.arrays import FloatArray, IntArray, spread_fractions
 from bemkit.contact.body import ClosedVolume, ContactState
-from bemkit.contact.conditions import as_dense, stick
+from bemkit.contact.conditions import stick
 from bemkit.contact.further_laws import law_name
 from bemkit.contact.laws import LawError
 from bemkit.contact.problem import ContactProblem
+from bemkit.operators.rigid_modes import as_dense
 from bemkit.solvers.base import Iterate, Status, check_max_steps
 from bemkit.solvers.newton import spring_stiffness
 

@@ -11,17 +11,11 @@ import numpy as np
 from bemkit.arrays import BoolArray, FloatArray
 from bemkit.contact.body import ClosedVolume, ContactState, LinearBody, SingularResponse
 from bemkit.contact.certificate import DEFORMED, Scales
-from bemkit.contact.conditions import (
-    LinearConditions,
-    RigidMotions,
-    as_dense,
-    as_rows,
-    of_statuses,
-    separated,
-    stick,
-)
+from bemkit.contact.conditions import of_statuses, separated, stick
 from bemkit.contact.problem import ContactProblem
 from bemkit.errors import InputError
+from bemkit.operators.boundary_equations import LinearConditions
+from bemkit.operators.rigid_modes import RigidMotions, as_dense, as_rows
 from bemkit.solvers.active_sets import ActiveSets, ProjectionEquations, Residual, coheres
 
 _SPRING_STIFFNESS = 1e-3

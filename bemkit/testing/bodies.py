@@ -8,10 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from bemkit.contact.body import ContactState, LinearBody, SingularResponse
-from bemkit.contact.conditions import LinearConditions, as_dense, augmented, separated, slip, stick
+from bemkit.contact.conditions import augmented, separated, slip, stick
 from bemkit.contact.laws import Frictionless
 from bemkit.contact.problem import ContactProblem
 from bemkit.errors import InputError
+from bemkit.operators.boundary_equations import LinearConditions
+from bemkit.operators.rigid_modes import as_dense
 from bemkit.testing.failure import demand
 
 _MARGIN = 1e3

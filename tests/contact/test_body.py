@@ -4,11 +4,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bemkit.contact.body import ContactState, SingularResponse
-from bemkit.contact.conditions import LinearConditions, augmented, separated, slip, stick
+from bemkit.contact.conditions import augmented, separated, slip, stick
 from bemkit.contact.dense_body import DenseBody
 from bemkit.contact.equilibrium import Imbalance
 from bemkit.contact.laws import Coulomb
 from bemkit.contact.problem import ContactProblem
+from bemkit.operators.boundary_equations import LinearConditions
 from tests.handmade import block_body, random_body
 
 

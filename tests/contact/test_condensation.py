@@ -9,7 +9,7 @@ import pytest
 
 from bemkit.arrays import FloatArray, IntArray
 from bemkit.contact.body import ContactState
-from bemkit.contact.conditions import LinearConditions, separated, stick
+from bemkit.contact.conditions import separated, stick
 from bemkit.contact.contact_nodes import ContactNodes
 from bemkit.contact.direct_body import DirectBody
 from bemkit.contact.equilibrium import resultant_imbalance
@@ -18,6 +18,7 @@ from bemkit.contact.problem import ContactProblem
 from bemkit.geometry import BoundaryMesh, Polygon, Rectangle, Selection, Shape, discretise
 from bemkit.geometry.spaces import BoundarySpace, LinearSpace, dof_points
 from bemkit.model.contact_free_body import ContactFreeBody, certified
+from bemkit.operators.boundary_equations import LinearConditions
 from bemkit.operators.linear_solvers import SingularMatrixError
 from bemkit.operators.material import Material
 from bemkit.operators.steklov_poincare import CondensedMap, SteklovPoincare

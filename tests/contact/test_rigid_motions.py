@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 from scipy import sparse
 
-from bemkit.contact.conditions import orthonormal, separated, slip, stick
+from bemkit.contact.conditions import separated, slip, stick
 from bemkit.contact.joined.member import diagonal_blocks
 from bemkit.operators.null_space import null_space
+from bemkit.operators.rigid_modes import orthonormal
 from tests.slow import slow_except
 
 

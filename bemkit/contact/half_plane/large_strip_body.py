@@ -11,8 +11,9 @@ from bemkit.arrays import ComplexArray, FloatArray, IntArray
 from bemkit.contact.body import SingularResponse
 from bemkit.contact.half_plane.surface_body import SurfaceBody
 from bemkit.contact.reduced_conditions import ReducedConditions, as_pairs
+from bemkit.operators.boundary_equations import LinearConditions
 from bemkit.operators.half_plane.large import LargeHalfPlane
-from bemkit.operators.hierarchy.system import LocalConditions, NodeConditions
+from bemkit.operators.hierarchy.system import LocalConditions, solved
 from bemkit.operators.linear_solvers import SingularMatrixError
 
 _SAMPLED = 24
@@ -68,7 +69,7 @@ class LargeStripBody(SurfaceBody):
         on_traction[node, row] = _along(reduced.on_traction * turn)
         on_displacement[node, row] = _along(reduced.on_displacement * turn)
         value[node, row] = right
-        local = NodeConditions(on_traction, on_displacement, value).solved(1.0 / self.stiffness_scale)
+        local = solved(LinearConditions(on_displacement, on_traction, value), 1.0 / self.stiffness_scale)
         factors[self.acting], given[self.acting] = local.factors, local.given
         return LocalConditions(factors, given)
 

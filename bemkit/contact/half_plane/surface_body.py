@@ -17,11 +17,12 @@ import numpy as np
 
 from bemkit.arrays import ComplexArray, FloatArray, IntArray
 from bemkit.contact.body import ContactState, FreeMotion, LinearBody
-from bemkit.contact.conditions import LinearConditions, separated
+from bemkit.contact.conditions import separated
 from bemkit.contact.contact_nodes import ContactNodes
 from bemkit.contact.equilibrium import Imbalance
 from bemkit.contact.reduced_conditions import ReducedConditions, as_complex, as_pairs
 from bemkit.geometry.spaces import dof_points
+from bemkit.operators.boundary_equations import LinearConditions
 from bemkit.operators.counts import OperationCounts
 from bemkit.operators.half_plane.surface import SurfaceElasticity
 from bemkit.operators.linear_solvers import SingularMatrixError

@@ -10,12 +10,13 @@ import numpy as np
 
 from bemkit.arrays import FloatArray
 from bemkit.contact.body import ContactState, FreeMotion, LinearBody, SingularResponse
-from bemkit.contact.conditions import LinearConditions, RigidMotions, as_dense
 from bemkit.contact.dense_body import DenseBody
 from bemkit.contact.equilibrium import NOISE_FACTOR, Imbalance
 from bemkit.contact.joined.coupled_members import CoupledMembers
 from bemkit.contact.joined.dense_form import RelativeStiffness
 from bemkit.contact.joined.sparse_form import Compliance, sparse_response
+from bemkit.operators.boundary_equations import LinearConditions
+from bemkit.operators.rigid_modes import RigidMotions, as_dense
 
 LIGHTEST = 1e-3
 """Least scale of the forces on a member, relative to the largest forces on any member: all belong to one linear system,

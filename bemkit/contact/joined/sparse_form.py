@@ -16,10 +16,10 @@ from scipy.sparse.linalg import splu
 
 from bemkit.arrays import BoolArray, FloatArray, spread_fractions
 from bemkit.contact.body import ContactState, SingularResponse
-from bemkit.contact.conditions import LinearConditions
 from bemkit.contact.joined.coupled_members import CoupledMembers
 from bemkit.contact.joined.member import blocks_of_members
 from bemkit.errors import printable
+from bemkit.operators.boundary_equations import LinearConditions
 from bemkit.operators.linear_solvers import SingularMatrixError
 
 _MISSING = "SuperLU (pip install 'bemkit[pardiso]' brings PARDISO, which is faster)"

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
 
-from bemkit.arrays import BoolArray, FloatArray, IntArray
-from bemkit.operators.boundary_equations import BoundaryEquations
+from bemkit.arrays import FloatArray, IntArray
+from bemkit.operators.boundary_equations import BoundaryEquations, LinearConditions
 from bemkit.operators.hierarchy.tree import ClusterTree
 from bemkit.operators.linear_solvers import SingularMatrixError
 
@@ -48,76 +48,42 @@ def _inverse(matrices: FloatArray) -> FloatArray:
     return np.asarray(adjoint / determinant[:, None, None])
 
 
-@dataclass(frozen=True, eq=False)
-class NodeConditions:
-    """Two linear conditions ``A_t t + A_u u = c`` for each of some elements, in the frame of the element.
+def solved(conditions: LinearConditions, displacement_unit: float) -> LocalConditions:
+    """Solve the two conditions of each element for two of its four quantities, in its frame.
+
+    The other two become the unknowns z.
 
     Parameters
     ----------
-    on_traction, on_displacement : (n, 2, 2) arrays
-        Axes element, condition, component.
-    value : (n, 2) array
+    conditions : LinearConditions
+    displacement_unit : float [m/Pa]
+        Typical displacement per traction; makes the determinants of different pairs comparable.
+
+    Raises
+    ------
+    UndeterminedError
+        If the two conditions at an element are not independent.
     """
-
-    on_traction: FloatArray
-    on_displacement: FloatArray
-    value: FloatArray
-
-    @classmethod
-    def given(cls, is_displacement: BoolArray, traction: FloatArray, displacement: FloatArray) -> NodeConditions:
-        """Return conditions that prescribe traction or displacement along each direction; all arrays are (n, 2)."""
-        unit = np.eye(2)
-        return cls(
-            np.where(is_displacement, 0.0, 1.0)[:, :, None] * unit,
-            np.where(is_displacement, 1.0, 0.0)[:, :, None] * unit,
-            np.where(is_displacement, displacement, traction),
-        )
-
-    def relative_to(self, traction: FloatArray, displacement: FloatArray) -> NodeConditions:
-        """Return the conditions for the differences from known tractions and displacements, (n, 2) in the frames."""
-        fulfilled = np.einsum("nrk,nk->nr", self.on_traction, traction)
-        fulfilled += np.einsum("nrk,nk->nr", self.on_displacement, displacement)
-        return replace(self, value=self.value - fulfilled)
-
-    def take(self, elements: IntArray) -> NodeConditions:
-        """Return the conditions of some of the elements."""
-        return NodeConditions(self.on_traction[elements], self.on_displacement[elements], self.value[elements])
-
-    def solved(self, displacement_unit: float) -> LocalConditions:
-        """Solve the two conditions of each element for two of its four quantities, in its frame.
-
-        The other two become the unknowns z.
-
-        Parameters
-        ----------
-        displacement_unit : float [m/Pa]
-            Typical displacement per traction; makes the determinants of different pairs comparable.
-
-        Raises
-        ------
-        UndeterminedError
-            If the two conditions at an element are not independent.
-        """
-        conditions = np.concatenate([self.on_traction, self.on_displacement], axis=2)
-        scaled = conditions * np.array([1.0, 1.0, displacement_unit, displacement_unit])
-        sizes = np.abs(scaled).max(axis=2, keepdims=True)
-        scaled = scaled / np.where(sizes > 0.0, sizes, 1.0)
-        determinants = np.stack(
-            [np.abs(scaled[:, 0, i] * scaled[:, 1, j] - scaled[:, 0, j] * scaled[:, 1, i]) for i, j in _KNOWN], axis=1
-        )
-        best = determinants.max(axis=1)
-        if not np.all(best > 0.0):
-            raise UndeterminedError("the two conditions at a contact node are not independent")
-        of_both_directions = np.where(_KNOWN[:, 0] % 2 != _KNOWN[:, 1] % 2, determinants, 0.0)
-        is_preferred = of_both_directions.max(axis=1) >= _PREFERRED * best
-        choice = np.where(is_preferred, of_both_directions.argmax(axis=1), determinants.argmax(axis=1))
-        known, unknown = _KNOWN[choice], _UNKNOWN[choice]
-        of_known, of_unknown = (np.take_along_axis(conditions, pair[:, None], axis=2) for pair in (known, unknown))
-        inverse, n = _inverse(of_known), len(choice)
-        factors, given, rows = np.zeros((n, 4, 2)), np.zeros((n, 4)), np.arange(n)[:, None]
-        factors[rows, known], factors[rows, unknown, [0, 1]] = -inverse @ of_unknown, 1.0
-        given[rows, known] = (inverse @ self.value[:, :, None])[:, :, 0]
-        return LocalConditions(factors, given)
+    both = np.concatenate([conditions.on_traction, conditions.on_displacement], axis=2)
+    scaled = both * np.array([1.0, 1.0, displacement_unit, displacement_unit])
+    sizes = np.abs(scaled).max(axis=2, keepdims=True)
+    scaled = scaled / np.where(sizes > 0.0, sizes, 1.0)
+    determinants = np.stack(
+        [np.abs(scaled[:, 0, i] * scaled[:, 1, j] - scaled[:, 0, j] * scaled[:, 1, i]) for i, j in _KNOWN], axis=1
+    )
+    best = determinants.max(axis=1)
+    if not np.all(best > 0.0):
+        raise UndeterminedError("the two conditions at a contact node are not independent")
+    of_both_directions = np.where(_KNOWN[:, 0] % 2 != _KNOWN[:, 1] % 2, determinants, 0.0)
+    is_preferred = of_both_directions.max(axis=1) >= _PREFERRED * best
+    choice = np.where(is_preferred, of_both_directions.argmax(axis=1), determinants.argmax(axis=1))
+    known, unknown = _KNOWN[choice], _UNKNOWN[choice]
+    of_known, of_unknown = (np.take_along_axis(both, pair[:, None], axis=2) for pair in (known, unknown))
+    inverse, n = _inverse(of_known), len(choice)
+    factors, given, rows = np.zeros((n, 4, 2)), np.zeros((n, 4)), np.arange(n)[:, None]
+    factors[rows, known], factors[rows, unknown, [0, 1]] = -inverse @ of_unknown, 1.0
+    given[rows, known] = (inverse @ conditions.value[:, :, None])[:, :, 0]
+    return LocalConditions(factors, given)
 
 
 class UndeterminedError(SingularMatrixError):
@@ -186,7 +152,7 @@ class HierarchicalSystem:
         """Announce, before the first `state`, given parts (n_elements, 4): responses to their sums are then cheap."""
         self.factor.prepare(loads)
 
-    def state(self, known: LocalConditions, elements: IntArray, conditions: NodeConditions) -> FloatArray:
+    def state(self, known: LocalConditions, elements: IntArray, conditions: LinearConditions) -> FloatArray:
         """Return (t_1, t_2, u_1, u_2) of some elements, (n, 4), in their frames.
 
         Parameters
@@ -194,7 +160,7 @@ class HierarchicalSystem:
         known : LocalConditions
             Conditions of all other elements, from `local_conditions`.
         elements : (n,) array
-        conditions : NodeConditions
+        conditions : LinearConditions
             Conditions of these elements.
 
         Raises
@@ -206,7 +172,7 @@ class HierarchicalSystem:
         """
         factors, given = known.factors, known.given
         positions = self._position[elements]
-        local = conditions.solved(self._unit)
+        local = solved(conditions, self._unit)
         if elements.size:
             in_plane = rotated(local, self._frame[elements])
             factors, given = factors.copy(), given.copy()
@@ -283,9 +249,9 @@ class HierarchicalSystem:
         residual: FloatArray = equations.residual(positions, *in_tree_order) + errors
         return residual
 
-    def local_conditions(self, conditions: NodeConditions) -> LocalConditions:
+    def local_conditions(self, conditions: LinearConditions) -> LocalConditions:
         """Solve conditions on all elements; return them in x and y, in the order of the tree."""
-        return rotated(conditions.solved(self._unit), self._frame).take(self._order)
+        return rotated(solved(conditions, self._unit), self._frame).take(self._order)
 
     def _positions_in(self, leaves: IntArray) -> IntArray:
         return np.concatenate(

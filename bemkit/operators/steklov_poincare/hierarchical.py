@@ -9,9 +9,10 @@ import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray, IntArray
 from bemkit.geometry.mesh import BoundaryMesh
+from bemkit.operators.boundary_equations import LinearConditions
 from bemkit.operators.collocation.equations import collocation_equations
 from bemkit.operators.hierarchy.factor import Factor
-from bemkit.operators.hierarchy.system import BodyFactor, HierarchicalSystem, LocalConditions, NodeConditions
+from bemkit.operators.hierarchy.system import BodyFactor, HierarchicalSystem, LocalConditions
 from bemkit.operators.hierarchy.tree import ClusterTree
 from bemkit.operators.linear_solvers import Hierarchical, MatrixFree, SingularMatrixError
 from bemkit.operators.material import Material
@@ -228,10 +229,10 @@ class LoadedSystem:
         given = np.where(conditions.is_fixed, conditions.displacement - conditions.in_frames(self.motion), 0.0)
         return self.system.local_conditions(self._with_displacements(given))
 
-    def _with_displacements(self, displacement: FloatArray) -> NodeConditions:
+    def _with_displacements(self, displacement: FloatArray) -> LinearConditions:
         """Return conditions: given tractions on free directions, displacements (n_elements, 2) on the others."""
         traction = self.conditions.in_frames(self.force) / self.elastic.mesh.lengths[:, None]
-        return NodeConditions.given(~self.conditions.is_free, traction, displacement)
+        return LinearConditions.given(~self.conditions.is_free, traction, displacement)
 
     def large_motion(self, elements: IntArray, displacement: FloatArray) -> FloatArray | None:
         """Return the amplitudes of the rigid motion of some elements if it is far larger than their strain.

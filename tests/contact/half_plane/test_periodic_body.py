@@ -9,10 +9,11 @@ import pytest
 
 import bemkit as bk
 from bemkit.contact.body import ContactState, SingularResponse
-from bemkit.contact.conditions import LinearConditions, separated
+from bemkit.contact.conditions import separated
 from bemkit.contact.half_plane.periodic_body import PeriodicBody
 from bemkit.model.model import build_model
 from bemkit.model.prepared import prepare
+from bemkit.operators.boundary_equations import LinearConditions
 from bemkit.operators.half_plane.flexibility import mean_logarithms
 from bemkit.operators.half_plane.periodic import PeriodicElasticity, wave_flexibility
 from bemkit.operators.material import Material, Plane

@@ -8,12 +8,13 @@ from scipy import sparse
 
 from bemkit.contact.body import ContactState, SingularResponse
 from bemkit.contact.certificate import certify
-from bemkit.contact.conditions import LinearConditions, separated, slip, stick
+from bemkit.contact.conditions import separated, slip, stick
 from bemkit.contact.joined.joined_bodies import JoinedBodies
 from bemkit.contact.joined.member import Member
 from bemkit.contact.laws import Coulomb
 from bemkit.contact.problem import ContactProblem
 from bemkit.errors import InputError
+from bemkit.operators.boundary_equations import LinearConditions
 from bemkit.operators.linear_solvers import SingularMatrixError
 from bemkit.solvers.alm import AugmentedLagrangian
 from bemkit.solvers.base import solve

@@ -6,11 +6,11 @@ from itertools import product
 import numpy as np
 import pytest
 
-from bemkit.contact.conditions import as_rows
 from bemkit.contact.laws import Coulomb, Tresca
 from bemkit.contact.limit_load import largest_factor
 from bemkit.contact.problem import ContactProblem
 from bemkit.contact.solvability import find_unsolvable_load, friction_envelopes
+from bemkit.operators.rigid_modes import as_rows
 from bemkit.solvers.base import Status, solve
 from bemkit.solvers.fallbacks import Fallbacks
 from tests.contact.joined.blocks import arch, joined, rectangle, wall

@@ -9,9 +9,10 @@ import pytest
 
 from bemkit.arrays import BoolArray, FloatArray
 from bemkit.geometry import BoundaryMesh, ExteriorOf, PlateWithHole, Polygon, Rectangle, discretise
+from bemkit.operators.boundary_equations import LinearConditions
 from bemkit.operators.collocation.equations import collocation_equations
 from bemkit.operators.hierarchy.factor import Factor, SingularClusterError
-from bemkit.operators.hierarchy.system import HierarchicalSystem, LocalConditions, NodeConditions, UndeterminedError
+from bemkit.operators.hierarchy.system import HierarchicalSystem, LocalConditions, UndeterminedError
 from bemkit.operators.hierarchy.tree import ClusterTree
 from bemkit.operators.linear_solvers import SingularMatrixError
 from bemkit.operators.material import Material
@@ -82,11 +83,11 @@ def local_conditions_of(
     displacement = conditions.displacement.copy()
     displacement[conditions.is_retained] = kept
     traction = np.einsum("nkc,nc->nk", conditions.frame, force) / mesh.lengths[:, None]
-    return system.local_conditions(NodeConditions.given(~conditions.is_free, traction, displacement))
+    return system.local_conditions(LinearConditions.given(~conditions.is_free, traction, displacement))
 
 
 NOWHERE = np.zeros(0, np.intp)
-NOTHING = NodeConditions(np.zeros((0, 2, 2)), np.zeros((0, 2, 2)), np.zeros((0, 2)))
+NOTHING = LinearConditions(np.zeros((0, 2, 2)), np.zeros((0, 2, 2)), np.zeros((0, 2)))
 
 
 @pytest.mark.parametrize("slopes", slow_except([True, False], True), ids=["slopes", "constant"])
@@ -137,9 +138,9 @@ def test_conditions_that_change_leave_what_a_new_factorisation_finds() -> None:
     for changed in (open_elements, open_elements[:3], open_elements[:0]):
         some = np.isin(np.arange(mesh.n_elements), changed)[open_elements]
         stiff = np.where(some[:, None], rng.uniform(1.0, 2.0, (open_elements.size, 2)), 1.5)
-        held = NodeConditions(
-            np.broadcast_to(np.eye(2), (open_elements.size, 2, 2)),
+        held = LinearConditions(
             stiff[:, :, None] * np.eye(2),
+            np.broadcast_to(np.eye(2), (open_elements.size, 2, 2)),
             np.ones((open_elements.size, 2)),
         )
         state = system.state(local, open_elements, held)
@@ -158,15 +159,15 @@ def test_a_body_that_nothing_holds_and_conditions_that_are_one_are_named() -> No
     frame = np.broadcast_to(np.eye(2), (n, 2, 2))
     system = system_of(mesh, frame, True, 1e-11)
     nothing_held = system.local_conditions(
-        NodeConditions.given(np.zeros((n, 2), bool), np.zeros((n, 2)), np.zeros((n, 2)))
+        LinearConditions.given(np.zeros((n, 2), bool), np.zeros((n, 2)), np.zeros((n, 2)))
     )
     with pytest.raises(SingularMatrixError, match="check that supports and contacts hold the body"):
         system.state(nothing_held, NOWHERE, NOTHING)
     twice = np.array([[[1.0, 0.0], [2.0, 0.0]]])
     with pytest.raises(UndeterminedError, match="not independent"):
-        system.state(nothing_held, np.array([0]), NodeConditions(0.0 * twice, twice, np.zeros((1, 2))))
+        system.state(nothing_held, np.array([0]), LinearConditions(twice, 0.0 * twice, np.zeros((1, 2))))
     # and it goes on from there
-    held = system.local_conditions(NodeConditions.given(np.ones((n, 2), bool), np.zeros((n, 2)), mesh.centres))
+    held = system.local_conditions(LinearConditions.given(np.ones((n, 2), bool), np.zeros((n, 2)), mesh.centres))
     system.state(held, NOWHERE, NOTHING)
     traction, _ = system.full_state()
     # a uniform dilatation has the pressure 2 (mu + lambda) = 2 mu / (1 - 2 nu) on all sides
@@ -221,7 +222,7 @@ def test_clusters_that_do_not_change_keep_no_scattering_matrices_and_may_change_
     for place in (0, 699, 350):
         elements, one = (
             np.array([place]),
-            NodeConditions.given(np.ones((1, 2), bool), np.zeros((1, 2)), np.ones((1, 2))),
+            LinearConditions.given(np.ones((1, 2), bool), np.zeros((1, 2)), np.ones((1, 2))),
         )
         states = [each.state(local, elements, one) for each in (system, every)]
         np.testing.assert_array_equal(*states)

@@ -11,9 +11,11 @@ import bemkit as bk
 from bemkit.arrays import FloatArray
 from bemkit.geometry import BoundaryMesh
 from bemkit.model.prepared import prepare
+from bemkit.operators.boundary_equations import LinearConditions
 from bemkit.operators.collocation.equations import CollocationEquations, collocation_equations
 from bemkit.operators.collocation.layers import Constants
-from bemkit.operators.hierarchy.system import HierarchicalSystem, NodeConditions
+from bemkit.operators.hierarchy.system import HierarchicalSystem
+from bemkit.operators.hierarchy.system import solved as solve_conditions
 from bemkit.operators.linear_solvers import MatrixFree, SingularMatrixError
 from bemkit.operators.material import Material
 from bemkit.operators.matrix_free.coarse_equations import ElementGroups
@@ -27,7 +29,7 @@ from tests.slow import slow_except, slow_only
 
 NOTHING = np.zeros(0, np.intp)
 ACCURATE = MatrixFree(1e-10)
-EMPTY = NodeConditions(np.zeros((0, 2, 2)), np.zeros((0, 2, 2)), np.zeros((0, 2)))
+EMPTY = LinearConditions(np.zeros((0, 2, 2)), np.zeros((0, 2, 2)), np.zeros((0, 2)))
 
 
 def iterated(
@@ -37,21 +39,21 @@ def iterated(
     return HierarchicalSystem(factor, frame, mesh.diameter / mesh.n_elements / MATERIAL.plane_modulus), factor
 
 
-def held(mesh: BoundaryMesh, seed: int = 1) -> NodeConditions:
+def held(mesh: BoundaryMesh, seed: int = 1) -> LinearConditions:
     """Runs of elements held along both, one or none of two turned directions, under loads."""
     conditions, force, _ = conditions_of(mesh, seed)
     traction = np.einsum("nkc,nc->nk", conditions.frame, force) / mesh.lengths[:, None]
-    return NodeConditions.given(conditions.is_fixed, traction, conditions.displacement)
+    return LinearConditions.given(conditions.is_fixed, traction, conditions.displacement)
 
 
-def clamped(mesh: BoundaryMesh) -> NodeConditions:
+def clamped(mesh: BoundaryMesh) -> LinearConditions:
     """The lowest side held, a load on the rest."""
     is_held = np.isclose(mesh.centres[:, 1], mesh.nodes[:, 1].min())
     both = np.repeat(is_held[:, None], 2, axis=1)
-    return NodeConditions.given(both, np.where(both, 0.0, np.cos(mesh.centres)), np.zeros_like(mesh.centres))
+    return LinearConditions.given(both, np.where(both, 0.0, np.cos(mesh.centres)), np.zeros_like(mesh.centres))
 
 
-def solved(system: HierarchicalSystem, conditions: NodeConditions) -> tuple[FloatArray, FloatArray]:
+def solved(system: HierarchicalSystem, conditions: LinearConditions) -> tuple[FloatArray, FloatArray]:
     system.state(system.local_conditions(conditions), NOTHING, EMPTY)
     return system.full_state()
 
@@ -94,7 +96,7 @@ def test_springs_and_friction(stiffness: float) -> None:
     on_traction[is_side] = [[1.0, -0.3], [0.0, 0.0]]
     on_displacement[is_side] = [[0.0, 0.0], [0.0, 1.0]]
     value = np.where((is_low | is_side)[:, None], 0.0, np.cos(mesh.centres))
-    conditions, frame = NodeConditions(on_traction, on_displacement, value), np.tile(np.eye(2), (400, 1, 1))
+    conditions, frame = LinearConditions(on_displacement, on_traction, value), np.tile(np.eye(2), (400, 1, 1))
     system, factor = iterated(mesh, frame)
     answers = solved(system, conditions), solved(system_of(mesh, frame, True, 1e-12), conditions)
     for own, exact in zip(*answers, strict=True):
@@ -139,7 +141,7 @@ def test_steps_that_do_not_suffice() -> None:
 
 def test_conditions_that_hold_nothing() -> None:
     mesh = mesh_of("rectangle", 400)
-    free = NodeConditions.given(np.zeros((400, 2), bool), np.zeros((400, 2)), np.zeros((400, 2)))
+    free = LinearConditions.given(np.zeros((400, 2), bool), np.zeros((400, 2)), np.zeros((400, 2)))
     system, _ = iterated(mesh, np.tile(np.eye(2), (400, 1, 1)))
     with pytest.raises(SingularMatrixError, match="on groups of elements is singular"):
         solved(system, free)
@@ -154,7 +156,7 @@ def test_groups_lose_no_digits_on_fine_meshes() -> None:
     side = np.repeat(np.arange(4), 5_000)
     is_held = np.stack([side <= 1, side == 0], axis=1)
     nothing = np.zeros_like(mesh.centres)
-    local = NodeConditions.given(is_held, nothing, nothing).solved(1.0)
+    local = solve_conditions(LinearConditions.given(is_held, nothing, nothing), 1.0)
     equations = collocation_equations(mesh, material, np.arange(mesh.n_elements), takes_slopes=True)
     assert isinstance(equations, CollocationEquations)
     inverse = Preconditioner(mesh, material, equations, local, 1.0)
