@@ -17,8 +17,8 @@ from bemkit.geometry.curves import Arc, Segment
 from bemkit.geometry.local_values import values_on_elements
 from bemkit.geometry.outline import Outline, Side
 from bemkit.model.prepared import prepare
+from bemkit.operators.boundary import SteklovPoincareOperator
 from bemkit.operators.steklov_poincare.galerkin import GalerkinElasticity
-from bemkit.operators.steklov_poincare.operator import SteklovPoincareOperator
 
 REFERENCE = Path(__file__).parent / "reference" / "data"
 

@@ -13,7 +13,6 @@ import numpy as np
 from bemkit.arrays import BoolArray, FloatArray, IntArray, read_only
 from bemkit.errors import GeometryError, UnknownPartError
 from bemkit.geometry.curves import Curve, as_point, require_positive, scaled_curve
-from bemkit.geometry.elements import Elements, bisected
 from bemkit.geometry.loops import (
     as_index,
     check_chains,
@@ -24,7 +23,7 @@ from bemkit.geometry.loops import (
     restrict_loops,
     swept_areas,
 )
-from bemkit.geometry.pieces import Pieces, evaluate_curves, make_pieces
+from bemkit.geometry.pieces import Elements, Pieces, evaluate_curves, make_pieces
 from bemkit.geometry.quadrature import gauss_legendre
 from bemkit.geometry.vectors import norms, turned_right
 
@@ -305,14 +304,15 @@ class BoundaryMesh:
             Both halves take the place of the element in its parts and in the order of elements; curved elements are
             halved on their curve. The surface of a half-plane is divided anew instead.
         """
+        from bemkit.geometry.bisection import bisected
+
         marked = as_index(marked, "marked")
         if marked.size and not (marked.min() >= 0 and marked.max() < self.n_elements):
             raise GeometryError(
                 f"BoundaryMesh: marked contains elements from {marked.min()} to {marked.max()}: "
                 f"use numbers from 0 to {self.n_elements - 1}"
             )
-        is_halved = np.isin(np.arange(self.n_elements), marked)
-        halves = bisected(self._content, is_halved, self.centres)
+        halves = bisected(self._content, np.isin(np.arange(self.n_elements), marked), self.centres)
         return BoundaryMesh(*halves, self.is_exterior, self.symmetry, self.surface)
 
     def transformed(self, shift: tuple[float, float] = (0.0, 0.0), factor: float = 1.0) -> BoundaryMesh:

@@ -9,9 +9,9 @@ than the round-off of their own coordinates, so that neighbours a millionth of a
 the size of the body, are seen as they are.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -100,6 +100,17 @@ class Pieces:
         first = _with_turning(self, self.start, point, np.column_stack([self.span[:, 0], middle]))
         second = _with_turning(self, point, self.end, np.column_stack([middle, self.span[:, 1]]))
         return first, second
+
+
+class Elements(NamedTuple):
+    """The arrays of a boundary mesh; see `BoundaryMesh`."""
+
+    nodes: FloatArray
+    elements: IntArray
+    parts: Mapping[str, IntArray]
+    curves: tuple[Curve, ...]
+    element_curve: IntArray | None
+    element_span: FloatArray | None
 
 
 def make_pieces(

@@ -14,8 +14,7 @@ import numpy as np
 from bemkit.arrays import BoolArray, FloatArray, IntArray
 from bemkit.errors import GeometryError
 from bemkit.geometry.curves import Curve, TransformedCurve, scaled_curve
-from bemkit.geometry.elements import Elements
-from bemkit.geometry.pieces import RESOLUTION
+from bemkit.geometry.pieces import RESOLUTION, Elements
 
 _ON_LINE = 64 * RESOLUTION
 """Nodes closer to a line than this, times the size of coordinates, lie on it: trigonometry loses a few digits."""

@@ -94,13 +94,11 @@ def single_body(prepared: Prepared, elastic: SteklovPoincare, condensed: Condens
 
 
 def _half_plane(prepared: Prepared, elastic: SteklovPoincare) -> SurfaceBody:
-    from bemkit.operators.half_plane.elasticity import HalfPlaneElasticity
+    from bemkit.operators.half_plane.elasticity import HalfPlaneElasticity, LargeHalfPlane
 
     body, nodes = prepared.only, prepared.contact_nodes
     conditions = opened(body.conditions, nodes)
     if isinstance(elastic, HalfPlaneElasticity):
-        from bemkit.operators.half_plane.large import LargeHalfPlane
-
         if isinstance(elastic, LargeHalfPlane) and not conditions.is_fixed.any():
             from bemkit.contact.half_plane.large_strip_body import LargeStripBody
 

@@ -28,10 +28,14 @@ from bemkit.operators.forms import (
 from bemkit.operators.linear_solvers import Tag
 from bemkit.operators.material import Material
 from bemkit.operators.pair_form import PairForm, require_one_mesh
+from bemkit.operators.steklov_poincare.nodal_conditions import TractionField, integrate_traction
 
 Matrix: TypeAlias = "FloatArray | csr_array[np.float64]"
 
 if TYPE_CHECKING:
+    from bemkit.operators.steklov_poincare.collocation import CollocationElasticity
+    from bemkit.operators.steklov_poincare.galerkin import GalerkinElasticity
+
     _LinearOperator: TypeAlias = LinearOperator[np.float64]
 else:
     _LinearOperator = LinearOperator
@@ -174,6 +178,28 @@ class Mass(BoundaryOperator):
 
     def _build(self) -> Matrix:
         return mass_matrix(self.trial, self.test)
+
+
+class SteklovPoincareOperator(BoundaryOperator):
+    """The Steklov-Poincare operator S: displacement dofs [m] -> nodal forces [N/m], both (n_dofs,).
+
+    Parameters
+    ----------
+    elastic : GalerkinElasticity or CollocationElasticity
+        Map whose stiffness is the matrix. Rigid motions of a bounded body are its kernel. S contains an inverse, so
+        that each block requires the whole matrix.
+    """
+
+    def __init__(self, elastic: GalerkinElasticity | CollocationElasticity) -> None:
+        super().__init__(elastic.displacement_space, elastic.displacement_space, elastic.tags)
+        self.elastic = elastic
+
+    def _build(self) -> FloatArray:
+        return self.elastic.stiffness()
+
+    def nodal_forces(self, elements: IntArray, traction: TractionField) -> FloatArray:
+        """Return the consistent nodal forces (n_nodes, 2) [N/m] of a traction field [Pa] on some elements."""
+        return integrate_traction(self.trial, elements, traction)
 
 
 def single_layer(trial: BoundarySpace, test: BoundarySpace, material: Material) -> PairOperator:

@@ -148,7 +148,7 @@ class Galerkin(Discretisation):
     def elastic_map(self, mesh: BoundaryMesh, material: Material, linear_solver: LinearSolver) -> SteklovPoincare:
         """Return the Galerkin map of the two spaces; of a half-plane the one of its surface."""
         if mesh.surface is not None:
-            from bemkit.operators.half_plane.maps import half_plane_map
+            from bemkit.operators.half_plane.elasticity import half_plane_map
 
             return half_plane_map(mesh, material)
         from bemkit.operators.steklov_poincare.galerkin import GalerkinElasticity

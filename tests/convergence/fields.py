@@ -10,12 +10,12 @@ from bemkit.arrays import FloatArray
 from bemkit.geometry import BoundaryMesh
 from bemkit.geometry.neighbours import corner_nodes
 from bemkit.geometry.spaces import LinearSpace, QuadraticSpace, dof_points
+from bemkit.operators.boundary import SteklovPoincareOperator
 from bemkit.operators.material import Material
 from bemkit.operators.rigid_modes import traction_free_modes
 from bemkit.operators.steklov_poincare import SteklovPoincare
 from bemkit.operators.steklov_poincare.collocation import CollocationElasticity
 from bemkit.operators.steklov_poincare.galerkin import GalerkinElasticity
-from bemkit.operators.steklov_poincare.operator import SteklovPoincareOperator
 
 
 def quadratic_map(mesh: BoundaryMesh, material: Material) -> GalerkinElasticity:

@@ -9,12 +9,11 @@ from scipy.special import zeta
 from bemkit.arrays import FloatArray
 from bemkit.geometry import BoundaryMesh, Disk, discretise
 from bemkit.geometry.spaces import BoundarySpace, ConstantSpace, LinearSpace, QuadraticSpace, dof_points
-from bemkit.operators.boundary import assemble, double_layer, hypersingular, single_layer
+from bemkit.operators.boundary import SteklovPoincareOperator, assemble, double_layer, hypersingular, single_layer
 from bemkit.operators.material import Material
 from bemkit.operators.steklov_poincare import SteklovPoincare
 from bemkit.operators.steklov_poincare.collocation import CollocationElasticity
 from bemkit.operators.steklov_poincare.galerkin import GalerkinElasticity
-from bemkit.operators.steklov_poincare.operator import SteklovPoincareOperator
 from tests.slow import slow_except
 
 RADIUS = 1.3

@@ -10,10 +10,10 @@ import pytest
 from bemkit.arrays import FloatArray
 from bemkit.geometry import BoundaryMesh, Disk, ExteriorOf, discretise
 from bemkit.geometry.spaces import dof_points
+from bemkit.operators.boundary import SteklovPoincareOperator
 from bemkit.operators.material import Material, Plane
 from bemkit.operators.steklov_poincare.collocation import CollocationElasticity
 from bemkit.operators.steklov_poincare.galerkin import GalerkinElasticity
-from bemkit.operators.steklov_poincare.operator import SteklovPoincareOperator
 from tests.convergence.fields import distance, forces, neumann, observed_order, quadratic_map
 
 RADIUS = 0.7

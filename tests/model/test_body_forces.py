@@ -16,9 +16,9 @@ from bemkit.arrays import FloatArray
 from bemkit.geometry.spaces import dof_points
 from bemkit.model.model import Model, build_model
 from bemkit.model.prepared import prepare
+from bemkit.operators.boundary import SteklovPoincareOperator
 from bemkit.operators.material import Plane
 from bemkit.operators.steklov_poincare.galerkin import GalerkinElasticity
-from bemkit.operators.steklov_poincare.operator import SteklovPoincareOperator
 from bemkit.runs.steps import UnsolvableSceneError
 from bemkit.solvers.base import solve
 from tests.slow import slow_except, slow_only

@@ -31,6 +31,7 @@ from bemkit.geometry import (
 )
 from bemkit.geometry.neighbours import corner_nodes
 from bemkit.geometry.placement import Placement
+from bemkit.operators.boundary import SteklovPoincareOperator
 from bemkit.operators.element_geometry import ElementGeometry
 from bemkit.operators.integrals.inner import inner_integrals, inner_on_element
 from bemkit.operators.integrals.pairs import Degrees, PairIntegrals
@@ -39,7 +40,6 @@ from bemkit.operators.material import Material
 from bemkit.operators.rigid_modes import rigid_motions
 from bemkit.operators.steklov_poincare.collocation import CollocationElasticity
 from bemkit.operators.steklov_poincare.galerkin import GalerkinElasticity
-from bemkit.operators.steklov_poincare.operator import SteklovPoincareOperator
 from tests.operators.collocation_matrices import collocation_matrices
 from tests.slow import slow_except, slow_only
 

@@ -15,10 +15,10 @@ from bemkit.errors import GeometryError
 from bemkit.geometry.neighbours import break_nodes
 from bemkit.geometry.quadrature import gauss_lobatto
 from bemkit.geometry.spaces import LagrangeSpace, dof_points
+from bemkit.operators.boundary import SteklovPoincareOperator
 from bemkit.operators.somigliana.fields import InteriorFields
 from bemkit.operators.steklov_poincare.galerkin import GalerkinElasticity
 from bemkit.operators.steklov_poincare.nodal_conditions import integrate_traction
-from bemkit.operators.steklov_poincare.operator import SteklovPoincareOperator
 from bemkit.scene.toml import SceneError, load_scene, scene_from_toml, scene_to_toml, with_overrides
 from tests.slow import slow_except
 

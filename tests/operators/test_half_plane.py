@@ -7,10 +7,9 @@ from mpmath import log, mpf, workdps
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.shapes import ElasticHalfPlane
 from bemkit.geometry.surface import Surface
-from bemkit.operators.half_plane.elasticity import HalfPlaneElasticity
+from bemkit.operators.half_plane.elasticity import HalfPlaneElasticity, half_plane_map
 from bemkit.operators.half_plane.equations import HalfPlaneEquations
 from bemkit.operators.half_plane.flexibility import mean_logarithms
-from bemkit.operators.half_plane.maps import half_plane_map
 from bemkit.operators.material import Material, Plane
 from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions
 

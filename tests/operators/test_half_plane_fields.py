@@ -12,8 +12,8 @@ from scipy.optimize import minimize_scalar
 import bemkit as bk
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.surface import Surface
+from bemkit.operators.half_plane.elasticity import half_plane_map
 from bemkit.operators.half_plane.fields import HalfPlaneFields, dilogarithm
-from bemkit.operators.half_plane.maps import half_plane_map
 from bemkit.operators.material import Material, Plane
 from bemkit.operators.somigliana.locate import PointNotInsideError
 

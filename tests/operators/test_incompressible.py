@@ -12,11 +12,11 @@ from bemkit.contact.contact_nodes import ContactNodes
 from bemkit.geometry import BoundaryMesh, Selection
 from bemkit.geometry.neighbours import corner_nodes
 from bemkit.geometry.spaces import LinearSpace, QuadraticSpace, dof_points
+from bemkit.operators.boundary import SteklovPoincareOperator
 from bemkit.operators.linear_solvers import SingularMatrixError
 from bemkit.operators.steklov_poincare.collocation import CollocationElasticity
 from bemkit.operators.steklov_poincare.galerkin import GalerkinElasticity
 from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions, Support, integrate_traction
-from bemkit.operators.steklov_poincare.operator import SteklovPoincareOperator
 from tests.handmade import condense, contact_along_normals
 from tests.slow import slow_except, slow_only
 

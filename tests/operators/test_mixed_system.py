@@ -10,13 +10,13 @@ import pytest
 from bemkit.arrays import FloatArray
 from bemkit.geometry import BoundaryMesh, Disk, PlateWithHole, Rectangle, Ring, discretise
 from bemkit.geometry.neighbours import corner_nodes
+from bemkit.operators.boundary import SteklovPoincareOperator
 from bemkit.operators.collocation.reciprocity import Reciprocity
 from bemkit.operators.counts import Entries
 from bemkit.operators.material import Material
 from bemkit.operators.rigid_modes import traction_free_modes
 from bemkit.operators.steklov_poincare.collocation import CollocationElasticity
 from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions
-from bemkit.operators.steklov_poincare.operator import SteklovPoincareOperator
 from tests.operators.collocation_matrices import collocation_matrices
 from tests.operators.test_curved import composite
 

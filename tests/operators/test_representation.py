@@ -17,6 +17,7 @@ from bemkit.geometry import BoundaryMesh, Disk, ExteriorOf, ParametricCurve, Pol
 from bemkit.geometry.neighbours import corner_nodes
 from bemkit.geometry.outline import Outline, Side
 from bemkit.geometry.spaces import BoundarySpace, ConstantSpace, LinearSpace, QuadraticSpace, dof_points
+from bemkit.operators.boundary import SteklovPoincareOperator
 from bemkit.operators.element_geometry import ElementGeometry
 from bemkit.operators.material import Material, Plane
 from bemkit.operators.somigliana.fields import InteriorFields
@@ -25,7 +26,6 @@ from bemkit.operators.somigliana.moments import local_moments, straight_gradient
 from bemkit.operators.somigliana.stress import principal_stresses, von_mises
 from bemkit.operators.steklov_poincare.collocation import CollocationElasticity
 from bemkit.operators.steklov_poincare.galerkin import GalerkinElasticity
-from bemkit.operators.steklov_poincare.operator import SteklovPoincareOperator
 from bemkit.results.solved_scene import interior_fields
 from tests.slow import slow_except, slow_only
 

@@ -22,6 +22,7 @@ from bemkit.geometry import (
 )
 from bemkit.geometry.neighbours import corner_nodes
 from bemkit.geometry.spaces import LinearSpace, QuadraticSpace, dof_points
+from bemkit.operators.boundary import SteklovPoincareOperator
 from bemkit.operators.linear_solvers import Automatic
 from bemkit.operators.material import Material, Plane
 from bemkit.operators.rigid_modes import rigid_motions
@@ -29,7 +30,6 @@ from bemkit.operators.steklov_poincare import SteklovPoincare
 from bemkit.operators.steklov_poincare.collocation import CollocationElasticity
 from bemkit.operators.steklov_poincare.galerkin import GalerkinElasticity
 from bemkit.operators.steklov_poincare.nodal_conditions import integrate_traction
-from bemkit.operators.steklov_poincare.operator import SteklovPoincareOperator
 from bemkit.testing import check_operator
 
 MATERIAL = Material(1.0, 0.3)

@@ -12,7 +12,7 @@ from bemkit.contact.body import SingularResponse
 from bemkit.contact.half_plane.surface_body import SurfaceBody
 from bemkit.contact.reduced_conditions import ReducedConditions, as_pairs
 from bemkit.operators.boundary_equations import LinearConditions
-from bemkit.operators.half_plane.large import LargeHalfPlane
+from bemkit.operators.half_plane.elasticity import LargeHalfPlane
 from bemkit.operators.hierarchy.system import LocalConditions, solved
 from bemkit.operators.linear_solvers import SingularMatrixError
 

@@ -1,7 +1,7 @@
 """Maps of an elastic body from boundary displacements to tractions, by Galerkin or by collocation.
 
-Scenes use `galerkin.GalerkinElasticity` or `collocation.CollocationElasticity`; `operator` makes scipy linear operators
-of them.
+Scenes use `galerkin.GalerkinElasticity` or `collocation.CollocationElasticity`; `bemkit.operators.boundary` makes scipy
+linear operators of them.
 
 On bounded bodies the tractions of both maps are in exact equilibrium of forces and moments, as those of the continuous
 map. A plain discretisation would violate equilibrium slightly, and results would depend on the arbitrary constant in

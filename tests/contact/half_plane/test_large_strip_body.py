@@ -14,7 +14,7 @@ from bemkit.contact.half_plane.large_strip_body import LargeStripBody
 from bemkit.contact.half_plane.strip_body import StripBody
 from bemkit.model.model import build_model
 from bemkit.model.prepared import prepare
-from bemkit.operators.half_plane.large import LargeHalfPlane
+from bemkit.operators.half_plane.elasticity import LargeHalfPlane
 from bemkit.testing import check_body
 from tests.contact.half_plane.test_strip_body import DRIVES, LOAD
 from tests.slow import slow_except
@@ -90,11 +90,11 @@ def test_what_nothing_holds_is_singular() -> None:
 
 def test_compressed_equations_have_the_tractions_of_dense_equations(monkeypatch: pytest.MonkeyPatch) -> None:
     scene = replace(CYLINDER, mesh=bk.MeshOptions(elements=500))
-    monkeypatch.setattr("bemkit.operators.half_plane.maps.LARGEST_DENSE", 499)
+    monkeypatch.setattr("bemkit.operators.half_plane.elasticity.LARGEST_DENSE", 499)
     large = bk.run(scene)
     assert large.is_converged
     assert any(item.name == "tree of clusters" for item in large.plan.items)
-    monkeypatch.setattr("bemkit.operators.half_plane.maps.LARGEST_DENSE", 500)
+    monkeypatch.setattr("bemkit.operators.half_plane.elasticity.LARGEST_DENSE", 500)
     dense = bk.run(scene)  # from the start: the solution compared with must not help
     assert not any(item.name == "tree of clusters" for item in dense.plan.items)
     for name in ("sigma_n", "sigma_t"):

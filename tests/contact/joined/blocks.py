@@ -15,11 +15,11 @@ from bemkit.contact.joined.joined_bodies import JoinedBodies
 from bemkit.contact.joined.member import Member
 from bemkit.geometry import Polygon, discretise
 from bemkit.geometry.spaces import dof_points
+from bemkit.operators.boundary import SteklovPoincareOperator
 from bemkit.operators.material import Material
 from bemkit.operators.rigid_modes import rigid_motions
 from bemkit.operators.steklov_poincare.galerkin import GalerkinElasticity
 from bemkit.operators.steklov_poincare.nodal_conditions import integrate_traction
-from bemkit.operators.steklov_poincare.operator import SteklovPoincareOperator
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,9 +14,15 @@ from bemkit.geometry.reflection import antisymmetric_dofs, reflected_to_whole
 from bemkit.geometry.spaces import BoundarySpace, ConstantSpace, LinearSpace, QuadraticSpace
 from bemkit.model.model import build_model
 from bemkit.model.prepared import prepare
-from bemkit.operators.boundary import adjoint_double_layer, double_layer, hypersingular, mass, single_layer
+from bemkit.operators.boundary import (
+    SteklovPoincareOperator,
+    adjoint_double_layer,
+    double_layer,
+    hypersingular,
+    mass,
+    single_layer,
+)
 from bemkit.operators.steklov_poincare.galerkin import GalerkinElasticity
-from bemkit.operators.steklov_poincare.operator import SteklovPoincareOperator
 from bemkit.testing import check_double_layer, check_operator, check_space
 from tests.scenes import DISCRETISATIONS, square, squeezed, whole_mesh
 from tests.slow import slow_except, slow_only

@@ -1,23 +1,9 @@
-"""Arrays of a boundary mesh, and its bisection."""
-
-from collections.abc import Mapping
-from typing import NamedTuple
+"""Bisection of the elements of a boundary mesh."""
 
 import numpy as np
 
-from bemkit.arrays import BoolArray, FloatArray, IntArray
-from bemkit.geometry.curves import Curve
-
-
-class Elements(NamedTuple):
-    """The arrays of a boundary mesh; see `BoundaryMesh`."""
-
-    nodes: FloatArray
-    elements: IntArray
-    parts: Mapping[str, IntArray]
-    curves: tuple[Curve, ...]
-    element_curve: IntArray | None
-    element_span: FloatArray | None
+from bemkit.arrays import BoolArray, FloatArray
+from bemkit.geometry.pieces import Elements
 
 
 def bisected(old: Elements, is_halved: BoolArray, middles: FloatArray) -> Elements:
