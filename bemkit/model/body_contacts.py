@@ -14,6 +14,7 @@ from bemkit.contact.mortar.congruent import CongruentCouplings, PlacedSide
 from bemkit.contact.mortar.facing import find_facing, is_non_mortar
 from bemkit.contact.mortar.sides import ContactSide
 from bemkit.errors import InputError
+from bemkit.formulas import choices
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.reflection import antisymmetric_dofs
 from bemkit.geometry.spaces import BoundarySpace
@@ -34,7 +35,12 @@ _DIGITS = 9
 def touching_pairs(scene: Scene, bodies: Sequence[PlacedBody]) -> tuple[tuple[ContactPair, bool], ...]:
     """Return the contacts of free sides that face each other, besides those that are listed; see `Touching`.
 
-    Each comes with whether the meshes resolve it.
+    Each comes with whether the meshes resolve it. The first side of each has the multipliers.
+
+    Raises
+    ------
+    InputError
+        If `Touching.names` has a side that is not free, or a symmetry line shows a side its own image.
     """
     touching = scene.touching
     if touching is None:
@@ -49,14 +55,27 @@ def touching_pairs(scene: Scene, bodies: Sequence[PlacedBody]) -> tuple[tuple[Co
                 owners.append(number)
     if scene.symmetry is not None:
         _check_images(sides, names, scene.symmetry, touching.within)
-    known = {frozenset(pair.sides) for pair in scene.contacts}
+    known, given = {frozenset(pair.sides) for pair in scene.contacts}, _given_sides(touching.names, names)
     law = scene.law_of(touching)
     facing = find_facing(sides, touching.within, owners=owners, has_friction=not law.is_frictionless)
-    found = [
-        (ContactPair((names[pair.non_mortar], names[pair.mortar]), multipliers_on=names[pair.non_mortar]), pair)
-        for pair in facing
-    ]
-    return tuple((pair, sides.is_resolved) for pair, sides in found if frozenset(pair.sides) not in known)
+    ordered = [((names[pair.non_mortar], names[pair.mortar]), pair.is_resolved) for pair in facing]
+    ordered = [(both[::-1] if both[::-1] in given else both, is_resolved) for both, is_resolved in ordered]
+    return tuple(
+        (ContactPair(both, multipliers_on=both[0]), is_resolved)
+        for both, is_resolved in ordered
+        if frozenset(both) not in known
+    )
+
+
+def _given_sides(given: Sequence[str], names: Sequence[str]) -> set[tuple[str, ...]]:
+    """Return the pairs of sides in the names of contacts, all of which must be free sides."""
+    pairs = {name: tuple(name.split(" / ")) for name in given}
+    for name, sides in pairs.items():
+        if len(sides) != 2 or not set(sides) <= set(names):
+            raise InputError(
+                f"touching.names has {name!r}: give 'side / side' of the free sides {choices(sides[0], list(names))}"
+            )
+    return set(pairs.values())
 
 
 def _check_images(sides: Sequence[ContactSide], names: Sequence[str], symmetry: Symmetry, within: float) -> None:

@@ -137,14 +137,18 @@ class Level:
 
 
 def with_sides_of(scene: Scene, solution: Solution) -> Scene:
-    """Return a scene whose listed contacts have their multipliers on the sides that had them in a solution."""
-    contacts = []
+    """Return a scene whose contacts have their multipliers on the sides that had them in a solution."""
+    contacts, touching = [], scene.touching
+    if touching is not None:
+        listed = {*touching.names, *(pair.name for pair in scene.contacts)}
+        found = (pair.name for pair in solution.scene.contacts if pair.name not in listed)
+        touching = replace(touching, names=(*touching.names, *found))
     for pair in scene.contacts:
         first = solution.contact_sides.get(pair.name, (None,))[0]
         sides = [side for side, place in zip(pair.elastic_sides, pair.elastic_parts, strict=True) if place == first]
         is_open = pair.rigid_body is None and pair.multipliers_on is None
         contacts.append(replace(pair, multipliers_on=sides[0]) if is_open and sides else pair)
-    return replace(scene, contacts=tuple(contacts))
+    return replace(scene, contacts=tuple(contacts), touching=touching)
 
 
 def _divided_bodies(asked: Scene) -> tuple[dict[str, int], list[BodyScene], tuple[tuple[str, ...], ...]]:

@@ -116,6 +116,9 @@ class Touching:
         By default that of the scene.
     reach : float [m], optional
         Of each contact found; see `ContactPair`.
+    names : tuple of str
+        Of contacts that may be found, ``"body.part / body.part"``: the side named first has the multipliers. By default
+        see `bemkit.contact.mortar`.
 
     Raises
     ------
@@ -126,6 +129,7 @@ class Touching:
     within: float
     law: FrictionLaw | None = None
     reach: float | None = None
+    names: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         check_objects(self, "touching")

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import bemkit as bk
+from bemkit.errors import InputError
 from bemkit.model.contacts import OverlapError
 from bemkit.results.solution import Solution
 from bemkit.runs.adaptive import run_adaptive
@@ -507,3 +508,27 @@ def test_round_off_of_a_long_way_is_refined_on_graded_meshes() -> None:
         mesh=bk.MeshOptions(elements=60, grading=bk.Geometric(0.3, 4)),
     )
     assert bk.run(scene).certificate.force_imbalance < 1e-11  # a hundredth of the tolerance of solves
+
+
+def test_names_of_touching_contacts_say_which_side_has_the_multipliers() -> None:
+    parts = {
+        "lower": bk.Part("floor", bk.Clamped(), ("bottom",)),
+        "upper": bk.Part("press", bk.Pressure(1e3), ("top",)),
+    }
+    blocks = tuple(
+        bk.Body(
+            name=name, shape=bk.Rectangle(1.0, 1.0), material=STEEL, parts=(part,),
+            placement=bk.Placement((0.0, height)), mesh=bk.MeshOptions(elements=16),
+        )
+        for height, (name, part) in enumerate(parts.items())
+    )  # fmt: skip
+    for name in ("lower.top / upper.bottom", "upper.bottom / lower.top"):
+        touching = bk.Touching(1e-6, names=(name,))
+        solution = bk.run(bk.Scene(title="Two blocks", bodies=blocks, touching=touching, law=bk.Frictionless()))
+        ((found, sides),) = solution.contact_sides.items()
+        assert found == name == " / ".join(".".join(side) for side in sides)
+    wrong = bk.Touching(1e-6, names=("lower.top / upper.base",))
+    with pytest.raises(
+        InputError, match=r"touching.names has 'lower.top / upper.base': give 'side / side' of the free"
+    ):
+        bk.run(bk.Scene(title="Two blocks", bodies=blocks, touching=wrong, law=bk.Frictionless()))

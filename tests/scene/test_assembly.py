@@ -115,7 +115,7 @@ def test_every_key_survives_its_text() -> None:
             ),
             RigidBody(name="level", obstacle=SignedDistance(Expression("y - x")), force_x=1.0, y=2.0, turn=-0.1),
         ),
-        touching=Touching(0.01, Coulomb(0.1), 0.3),
+        touching=Touching(0.01, Coulomb(0.1), 0.3, ("upper.bottom / lower.top",)),
         law=Coulomb(0.5),
         load_factors=(0.5, 1.0),
     )
