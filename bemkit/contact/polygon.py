@@ -9,7 +9,7 @@ import numpy as np
 from bemkit.arrays import BoolArray, FloatArray
 from bemkit.contact.obstacle import check_pair, unit_vectors
 from bemkit.errors import InputError
-from bemkit.geometry.vectors import turned_left, winding_numbers
+from bemkit.geometry.vectors import enclosed_area, turned_left, winding_numbers
 
 _ROUND_OFF = 1e-12
 """Largest distance from a corner, relative to the coordinates, that may be round-off."""
@@ -62,8 +62,7 @@ class RigidPolygon:
     def _sides(self) -> tuple[FloatArray, FloatArray]:
         """Return start (n_sides, 2) and vector to the end (n_sides, 2) of each side, anticlockwise."""
         start = np.array(self.vertices, dtype=float)
-        x, y = (start - start[0]).T
-        if np.sum(x * np.roll(y, -1) - y * np.roll(x, -1)) < 0.0:
+        if enclosed_area(start) < 0.0:
             start = start[::-1]
         return start, np.roll(start, -1, axis=0) - start
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Protocol
@@ -12,11 +11,11 @@ import numpy as np
 
 from bemkit.arrays import FloatArray
 from bemkit.errors import GeometryError, format_point
-from bemkit.geometry.curves import Arc, Curve, ParametricCurve, Segment, as_point, reverse_curve
+from bemkit.geometry.curves import Arc, Curve, ParametricCurve, Segment, as_point
 from bemkit.geometry.nurbs import Nurbs, clamped_knots
 from bemkit.geometry.outline import Drawing, Outline, Side
-from bemkit.geometry.shapes import CheckedShape
-from bemkit.geometry.vectors import circle_centre, cross, enclosed_area, norms
+from bemkit.geometry.shapes import CheckedShape, reversed_loop
+from bemkit.geometry.vectors import circle_centre, cross, norms, senses_of
 
 Point = tuple[float, float]
 
@@ -247,11 +246,8 @@ class OutlineShape(CheckedShape):
                 except GeometryError as error:
                     raise GeometryError(f"outline: side {name!r}: {error}") from error
             loops.append(tuple(sides))
-        areas = [_signed_area(loop) for loop in loops]
-        outer = int(np.argmax(np.abs(areas)))
-        for k, area in enumerate(areas):
-            if (area > 0.0) != (k == outer):
-                loops[k] = tuple(Side(side.name, reverse_curve(side.curve), side.group) for side in reversed(loops[k]))
+        _, senses = senses_of([np.concatenate([side.curve.point(_SEEN) for side in loop]) for loop in loops])
+        loops = [loop if is_right else reversed_loop(loop) for loop, is_right in zip(loops, senses, strict=True)]
         return Outline(tuple(loops), drawing=Drawing(self.notes, self.unit))
 
 
@@ -259,8 +255,3 @@ def _arc(centre: FloatArray, start: FloatArray, sweep: float) -> Arc:
     x, y = start - centre
     angle = math.atan2(y, x)
     return Arc((float(centre[0]), float(centre[1])), math.hypot(x, y), angle, angle + sweep)
-
-
-def _signed_area(loop: Sequence[Side]) -> float:
-    """Return the area [m^2] of a loop, to a few digits; negative if it runs clockwise."""
-    return enclosed_area(np.concatenate([side.curve.point(_SEEN) for side in loop]))

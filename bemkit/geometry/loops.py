@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -342,12 +343,10 @@ def check_mesh_loops(
     for k, loop in enumerate(loops):
         loop_of_element[loop] = k
 
-    def describe(element: int) -> str:
-        return describe_element(nodes, elements, element)
-
     def describe_loop(k: int) -> str:
         return f"loop of {len(loops[k])} elements through element {loops[k][0]}"
 
+    describe = partial(describe_element, nodes, elements)
     check_loops(pieces.take(np.concatenate(loops)), loop_of_element, is_exterior, describe, describe_loop)
 
 

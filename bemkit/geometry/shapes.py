@@ -13,6 +13,7 @@ import numpy as np
 from bemkit.errors import GeometryError
 from bemkit.geometry.curves import Arc, Segment, as_point, require_positive, reverse_curve
 from bemkit.geometry.outline import Outline, Side
+from bemkit.geometry.vectors import enclosed_area
 
 _QUADRANTS = np.pi / 2 * np.arange(5)
 
@@ -98,8 +99,7 @@ class Polygon(CheckedShape):
                 raise GeometryError(
                     f"Polygon: side_names has {len(self.side_names)} names for {len(vertices)} sides: name every side"
                 )
-        x, y = (np.array(vertices) - vertices[0]).T
-        is_clockwise = bool(x @ np.roll(y, -1) - y @ np.roll(x, -1) < 0.0)
+        is_clockwise = enclosed_area(np.array(vertices)) < 0.0
         object.__setattr__(self, "vertices", vertices[::-1] if is_clockwise else vertices)
         self.outline()  # says first if the sides cross: then their sense is undefined
         if is_clockwise:
@@ -269,7 +269,7 @@ class ExteriorOf(CheckedShape):
         """Return the loop of the shape, reversed."""
         outline = self.shape.outline()
         (loop,) = outline.loops
-        return Outline((_reversed_loop(loop),), is_exterior=True, drawing=outline.drawing)
+        return Outline((reversed_loop(loop),), is_exterior=True, drawing=outline.drawing)
 
 
 @dataclass(frozen=True)
@@ -354,8 +354,9 @@ def _circle_loop(centre: tuple[float, float], radius: float, name: str) -> tuple
 
 def _hole_loop(centre: tuple[float, float], radius: float, name: str) -> tuple[Side, ...]:
     """Return four arcs, clockwise from angle 2 pi, so that arc k is that of quadrant k."""
-    return _reversed_loop(_circle_loop(centre, radius, name))
+    return reversed_loop(_circle_loop(centre, radius, name))
 
 
-def _reversed_loop(loop: tuple[Side, ...]) -> tuple[Side, ...]:
+def reversed_loop(loop: tuple[Side, ...]) -> tuple[Side, ...]:
+    """Return the sides traversed the other way, under the same names."""
     return tuple(Side(side.name, reverse_curve(side.curve), side.group) for side in reversed(loop))

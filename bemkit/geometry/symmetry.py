@@ -80,6 +80,10 @@ class Symmetry:
         """Return the images of points (..., 2) [m]; `image` is a row of `images`."""
         return np.where(image < 0.0, 2.0 * self._places - points, points)
 
+    def _reflected_curve(self, curve: Curve, image: FloatArray) -> TransformedCurve:
+        x, y = np.where(image < 0.0, 2.0 * self._places, 0.0).tolist()
+        return scaled_curve(curve, (x, y), (float(image[0]), float(image[1])), is_reversed=is_reversing(image))
+
     def meets(self, nodes: FloatArray) -> BoolArray:
         """Return (n, 2) bool: which nodes (n, 2) lie on the lines x = a and y = b.
 
@@ -156,7 +160,7 @@ class Symmetry:
         curve, span = half.element_curve, half.element_span
         if curve is None or span is None:
             return Elements(nodes, np.concatenate(elements), parts, (), None, None)
-        curves = [reflected_curve(curve, self, image) for image in images[1:] for curve in half.curves]
+        curves = [self._reflected_curve(curve, image) for image in images[1:] for curve in half.curves]
         spans = [1.0 - span[:, ::-1] if is_reversing(image) else span for image in images]
         indices = [np.where(curve < 0, -1, curve + g * n_curves) for g in range(len(images))]
         return Elements(
@@ -167,24 +171,6 @@ class Symmetry:
             np.concatenate(indices),
             np.concatenate(spans),
         )
-
-
-def reflected_curve(curve: Curve, symmetry: Symmetry, image: FloatArray) -> TransformedCurve:
-    """Return the image of a curve; a single reflection is traversed from the end of the curve to its start.
-
-    Parameters
-    ----------
-    curve : Curve
-    symmetry : Symmetry
-    image : (2,) array
-        A row of `Symmetry.images`.
-    """
-    x, y = (
-        2.0 * place if sign < 0.0 and place is not None else 0.0
-        for place, sign in zip((symmetry.x, symmetry.y), image, strict=True)
-    )
-    factors = float(image[0]), float(image[1])
-    return scaled_curve(curve, (x, y), factors, is_reversed=is_reversing(image))
 
 
 def is_reversing(image: FloatArray) -> bool:

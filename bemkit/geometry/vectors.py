@@ -1,5 +1,7 @@
 """Plane vectors, stored as (..., 2) arrays, and how large they may be."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from bemkit.arrays import FloatArray, IntArray
@@ -31,6 +33,13 @@ def enclosed_area(points: FloatArray) -> float:
     """Return the area of the polygon through points (n, 2), negative if it runs clockwise."""
     arms = points - points[0]
     return float(0.5 * cross(arms, np.roll(arms, -1, axis=0)).sum())
+
+
+def senses_of(loops: Sequence[FloatArray]) -> tuple[int, list[bool]]:
+    """Return the largest of closed polygons (n, 2), and which run as they should: it anticlockwise, the others not."""
+    areas = np.array([enclosed_area(points) for points in loops])
+    outer = int(np.argmax(np.abs(areas)))
+    return outer, ((areas > 0.0) == (np.arange(areas.size) == outer)).tolist()
 
 
 def winding_numbers(points: FloatArray, start: FloatArray, end: FloatArray) -> IntArray:

@@ -17,7 +17,7 @@ from bemkit.errors import GeometryError, format_point
 from bemkit.geometry.drawn import ArcTo, LineTo, Loop, NurbsTo, Point, SplineTo
 from bemkit.geometry.loops import closed_chains
 from bemkit.geometry.nurbs import conic_arc
-from bemkit.geometry.vectors import cross, enclosed_area, norms
+from bemkit.geometry.vectors import cross, norms, senses_of
 
 StrokeSide: TypeAlias = LineTo | ArcTo | SplineTo | NurbsTo
 
@@ -250,11 +250,10 @@ def named_loops(loops: Sequence[list[Stroke]]) -> tuple[Loop, ...]:
     Sides of a name of the file keep it; several of one name are numbered and have it as their group. Sides without
     a name are ``side-1``, ``side-2``, ... along the loops, each of which begins at its lower left corner.
     """
-    areas = [enclosed_area(np.concatenate([stroke.points for stroke in loop])) for loop in loops]
-    outer = int(np.argmax(np.abs(areas)))
+    outer, senses = senses_of([np.concatenate([stroke.points for stroke in loop]) for loop in loops])
     turned = [
-        loop if (area > 0.0) == (k == outer) else [stroke.reversed() for stroke in loop[::-1]]
-        for k, (loop, area) in enumerate(zip(loops, areas, strict=True))
+        loop if is_right else [stroke.reversed() for stroke in loop[::-1]]
+        for loop, is_right in zip(loops, senses, strict=True)
     ]
     begun = [_from_lower_left(loop) for loop in turned]
     holes = sorted((loop for k, loop in enumerate(begun) if k != outer), key=lambda loop: loop[0].start)
