@@ -324,16 +324,20 @@ def nurbs_strokes(points: FloatArray, degree: int, knots: FloatArray, weights: F
 
     Knots need not be repeated at the ends, as those of closed curves are not.
     """
+    from scipy.interpolate import BSpline
+
     if len(knots) != len(points) + degree + 1 or (np.diff(knots) < 0.0).any() or not (weights > 0.0).all():
         raise GeometryError(
             f"a spline has {len(knots)} knots for {len(points)} control points and degree {degree}: redraw it"
         )
-    values = np.column_stack([points * weights[:, None], weights])
+    spline = BSpline(knots, np.column_stack([points * weights[:, None], weights]), degree)
     low, high = knots[degree], knots[-degree - 1]
     inner = knots[(knots > low) & (knots < high)]
     kinks = sorted({float(knot) for knot in inner if np.count_nonzero(inner == knot) >= degree})
     for knot in (low, *kinks, high):
-        knots, values = _inserted(knots, values, degree, float(knot))
+        if (n_missing := degree - int(np.count_nonzero(spline.t == knot))) > 0:
+            spline = spline.insert_knot(knot, n_missing)
+    knots, values = spline.t, spline.c
     strokes = []
     cuts = [float(low), *kinks, float(high)]
     for begin, end in pairwise(cuts):
@@ -352,18 +356,6 @@ def nurbs_strokes(points: FloatArray, degree: int, knots: FloatArray, weights: F
         kept = None if is_plain else tuple(map(float, own_weights))
         strokes.append(Stroke(start, NurbsTo(to, tuple(middle), degree, own_knots, kept, group=group)))
     return strokes
-
-
-def _inserted(knots: FloatArray, values: FloatArray, degree: int, knot: float) -> tuple[FloatArray, FloatArray]:
-    """Repeat a knot until its multiplicity is the degree, by Boehm's algorithm; the curve stays the same."""
-    while (multiplicity := int(np.count_nonzero(knots == knot))) < degree:
-        last = int(np.searchsorted(knots, knot, side="right")) - 1
-        changed = np.arange(last - degree + 1, last - multiplicity + 1)
-        ratio = ((knot - knots[changed]) / (knots[changed + degree] - knots[changed]))[:, None]
-        inner = ratio * values[changed] + (1.0 - ratio) * values[changed - 1]
-        values = np.concatenate([values[: changed[0]], inner, values[last - multiplicity :]])
-        knots = np.insert(knots, last + 1, knot)
-    return knots, values
 
 
 def pair(point: FloatArray) -> Point:
