@@ -10,7 +10,7 @@ import numpy as np
 from bemkit.arrays import FloatArray
 from bemkit.contact.body import ContactState, LinearBody
 from bemkit.contact.certificate import Certificate
-from bemkit.contact.equilibrium import Imbalance, resultant_imbalance, round_off_of
+from bemkit.contact.equilibrium import NOISE_FACTOR, Imbalance, resultant_imbalance, round_off_of
 from bemkit.geometry.spaces import BoundarySpace, dof_points
 from bemkit.operators.boundary_equations import LinearConditions
 from bemkit.operators.counts import OperationCounts
@@ -71,7 +71,8 @@ class ContactFreeBody(LinearBody):
     def imbalance(self, state: ContactState) -> Imbalance:
         """Return how far the forces are from those given on free directions, and all together from equilibrium.
 
-        Not a number if the displacements are none.
+        Not a number if the displacements are none. If no force is given and all reactions are round-off, the body has
+        only been moved, and they are relative to the terms of which they are sums.
         """
         displacement, force = self.recover(state)
         if not np.isfinite(displacement).all():
@@ -80,6 +81,8 @@ class ContactFreeBody(LinearBody):
         round_off = round_off_of(displacement, self.condensed.sensitivity)
         resultant, inner = self.condensed.volume_force, self.condensed.inner_force
         total = float(np.abs(force).sum()) + inner or 1.0
+        if inner == 0.0 < round_off and total <= NOISE_FACTOR * round_off and not self.force.any():
+            return Imbalance(total / (round_off / np.finfo(float).eps), 0.0)
         missing = self.conditions.in_frames(force - self.force)[self.conditions.is_free]
         residual = Imbalance(float(np.abs(missing).max(initial=0.0)) / total, 0.0, round_off / total)
         return residual.joined(resultant_imbalance(points, force, balanced, round_off, resultant, inner))

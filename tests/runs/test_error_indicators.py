@@ -131,7 +131,9 @@ def test_a_graded_mesh_of_a_body_that_turns_has_no_error() -> None:
         parts=(bk.Part("lid", lid, sides=("top",)),), discretisation=bk.Galerkin(2),
         mesh=bk.MeshOptions(elements=400, grading=bk.Geometric(levels=20)),
     )  # fmt: skip
-    assert bk.run(scene).estimated_error == 0.0
+    solution = bk.run(scene)
+    assert solution.is_converged, solution.message  # though its reactions, round-off, are not in equilibrium
+    assert solution.estimated_error == 0.0
 
 
 def test_the_largest_error_leaves_out_an_equally_small_share() -> None:
