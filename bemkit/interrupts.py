@@ -1,4 +1,4 @@
-"""Ctrl-C that nothing swallows."""
+"""Ctrl-C that nothing swallows, or that waits for a short statement."""
 
 from __future__ import annotations
 
@@ -49,3 +49,21 @@ def raise_missed_interrupt() -> None:
     handler = signal.getsignal(signal.SIGINT)
     if isinstance(handler, _Remembering) and handler.has_come and threading.current_thread() is threading.main_thread():
         raise KeyboardInterrupt
+
+
+@contextmanager
+def uninterrupted() -> Iterator[None]:
+    """Hold back Ctrl-C and SIGTERM until the end of a short ``with`` statement; only in the main thread."""
+    came: list[int] = []
+    is_main = threading.current_thread() is threading.main_thread()
+    handlers = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM) if is_main}
+    known = {number: handler for number, handler in handlers.items() if handler is not None}  # set by Python
+    for number in known:
+        signal.signal(number, lambda number, _: came.append(number))
+    try:
+        yield
+    finally:
+        for number, handler in known.items():
+            signal.signal(number, handler)
+        for signal_number in came:
+            signal.raise_signal(signal_number)

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 import pytest
 
 import bemkit as bk
-from bemkit.interrupts import interruptible
+from bemkit.interrupts import interruptible, uninterrupted
 from tests.scenes import paper
 
 SWALLOWED = pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
@@ -85,3 +85,17 @@ def test_handlers_of_the_program_around_stay() -> None:
     with interruptible():
         signal.raise_signal(signal.SIGINT)
     assert came == [signal.SIGINT]
+
+
+def test_interrupts_wait_for_the_end_of_a_short_statement() -> None:
+    went_on: list[bool] = []
+
+    def interrupted() -> None:
+        with uninterrupted():
+            signal.raise_signal(signal.SIGINT)
+            went_on.append(True)
+
+    with pytest.raises(KeyboardInterrupt):
+        interrupted()
+    assert went_on
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler

@@ -10,11 +10,12 @@ from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExec
 from contextlib import contextmanager
 from dataclasses import dataclass
 from itertools import groupby
-from multiprocessing import get_context, parent_process
+from multiprocessing import active_children, get_context, parent_process
 from threading import Thread
 from typing import Generic, NamedTuple
 
 from bemkit.errors import CANNOT_BE_SENT, BemkitError, InputError, printable, why_not_sent
+from bemkit.interrupts import uninterrupted
 from bemkit.results.solution import Solution
 from bemkit.studies.row_file import R
 
@@ -125,8 +126,8 @@ def compute(
 def executor_of(processes: int = 1, cluster: str | None = None) -> Iterator[tuple[Executor | None, int]]:
     """Give an executor of some processes, none for one, and the number of its workers.
 
-    With the address of a `distributed` scheduler, such as ``tcp://10.0.0.1:8786``, the workers of its cluster take the
-    place of processes.
+    An error or an interrupt ends the processes at once. With the address of a `distributed` scheduler, such as
+    ``tcp://10.0.0.1:8786``, the workers of its cluster take the place of processes.
 
     Raises
     ------
@@ -137,10 +138,16 @@ def executor_of(processes: int = 1, cluster: str | None = None) -> Iterator[tupl
         with _cluster(cluster) as found:
             yield found
     elif processes > 1:
+        others = active_children()
         # spawned processes do not inherit threads that hold locks
         executor = ProcessPoolExecutor(processes, get_context("spawn"), initializer=_prepare_process)
         try:
             yield executor, processes
+        except BaseException:  # only a terminal sends an interrupt to the workers, too
+            for worker in active_children():
+                if worker not in others:
+                    worker.terminate()
+            raise
         finally:
             executor.shutdown(cancel_futures=True)
     else:
@@ -171,7 +178,8 @@ def _cluster(address: str) -> Iterator[tuple[Executor, int]]:
 def _computed_elsewhere(tasks: Sequence[Task[R]], executor: Executor, n_workers: int) -> Iterator[R]:
     futures: list[Future[list[R]]] = []
     try:
-        futures = [executor.submit(_all_computed, bundle) for bundle in _bundles(tasks, n_workers)]
+        with uninterrupted():  # a process that is known to nobody until it has started would wait for ever
+            futures = [executor.submit(_all_computed, bundle) for bundle in _bundles(tasks, n_workers)]
         for future in as_completed(futures):
             yield from future.result()
     except BrokenExecutor as error:
