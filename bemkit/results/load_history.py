@@ -203,4 +203,12 @@ class LoadHistory:
 
     def where(self) -> str:
         """Describe how far the history has come."""
-        return f"Finished: {len(self.steps)} of {self.n_steps} steps, up to t = {self.steps[-1].time:.6g}."
+        return f"Finished: {self.progress}."
+
+    @property
+    def progress(self) -> str:
+        """The number of finished steps in words, up to a load factor, or a time where the scene has no factors."""
+        count, factors = len(self.steps), self.asked.load_factors
+        has_factors = not self.asked.steps and len(factors) == self.n_steps
+        last = f"load factor {factors[count - 1]:.6g}" if has_factors else f"t = {self.steps[-1].time:.6g}"
+        return f"{count} of {self.n_steps} steps, up to {last}"

@@ -171,7 +171,7 @@ def _history_rows(solution: Solution) -> Iterator[tuple[str, str]]:
     loading = solution.loading
     if loading is not None:
         work, units = loading.total(), solution.units
-        yield "load history", f"{len(loading.steps)} of {loading.n_steps} steps, up to t = {loading.times[-1]:.6g}"
+        yield "load history", loading.progress
         yield "external work", f"{_amount(work.external_work, 'energy', units)}  in all steps"
         yield "dissipation", f"{_amount(work.dissipation, 'energy', units)}  in all steps"
         if loading.has_coarse_increments:

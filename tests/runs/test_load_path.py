@@ -85,7 +85,7 @@ def test_steps_that_are_reached_are_kept_in_the_result_of_a_scene() -> None:
     solution = bk.run(assembly)
     assert solution.status is Status.UNSOLVABLE_LOAD
     assert solution.message.startswith("load step 2 of 2: No contact tractions can balance this load")
-    assert "Finished: 1 of 2 steps, up to t = 1." in solution.message
+    assert "Finished: 1 of 2 steps, up to load factor 1." in solution.message
     assert solution.scene.bodies == assembly.bodies  # the fields are of this one
     assert not solution.is_certified
     with pytest.raises(UnsolvableSceneError, match="slides bodies 'block 1-0'"):
