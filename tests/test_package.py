@@ -34,7 +34,7 @@ NOT_NEEDED = (
     *("geometry.symmetry", "geometry.surface", "scene.body_forces", "scene.contacts", "scene.copies"),
     *("scene.load_history", "scene.plane_motion", "scene.profiles", "scene.steps"),
     *("operators.integrals", "operators.collocation.images"),
-    *("operators.null_space", "operators.pair_form", "contact.held_friction", "table", "atomic_files"),
+    *("operators.null_space", "contact.held_friction", "table", "atomic_files"),
     *("model.finite_sliding", "results.moved_contacts", "results.solved_steps"),
 )
 """Of a scene with one body of straight sides on one obstacle, solved by collocation from a number of elements."""

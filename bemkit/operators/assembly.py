@@ -21,9 +21,9 @@ from bemkit.geometry.local_values import element_degrees
 from bemkit.geometry.reflection import antisymmetric_dofs
 from bemkit.geometry.series import columns_of, series
 from bemkit.geometry.spaces import BoundarySpace
+from bemkit.operators.forms import Functions, PairForm
 from bemkit.operators.integrals.pairs import Degrees, PairIntegrals
 from bemkit.operators.integrals.sweep import FEW, PairSweep
-from bemkit.operators.pair_form import Functions, PairForm
 from bemkit.operators.threads import for_each_chunk
 from bemkit.stopwatch import assembling
 

@@ -19,15 +19,16 @@ from bemkit.errors import InputError
 from bemkit.geometry.spaces import BoundarySpace
 from bemkit.operators.assembly import assemble_block, assemble_together
 from bemkit.operators.forms import (
+    PairForm,
     definite,
     double_layer_form,
     hypersingular_form,
     mass_matrix,
+    require_one_mesh,
     single_layer_form,
 )
 from bemkit.operators.linear_solvers import Tag
 from bemkit.operators.material import Material
-from bemkit.operators.pair_form import PairForm, require_one_mesh
 from bemkit.operators.steklov_poincare.nodal_conditions import TractionField, integrate_traction
 
 Matrix: TypeAlias = "FloatArray | csr_array[np.float64]"

@@ -110,7 +110,7 @@ def test_the_counts_of_the_papers_first_example() -> None:
 
 LEFT_OUT = {
     "constant": (
-        "operators.pair_form.PairForm.__init__",
+        "operators.forms.PairForm.__init__",
         "operators.linear_solvers.Cholesky.__init__",
         "operators.integrals.inner.far_inner",
         "operators.integrals.curved_geometry.fit",
@@ -124,10 +124,10 @@ LEFT_OUT = {
     "no contact": (
         "contact.dense_body.DenseBody.__init__",
         "solvers.base._Run.finish",
-        "operators.pair_form.PairForm.__init__",
+        "operators.forms.PairForm.__init__",
     ),
-    "curved": ("operators.pair_form.PairForm.__init__",),
-    "exterior": ("contact.dense_body.DenseBody.__init__", "operators.pair_form.PairForm.__init__"),
+    "curved": ("operators.forms.PairForm.__init__",),
+    "exterior": ("contact.dense_body.DenseBody.__init__", "operators.forms.PairForm.__init__"),
 }
 
 
