@@ -22,6 +22,7 @@ from bemkit.operators import boundary
 from bemkit.operators.boundary import (
     BoundaryOperator,
     PairOperator,
+    SteklovPoincareOperator,
     adjoint_double_layer,
     double_layer,
     hypersingular,
@@ -31,6 +32,7 @@ from bemkit.operators.boundary import (
 from bemkit.operators.forms import single_layer_form
 from bemkit.operators.linear_solvers import Tag
 from bemkit.operators.material import Material, Plane
+from bemkit.operators.steklov_poincare.galerkin import GalerkinElasticity
 from bemkit.testing import CheckFailed, check_double_layer, check_operator
 from tests.slow import slow_except, slow_only
 from tests.testing.test_spaces import public_classes
@@ -56,6 +58,7 @@ def operators_on(mesh: BoundaryMesh, material: Material) -> list[BoundaryOperato
             result += [single_layer(t, u, material)]
     result += [hypersingular(u, u, material) for u in displacements]
     result += [hypersingular(displacements[0], displacements[1], material)]
+    result += [SteklovPoincareOperator(GalerkinElasticity(mesh, material))]
     return result
 
 
