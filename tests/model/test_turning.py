@@ -10,7 +10,7 @@ import pytest
 
 import bemkit as bk
 from bemkit.runs.steps import UnsolvableSceneError
-from tests.slow import slow_only
+from tests.slow import slow_except, slow_only
 
 STEEL = bk.Material(1e3, 0.3)
 ROCK = bk.Body(
@@ -47,14 +47,20 @@ def test_a_load_that_turns_a_round_body_is_not_held_by_its_mesh() -> None:
         bk.run(TWISTED)
 
 
-def test_bodies_that_friction_joins_turn_together() -> None:
-    """A torque on a shaft that is pressed into a ring, which lies in the hole without friction."""
+@pytest.mark.parametrize(("of_shaft", "of_ring"), slow_except([(12, 16), (18, 22)], (12, 16)))
+def test_bodies_that_friction_joins_turn_together(of_shaft: int, of_ring: int) -> None:
+    """A torque on a shaft that is pressed into a ring, which lies in the hole without friction.
+
+    On the finer meshes the solver ends first, and the torque is named then.
+    """
     inside = bk.Part("in", bk.Pressure(1.0, 0.1), sides=tuple(f"inner-{k}" for k in range(1, 5)))
     seat = bk.Part("seat", bk.Free(), sides=tuple(f"inner-{k}" for k in range(1, 5)))
     shaft = bk.Body(
-        name="shaft", shape=bk.Ring(0.4, 0.7), material=STEEL, parts=(inside, OUTSIDE), mesh=bk.MeshOptions(18)
+        name="shaft", shape=bk.Ring(0.4, 0.7), material=STEEL, parts=(inside, OUTSIDE), mesh=bk.MeshOptions(of_shaft)
     )
-    ring = bk.Body(name="ring", shape=bk.Ring(0.7, 1.0), material=STEEL, parts=(seat, OUTSIDE), mesh=bk.MeshOptions(22))
+    ring = bk.Body(
+        name="ring", shape=bk.Ring(0.7, 1.0), material=STEEL, parts=(seat, OUTSIDE), mesh=bk.MeshOptions(of_ring)
+    )
     fit = bk.ContactPair(("shaft.out", "ring.seat"), law=bk.Coulomb(0.5), gap=-1e-3)
     contacts = (fit, bk.ContactPair(("rock.wall", "ring.out")))
     assembly = replace(TWISTED, bodies=(ROCK, shaft, ring), contacts=contacts)

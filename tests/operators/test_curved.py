@@ -339,7 +339,7 @@ def test_collocation_against_the_kernels_of_kelvin() -> None:
     mesh = MESHES["plate with hole"]()
     single, double = (m.reshape(36, 2, 36, 2) for m in collocation_matrices(mesh, material))
     points, weights = composite(20)
-    for j in range(36):
+    for j in range(0, 36, 5):
         elements = np.array([j])
         y, normal = mesh.points(elements, points)[0], mesh.normals_at(elements, points)[0]
         measure = weights * mesh.jacobian(elements, points)[0]

@@ -158,6 +158,7 @@ def example_mesh(degree: int) -> bk.BoundaryMesh:
     return bk.BoundaryMesh(points, elements, parts)
 
 
+@pytest.mark.slow
 def test_friction_converges_exponentially_where_the_mesh_knows_the_singular_places() -> None:
     # the reference of the friction force is that of paper-1: 0.0821429, to its last digit
     scene = load_scene("paper-1")

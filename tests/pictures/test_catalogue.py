@@ -124,12 +124,11 @@ def test_the_command_draws_results_and_scenes(tmp_path: Path, capsys: pytest.Cap
     assert capsys.readouterr().out.split() == [str(tmp_path / "q" / name) for name in ("friction-cone.png", "zoom.png")]
     scene = dataclasses.replace(with_overrides(bk.load_scene("paper-1"), elements=24), load_factors=(0.5, 1.0))
     Path("s.toml").write_text(scene_to_toml(scene), encoding="utf-8")
-    assert call("plot", "s.toml", "--what", "status-over-time,animation", "-o", "h") == 0
-    assert sorted(path.name for path in Path("h").iterdir()) == ["animation.gif", "status-over-time.png"]
-    assert Path("h/animation.gif").read_bytes().startswith(b"GIF8")
+    assert call("plot", "s.toml", "--what", "status-over-time", "-o", "h") == 0
+    assert [path.name for path in Path("h").iterdir()] == ["status-over-time.png"]
     assert call("run", "s.toml", "-o", "s.h5", "-q") == 0
     assert call("plot", "s.h5", "-o", "again.gif", "-q") == 0
-    assert Path("again.gif").read_bytes() == Path("h/animation.gif").read_bytes()
+    assert Path("again.gif").read_bytes().startswith(b"GIF8")
     assert call("plot", "r.h5", "-o", "none.gif") == 2
     assert "r.h5: the result has no load steps: give a scene with [[steps]] or load_factors" in capsys.readouterr().err
 

@@ -172,7 +172,7 @@ def test_each_measure_has_a_scale_and_a_largest_value(measure: str) -> None:
 
 def test_several_bodies_share_a_scale_and_the_axes_are_returned() -> None:
     given = Figure().add_subplot()
-    solution = bk.run(with_overrides(bk.load_scene("masonry-arch"), elements=8))
+    solution = bk.run(with_overrides(bk.load_scene("two-cylinders"), elements=24))
     assert draw_stress(solution, given) is given
     assert len(given.child_axes) == 1
 

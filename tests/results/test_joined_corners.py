@@ -53,6 +53,7 @@ def solved(friction: float, accuracy: float) -> Solution:
     return solution
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("friction", "contact"), slow_except([(0.6, HELD), (0.48, SLIDES)], (0.48, SLIDES)))
 @pytest.mark.parametrize("accuracy", slow_except([1e-2, 1e-3, 1e-4], 1e-2))
 def test_the_accuracy_is_reached_and_both_corners_are_named(

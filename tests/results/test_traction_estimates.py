@@ -38,6 +38,7 @@ def pin(side: str) -> Solution:
     return bk.run(replace(scene, bodies=bodies, contacts=contacts, discretisation=bk.Galerkin(2), mesh=mesh))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("n_elements", slow_except((80, 120, 160, 240), 80))
 @pytest.mark.parametrize("degree", slow_only([1, 2], 2))
 def test_the_estimates_are_near_the_errors(degree: int, n_elements: int) -> None:

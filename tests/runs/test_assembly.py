@@ -115,6 +115,7 @@ def test_uniform_pressure_and_shear_pass_a_joint_of_meshes_that_do_not_match(deg
     np.testing.assert_allclose(others, -tractions[0] + 0.0 * others, atol=1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("degree", "turn"), slow_except(product((2, 4), (0.0, 33.0)), (2, 33.0)))
 def test_nine_blocks_pass_the_patch(degree: int, turn: float) -> None:
     """Three by three, every block with another number of elements, under two pressures and a shear, held below.
@@ -287,6 +288,7 @@ def arch(n: int, thickness: float) -> bk.Scene:
     return bk.Scene(title="Arch", bodies=bodies, touching=bk.Touching(1e-3), law=bk.Coulomb(0.7))
 
 
+@pytest.mark.slow
 def test_an_arch_stands_where_limit_analysis_says_so() -> None:
     """15 blocks: 0.106265824 of the mean radius; hinges of finite pressure cost less than 2 % of it."""
     solution = bk.run(arch(15, 1.02 * 0.106265824))
@@ -377,7 +379,7 @@ def test_what_goes_with_one_body_alone_is_refused() -> None:
 
 def test_what_one_side_feels_the_other_gives_back() -> None:
     """Forces of both sides of a contact, integrated over their own elements, to round-off; so of every block."""
-    solution = bk.run(replace(bk.load_scene("two-cylinders"), mesh=bk.MeshOptions(elements=120)))
+    solution = bk.run(replace(bk.load_scene("two-cylinders"), mesh=bk.MeshOptions(elements=60)))
     upper, lower = ({force.name: force for force in body.part_forces}["tip"] for body in solution.bodies.values())
     (contact,) = solution.contacts
     assert upper.force_y == pytest.approx(contact.force_y, rel=1e-12)

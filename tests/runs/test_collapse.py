@@ -138,6 +138,7 @@ COULOMB = {0.643: 0.640, 0.580: 0.563, 0.404: 0.356, 0.332: 0.264, 0.240: 0.215}
 """Coulomb factors of the same walls by their associative ones [FerrisTinLoi2001]."""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("factor", "expected"), slow_except(COULOMB.items(), (0.643, 0.640)))
 def test_the_coulomb_factor_of_ferris_and_tin_loi_is_bracketed(factor: float, expected: float) -> None:
     found = bk.coulomb_load_factor(assembly_of(courses(FERRIS_AND_TIN_LOI[factor], 4.0, 1.75), 0.65, 4))

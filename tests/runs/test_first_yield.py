@@ -12,9 +12,7 @@ from tests.perforated_plate import NOMINAL, plate
 
 
 def test_a_plate_yields_at_its_hole() -> None:
-    scene = plate(
-        is_biaxial=False, mesh=bk.MeshOptions(accuracy=1e-4, rising_degrees=True), discretisation=bk.Galerkin(2)
-    )
+    scene = plate(is_biaxial=False, mesh=bk.MeshOptions(elements=48), discretisation=bk.Galerkin(6))
     found = bk.first_yield(scene, 12.0)
     assert found.load_factor == pytest.approx(12.0 / (3.0 * NOMINAL), rel=1e-3)
     assert abs(found.x) < 1e-6
@@ -48,8 +46,8 @@ def test_below_a_contact_the_stress_follows_a_power_of_the_load() -> None:
 def test_what_cannot_yield_is_refused() -> None:
     scene = bk.load_scene("disc-between-plates")
     assert isinstance(scene, bk.Scene)
-    scene = replace(scene, mesh=bk.MeshOptions(elements=60))
-    with pytest.raises(bk.InputError, match=r"the largest stress does not follow the load: 0\.02877"):
+    scene = replace(scene, mesh=bk.MeshOptions(elements=24))
+    with pytest.raises(bk.InputError, match=r"the largest stress does not follow the load: 0\.0551"):
         bk.first_yield(scene, 0.05)
     with pytest.raises(bk.InputError, match=r"yield_stress is -1\.0: give a positive stress"):
         bk.first_yield(scene, -1.0)

@@ -50,6 +50,7 @@ def test_wavy_half_planes_touch_on_the_length_of_westergaard(share: float) -> No
     assert solution.force_normal == pytest.approx(share * np.pi * HERTZ_MODULUS * WAVE, rel=1e-10)
 
 
+@pytest.mark.slow
 def test_wavy_half_planes_are_sheared_in_steps() -> None:
     """Partial slip by Jaeger's principle: the stick zone is the contact under the pressure less T / mu, at T < mu P."""
     steps = (bk.Step(1.0), bk.Step(2.0, {"bodies.upper.far.x": "1e-3 * (t - 1)"}, increments=4))

@@ -139,6 +139,7 @@ def test_halved_cylinders_on_meshes_that_follow_the_solution() -> None:
     assert np.abs(one.contact.sigma_t).max() < 1e-3 * pressure[0]
 
 
+@pytest.mark.slow
 def test_a_quarter_of_a_shrink_fit() -> None:
     """Two rings about both lines: a uniform pressure, in plane strain that of `references` of rings."""
     free = {"material": STEEL, "mesh": bk.MeshOptions(elements=96)}

@@ -50,8 +50,6 @@ def solved(name: str, word: str, exponent: float = 1.0, n_elements: int = 40) ->
     [
         ("clamped", "linear", 1.0),
         ("displaced", "quadratic", 3.0),
-        ("bonded", "linear", 3.0),
-        ("mixed", "quadratic", 1.0),
         *[
             pytest.param(name, word, exponent, marks=pytest.mark.slow)
             for name in SCENES

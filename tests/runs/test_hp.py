@@ -86,11 +86,17 @@ def test_six_digits_from_scratch(name: str) -> None:
 
 @pytest.mark.parametrize("name", slow_except(EXAMPLES, "paper-1"))
 def test_the_estimates_are_near_the_errors(name: str) -> None:
-    """Of contact tractions at every degree from 3 on; of the energy where the bisected mesh is not too large."""
+    """Of contact tractions, at every degree from 3 on."""
     for solution in risen(name, 3e-5):
         if degree_of(solution) > 2:
             assert solution.estimated_traction_error is not None
             assert 0.4 <= solution.estimated_traction_error / traction_error(solution) <= 2.5
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", EXAMPLES)
+def test_the_estimates_of_energies_are_near_their_errors(name: str) -> None:
+    """Where the bisected mesh is not too large."""
     solution = next(each for each in risen(name, 3e-5) if degree_of(each) > 4)
     assert solution.estimated_error is not None
     assert 0.3 <= solution.estimated_error / true_error(solution, 1) <= 5.0
@@ -445,6 +451,7 @@ def half_of_two_blocks(accuracy: float) -> bk.Scene:
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("accuracy", "law"),
     [
@@ -483,7 +490,7 @@ def test_all_meshes_have_the_multipliers_on_one_side() -> None:
     pair = bk.ContactPair(("lower.arc", "upper.arc"))
     scene = bk.Scene(
         title="two discs", bodies=(lower, upper), contacts=(pair,), law=bk.Frictionless(),
-        discretisation=bk.Galerkin(2), mesh=bk.MeshOptions(accuracy=1e-2, rising_degrees=True),
+        discretisation=bk.Galerkin(2), mesh=bk.MeshOptions(accuracy=3e-2, rising_degrees=True),
     )  # fmt: skip
     found = dataclasses.replace(scene, contacts=(), touching=bk.Touching(0.05))
     for each, name in ((scene, pair.name), (found, "upper.arc / lower.arc")):
@@ -586,7 +593,7 @@ def press_fit(accuracy: float) -> bk.Scene:
 
 
 @pytest.mark.parametrize("accuracy", slow_except([1e-2, 1e-3, 1e-4, 1e-5], 1e-2))
-@pytest.mark.parametrize("scene", [filled_hole, press_fit])
+@pytest.mark.parametrize("scene", slow_except([filled_hole, press_fit], filled_hole))
 def test_uniform_pressures_between_bodies_are_as_accurate_as_asked(
     scene: Callable[[float], bk.Scene], accuracy: float
 ) -> None:

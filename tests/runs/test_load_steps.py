@@ -230,7 +230,7 @@ def sliding(law: bk.FrictionLaw, increments: int, duration: float = 1.0) -> Load
 def test_friction_falls_with_the_slip() -> None:
     """At the end every node has slipped farther than D; on the way each carries what its own slip has left."""
     law = SlipWeakening(0.3, 0.1, 0.03)
-    loading = sliding(law, 10)
+    loading = sliding(law, 5)
     last = loading.steps[-1]
     assert last.slip.min() > 0.03
     assert last.force_tangential == pytest.approx(-0.1 * last.force_normal, rel=1e-9)
@@ -274,6 +274,7 @@ def test_a_law_that_never_agrees_with_its_slip_is_named() -> None:
     assert "Finished: 1 of 2 steps" in solution.message
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("accuracy", slow_except((2e-2, 5e-3), 2e-2))
 def test_histories_with_an_accuracy(accuracy: float) -> None:
     steps = (LOOP.steps[0], replace(LOOP.steps[1], increments=6))

@@ -21,6 +21,7 @@ def check_packing(assembly: bk.Scene, statuses: tuple[bk.Status, ...] = (bk.Stat
     assert sum(one.force_x for one in walls) == pytest.approx(0.0, abs=1e-9 * weight)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("n", "width"), slow_except([(4, 3.0), (12, 5.0)], (4, 3.0)))
 def test_a_packing_of_a_few_discs_rests(n: int, width: float) -> None:
     check_packing(packing(n, width))

@@ -43,6 +43,7 @@ def test_load_factors_are_halved_on_their_way() -> None:
     assert errors.tractions < 0.2
 
 
+@pytest.mark.slow
 def test_bodies_without_friction_follow_no_path() -> None:
     scene = replace(bk.load_scene("two-cylinders"), law=bk.Frictionless(), load_factors=(0.5, 1.0))
     errors = increment_errors(replace(scene, mesh=bk.MeshOptions(elements=60)))

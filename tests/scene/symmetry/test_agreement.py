@@ -144,7 +144,9 @@ def test_spaces_and_operators_on_a_half_keep_their_promises(symmetry: bk.Symmetr
         check_double_layer(double_layer(u, t, material))
 
 
-@pytest.mark.parametrize(("symmetry", "n_floating"), slow_only([(None, 3), (X, 1), (Y, 1), (BOTH, 0)], (X, 1)), ids=str)
+@pytest.mark.parametrize(
+    ("symmetry", "n_floating"), slow_only([(None, 3), (X, 1), (Y, 1), (BOTH, 0)], (X, 1), (BOTH, 0)), ids=str
+)
 @pytest.mark.parametrize("discretisation", slow_except(DISCRETISATIONS, *DISCRETISATIONS[1:]), ids=names)
 def test_only_translations_along_the_line_are_left(
     symmetry: bk.Symmetry | None, n_floating: int, discretisation: object
