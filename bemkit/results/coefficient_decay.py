@@ -186,14 +186,16 @@ def _missing(coefficients: FloatArray, degrees: IntArray, at_break: BoolArray) -
 def _without_gaps(sizes: FloatArray) -> FloatArray:
     """Return bounds (n, n_known) of coefficients that never rise, from sizes of which every other one may be zero.
 
-    The last one is at least half of what three before it lead to; of three, the middle one at least the geometric mean
-    of its neighbours. Otherwise an element in whose middle a field is symmetric had no error, or one that hardly falls.
+    The last one is at least half of what three before it lead to, less where they do not alternate; of three, the
+    middle one at least the geometric mean of its neighbours. Otherwise an element in whose middle a field is symmetric
+    had no error, or one that hardly falls.
     """
     known, n_known = sizes.copy(), sizes.shape[1]
     if n_known >= 4:
         before, next_to_last = sizes[:, -4:].max(axis=1), sizes[:, -2]
         expected = next_to_last * np.sqrt(next_to_last / np.maximum(before, np.finfo(float).tiny))
-        known[:, -1] = np.maximum(known[:, -1], 0.5 * expected)
+        alternates = np.minimum(1.0, next_to_last / np.maximum(sizes[:, -3], np.finfo(float).tiny))
+        known[:, -1] = np.maximum(known[:, -1], 0.5 * alternates * expected)
     if n_known == 3:
         known[:, 1] = np.maximum(known[:, 1], np.sqrt(known[:, 0] * known[:, 2]))
     return np.asarray(np.maximum.accumulate(known[:, ::-1], axis=1)[:, ::-1])

@@ -65,6 +65,18 @@ def test_missing_strains_have_the_norm_of_the_hypersingular_operator() -> None:
     assert 0.55 < norm / errors.energy.sum() < 0.7
 
 
+def error_over_best(coefficients: FloatArray, degree: int) -> float:
+    """Return the estimated error of tractions over that of the best polynomials, by coefficients (n,) or (n, 2)."""
+    space, displacement = tractions(degree - 1), np.zeros((MESH.n_elements * degree, 2))
+    columns = coefficients.reshape(coefficients.shape[0], -1)
+    values = np.zeros((space.n_dofs // 2, 2))
+    values[space.element_dofs[ELEMENT], : columns.shape[1]] = legendre.legval(space.local_nodes, columns[:degree]).T
+    spaces, at_nodes = (LagrangeSpace(MESH, degree=degree), space), values[space.element_dofs]
+    errors = coefficient_errors(*spaces, displacement, at_nodes, MATERIAL.plane_modulus)
+    missing = np.sum(columns[degree:] ** 2, axis=1) @ (2.0 * np.arange(degree, len(columns)) + 1.0) ** -1.0
+    return float(np.sqrt(errors.traction.sum() / (MESH.lengths[ELEMENT] * missing)))
+
+
 @pytest.mark.parametrize(
     ("first", "degree"),
     [
@@ -75,13 +87,16 @@ def test_fields_that_are_symmetric_in_an_element_have_estimates(first: int, degr
     """Every other coefficient is zero: the middle of three, which seemed not to fall, or the last, without error."""
     coefficients = np.zeros(24)
     coefficients[first::2] = 0.6 ** np.arange(first, 24, 2)
-    space, displacement = tractions(degree - 1), np.zeros((MESH.n_elements * degree, 2))
-    at_nodes = field(space, coefficients[:degree])[space.element_dofs]
-    spaces = LagrangeSpace(MESH, degree=degree), space
-    errors = coefficient_errors(*spaces, displacement, at_nodes, MATERIAL.plane_modulus)
-    missing = coefficients[degree:] ** 2 / (2.0 * np.arange(degree, 24) + 1.0)
-    norm = np.sqrt(MESH.lengths[ELEMENT] * missing.sum())
-    assert 0.4 < np.sqrt(errors.traction.sum()) / norm < 3.0
+    assert 0.4 < error_over_best(coefficients, degree) < 3.0
+
+
+@given(angle=st.floats(0.1, 0.6), turn=st.floats(0.0, 6.3), degree=st.integers(4, 6))
+def test_a_uniform_pressure_on_an_arc_has_no_large_estimate(angle: float, turn: float, degree: int) -> None:
+    """On an arc of twice the angle coefficients fall faster and faster."""
+    x, weights = legendre.leggauss(30)
+    pressure = np.stack([np.cos(turn + angle * x), np.sin(turn + angle * x)], axis=1)
+    coefficients = (np.arange(9) + 0.5)[:, None] * (legendre.legvander(x, 8).T @ (weights[:, None] * pressure))
+    assert 0.8 < error_over_best(coefficients, degree) < 2.0
 
 
 @given(place=st.floats(-0.9, 0.9), degree=st.integers(3, 10))
