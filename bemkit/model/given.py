@@ -17,9 +17,7 @@ from bemkit.model.units import Units
 from bemkit.operators.linear_solvers import (
     Automatic,
     ChosenLinearSolver,
-    DenseCholesky,
     Hierarchical,
-    LinearSolver,
     LinearSolverChoice,
     MatrixFree,
     Tag,
@@ -51,7 +49,6 @@ if TYPE_CHECKING:
     from bemkit.operators.half_plane.far_motion import FarMotion
     from bemkit.operators.steklov_poincare.forces_inside import ForcesInside
 
-_DIRECT: LinearSolver = DenseCholesky()
 _FEWEST_ELEMENTS = 200
 """Smallest number of elements of compressed equations."""
 _MOST_LOOPS = 41
@@ -295,15 +292,15 @@ def _collocation_solver(requested: LinearSolverChoice, case: BodyCase, hindrance
         from bemkit.operators.matrix_free.cost import why_stored
 
         if not (stored := hindrance or why_stored(case)):
-            return ChosenLinearSolver(_DIRECT, "asked for", requested)
+            return ChosenLinearSolver("asked for", requested)
         other = _collocation_solver(Automatic(), case, hindrance)
         return replace(other, reason=f"not matrix-free, because {stored}; {other.reason}")
     if not isinstance(requested, Automatic | Hierarchical):
-        return ChosenLinearSolver(requested, "asked for")
+        return ChosenLinearSolver("asked for", solver=requested)
     if hindrance := hindrance or _why_dense(case):
-        return ChosenLinearSolver(_DIRECT, f"the equations are not compressed, because {hindrance}")
+        return ChosenLinearSolver(f"the equations are not compressed, because {hindrance}")
     if isinstance(requested, Hierarchical):
-        return ChosenLinearSolver(_DIRECT, "asked for", requested)
+        return ChosenLinearSolver("asked for", requested)
     from bemkit.operators.steklov_poincare.hierarchical_cost import compressed_if_cheaper
 
     return compressed_if_cheaper(case, physical_memory())

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import enum
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Protocol, TypeAlias
 
 import numpy as np
@@ -327,16 +327,16 @@ class ChosenLinearSolver:
 
     Parameters
     ----------
-    solver : LinearSolver
     reason : str
         Part of a sentence, for the plan.
     hierarchical : Hierarchical or MatrixFree, optional
         If given, the equations are compressed over a tree or not stored, and `solver` is not used.
+    solver : LinearSolver
     """
 
-    solver: LinearSolver
     reason: str
     hierarchical: Hierarchical | MatrixFree | None = None
+    solver: LinearSolver = field(default_factory=DenseCholesky)
 
 
 def choose_linear_solver(requested: LinearSolverChoice) -> ChosenLinearSolver:
@@ -352,6 +352,6 @@ def choose_linear_solver(requested: LinearSolverChoice) -> ChosenLinearSolver:
         The requested linear solver if there is one, otherwise Cholesky.
     """
     if not isinstance(requested, Automatic | Hierarchical | MatrixFree):
-        return ChosenLinearSolver(requested, "asked for")
+        return ChosenLinearSolver("asked for", solver=requested)
     without = {Automatic: "", Hierarchical: "not compressed over a tree, but ", MatrixFree: "not matrix-free, but "}
-    return ChosenLinearSolver(DenseCholesky(), f"{without[type(requested)]}Cholesky, because S is positive definite")
+    return ChosenLinearSolver(f"{without[type(requested)]}Cholesky, because S is positive definite")

@@ -40,7 +40,7 @@ def test_large_bodies_are_compressed_and_small_ones_are_not() -> None:
     assert "would take" in small.reason
     assert large.hierarchical == bk.Hierarchical()
     assert "of the time of dense equations" in large.reason
-    assert chosen(scene_of(4000, linear_solver=DenseCholesky())) == ChosenLinearSolver(DenseCholesky(), "asked for")
+    assert chosen(scene_of(4000, linear_solver=DenseCholesky())) == ChosenLinearSolver("asked for")
     assert chosen(scene_of(320, linear_solver=ASKED)).hierarchical == ASKED
 
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.operators.counts import Entries, Factorisation, FactorKind, OperationCounts
-from bemkit.operators.linear_solvers import ChosenLinearSolver, DenseCholesky
+from bemkit.operators.linear_solvers import ChosenLinearSolver
 from bemkit.operators.material import Material
 from bemkit.operators.rigid_modes import admissible_modes
 from bemkit.operators.steklov_poincare.nodal_conditions import SLIDES, GivenData, NodalConditions
@@ -27,7 +27,7 @@ _SECONDS_PER_EVALUATION, _SECONDS_PER_FLOP = 2e-8, 1e-10
 """Time of a closed-form integral, and of a flop of a factorisation, on a common computer [s]."""
 CHUNK_PAIRS = 32768
 """Pairs of a midpoint and an element that each thread of collocation evaluates at a time."""
-_OWN_SOLVER = ChosenLinearSolver(DenseCholesky(), "the map has a linear solver of its own")
+_OWN_SOLVER = ChosenLinearSolver("the map has a linear solver of its own")
 
 
 @dataclass(frozen=True)

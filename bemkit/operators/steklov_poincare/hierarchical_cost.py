@@ -11,12 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from bemkit.operators.linear_solvers import (
-    ChosenLinearSolver,
-    DenseCholesky,
-    Hierarchical,
-    LinearSolver,
-)
+from bemkit.operators.linear_solvers import ChosenLinearSolver, Hierarchical
 from bemkit.operators.steklov_poincare.cost import (
     CONTACT_STEPS,
     NO_HYPERSINGULAR,
@@ -28,7 +23,6 @@ from bemkit.operators.steklov_poincare.cost import (
     slopes_item,
 )
 
-_DIRECT: LinearSolver = DenseCholesky()
 _SHARE = 0.5
 """Largest predicted time, relative to that of dense equations, of compressed ones that are chosen automatically."""
 _FLOPS_OF_LARGE = 0.2
@@ -62,11 +56,11 @@ def compressed_if_cheaper(case: BodyCase, memory: float) -> ChosenLinearSolver:
     of_dense = _FLOPS_OF_LARGE * (dense.flops + CONTACT_STEPS * 2.0 / 3.0 * case.n_retained**3)
     share = compressed.seconds / seconds_of(dense.evaluations, of_dense)
     if share < _SHARE:
-        return ChosenLinearSolver(_DIRECT, f"about {share:.2g} of the time of dense equations", options)
+        return ChosenLinearSolver(f"about {share:.2g} of the time of dense equations", options)
     if compressed.memory < memory < dense.memory:
         reason = f"dense ones need about {dense.memory / 1e9:.3g} GB, there are {memory / 1e9:.3g} GB"
-        return ChosenLinearSolver(_DIRECT, reason, options)
-    return ChosenLinearSolver(_DIRECT, f"compressed over a tree they would take {share:.2g} times as long")
+        return ChosenLinearSolver(reason, options)
+    return ChosenLinearSolver(f"compressed over a tree they would take {share:.2g} times as long")
 
 
 def hierarchical_cost(case: BodyCase, options: Hierarchical, *, takes_slopes: bool) -> BodyCost:

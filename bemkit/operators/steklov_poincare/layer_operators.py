@@ -11,12 +11,7 @@ from bemkit.geometry.reflection import antisymmetric_dofs
 from bemkit.geometry.spaces import BoundarySpace, dof_points
 from bemkit.operators.assembly import assemble_together
 from bemkit.operators.counts import Entries, OperationCounts
-from bemkit.operators.forms import (
-    double_layer_form,
-    hypersingular_form,
-    mass_matrix,
-    single_layer_form,
-)
+from bemkit.operators.forms import double_layer_form, hypersingular_form, mass_matrix, single_layer_form
 from bemkit.operators.linear_solvers import Cholesky, multiply, subtract_product
 from bemkit.operators.material import Material
 from bemkit.operators.rigid_modes import traction_free_modes
