@@ -87,7 +87,11 @@ def test_each_mesh_is_announced_with_its_size(heard: list[str]) -> None:
 def test_a_terminal_shows_stage_and_step(arguments: tuple[str, ...], words: tuple[str, ...]) -> None:
     shown = on_a_terminal(*arguments)
     assert all(word in shown for word in words)
-    assert on_a_terminal(*arguments, "-q") == ""
+
+
+@pytest.mark.slow
+def test_a_terminal_shows_nothing_if_asked_for_quiet() -> None:
+    assert on_a_terminal("run", "paper-1", "--elements", "24", "-q") == ""
 
 
 def test_the_bar_appears_before_anything_is_loaded() -> None:
@@ -95,11 +99,13 @@ def test_the_bar_appears_before_anything_is_loaded() -> None:
 import sys
 from bemkit.cli.options import shown_progress
 sys.stderr.isatty = lambda: True
-with shown_progress(False):
-    print([name for name in ("scipy", "h5py", "matplotlib") if name in sys.modules])
+with shown_progress(False) as callback:
+    print(callback is None, [name for name in ("scipy", "h5py", "matplotlib") if name in sys.modules])
+with shown_progress(True) as callback:
+    print(callback is None)
 """
     result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert result.stdout.strip() == "[]"
+    assert result.stdout.split() == ["False", "[]", "True"]
 
 
 def test_no_command_loads_its_work_before_it_shows_that_it_begins() -> None:

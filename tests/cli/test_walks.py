@@ -129,6 +129,7 @@ def call(*arguments: str) -> str:
     return result.output
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", slow_except(WALKS, "pin"))
 @pytest.mark.usefixtures("here")
 def test_a_walk_ends_with_numbers_and_pictures(name: str) -> None:

@@ -97,6 +97,7 @@ def test_a_half_cylinder_is_the_limit_of_compressible_ones(discretisation: objec
 NEARLY = (0.499, 0.4999, 0.49999, 0.499999, *(0.5 - 10.0**-k for k in range(7, 12)), 0.5 - 1.1e-12)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("friction", slow_only([0.0, 0.3], 0.0))
 @pytest.mark.parametrize("discretisation", slow_only(DISCRETISATIONS, *DISCRETISATIONS[:2]))
 @pytest.mark.parametrize(

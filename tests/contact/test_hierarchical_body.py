@@ -183,7 +183,7 @@ def test_a_body_is_compressed_and_factored_once_for_all_load_steps(monkeypatch: 
     monkeypatch.setattr(Factor, "update", updated)
     place = "parts.left-load.condition.x"
     steps = bk.Step(1.0, {place: 0.0}), bk.Step(3.0, {place: "0.5*(t - 1)"}, increments=2)
-    scenes = [replace(scene, steps=steps) for scene in in_both_ways(paper(1), 320)]
+    scenes = [replace(scene, steps=steps) for scene in in_both_ways(paper(1), 240)]
     solution, dense = (bk.run(scene) for scene in scenes)
     assert len(compressed) == 1  # though nothing presses from the left in the first step
     n_leaves = compressed[0].tree.n_leaves
@@ -224,7 +224,7 @@ def test_two_threads_give_the_bits_of_one(monkeypatch: pytest.MonkeyPatch) -> No
     solutions = []
     for count in (1, 2):
         monkeypatch.setattr(threads, "n_threads", lambda n_integrals, count=count: count)
-        solutions.append(bk.run(in_both_ways(paper(1), 300)[0]))
+        solutions.append(bk.run(in_both_ways(paper(1), 240)[0]))
     one, two = solutions
     assert np.array_equal(one.boundary.displacement, two.boundary.displacement)
     assert np.array_equal(one.contact.sigma_t, two.contact.sigma_t)

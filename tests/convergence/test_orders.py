@@ -14,6 +14,7 @@ from bemkit.arrays import FloatArray
 from bemkit.reference import find_reference
 from bemkit.runs.adaptive import run_adaptive
 from tests.scenes import angle, contact_error, paper, reference_values
+from tests.slow import slow_except
 
 ELEMENTS: dict[str, Any] = {"linear": bk.Galerkin(1), "quadratic": bk.Galerkin(2)}
 
@@ -126,7 +127,7 @@ def test_quadratic_elements_pass_the_contact_patch_test() -> None:
     np.testing.assert_allclose(contact.sigma_t, 0.0, atol=1e-11)
 
 
-@pytest.mark.parametrize("example", [1, 2])
+@pytest.mark.parametrize("example", slow_except([1, 2], 1))
 def test_uniform_quadratic_elements_beat_linear_ones(example: int) -> None:
     errors = {}
     for word, elements in ELEMENTS.items():

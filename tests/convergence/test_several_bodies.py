@@ -44,6 +44,7 @@ def fit(plane: bk.Plane, pressure: float, heat: float | None = None) -> bk.Scene
     )  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("plane", "pressure", "heat"),
     [

@@ -9,7 +9,7 @@ import pytest
 
 import bemkit as bk
 from bemkit.runs.steps import UnsolvableSceneError
-from tests.slow import slow_only
+from tests.slow import slow_except, slow_only
 
 BLOCK = bk.Body(
     name="block",
@@ -87,7 +87,7 @@ def test_a_cylinder_that_moves_so_far_that_its_false_gap_deforms_the_block_as_mu
     refused(pressed(bk.RigidCircle((0.0, 1.0), 1.0), bk.Frictionless(), x=x, y=-1e-3))
 
 
-@pytest.mark.parametrize("y", [-1e-2, -5e-2])
+@pytest.mark.parametrize("y", slow_except([-1e-2, -5e-2], -5e-2))
 @pytest.mark.parametrize("law", slow_only([bk.Frictionless(), bk.Coulomb(0.3)], bk.Coulomb(0.3)))
 def test_a_punch_is_dragged_so_far_that_its_corners_are_at_other_elements(law: bk.FrictionLaw, y: float) -> None:
     """Whether it is pressed lightly or so hard that the block gives way by half of the motion."""
@@ -152,6 +152,7 @@ def test_two_bodies_are_dragged_by_more_than_their_contact() -> None:
     refused(on_block(foot, ("bottom",), ("top",), 0.15, -0.05))
 
 
+@pytest.mark.slow
 def test_the_rule_does_not_depend_on_units_and_position() -> None:
     """The same cylinder in millimetres and MPa, a hundred radii away."""
     for drag, status in ((1e-3, bk.Status.CONVERGED), (0.1, bk.Status.FINITE_SLIDING)):

@@ -74,7 +74,7 @@ def test_bodies_that_friction_joins_turn_together(of_shaft: int, of_ring: int) -
     "held",
     [
         tunnel(bk.Pressure(1.0)),
-        replace(TWISTED, law=bk.Coulomb(0.3)),
+        pytest.param(replace(TWISTED, law=bk.Coulomb(0.3)), marks=pytest.mark.slow),
         tunnel(bk.Traction(bk.Expression("1 - y"), bk.Expression("-x"))),  # a push, and a moment of cos(2 angle)
         replace(tunnel(bk.Clamped()), contacts=(bk.ContactPair(("rock.wall", "lining.out"), gap=-1e-3),)),
     ],

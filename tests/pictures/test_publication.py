@@ -35,7 +35,9 @@ def solution() -> bk.Solution:
 )
 def test_pictures_are_as_wide_as_asked(width: float, name: str, solution: bk.Solution, tmp_path: Path) -> None:
     (path,) = save_pictures(solution, tmp_path / f"{name}.png", [name], dots_per_inch=200, width=width)
-    assert matplotlib.image.imread(path).shape[1] == pytest.approx(width / 25.4 * 200, abs=1.0)  # a pixel
+    picture = matplotlib.image.imread(path)
+    assert picture.shape[1] == pytest.approx(width / 25.4 * 200, abs=1.0)  # a pixel
+    assert picture[..., :3].std() > 0.03  # not blank
     (figure,) = figures(solution, [name]).values()
     assert figure.axes[0].get_title()
     box = fitted(figure, width)

@@ -34,6 +34,7 @@ def test_stress_concentration_of_a_hole(is_biaxial: bool, exact: float) -> None:
     assert solution.largest_stress().value == pytest.approx(exact * NOMINAL, rel=1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "discretisation", slow_except([bk.ConstantCollocation(), bk.Galerkin(1), bk.Galerkin(2)], bk.ConstantCollocation())
 )

@@ -47,13 +47,20 @@ def blocks() -> bk.Scene:
     )
 
 
+def history() -> bk.Scene:
+    """A block is pressed down and dragged along its floor in two increments."""
+    loop = with_overrides(bk.load_scene("friction-loop"), elements=24)
+    press, drag = loop.steps
+    return replace(loop, steps=(press, replace(drag, increments=2)))
+
+
 SCENES: dict[str, Callable[[], bk.Scene]] = {
     "obstacle": lambda: with_overrides(bk.load_scene("paper-1"), elements=40),
     "bodies": blocks,
     "rigid body": lambda: bk.load_scene("wedged-leg"),
     "driven rigid body": lambda: with_overrides(bk.load_scene("tilted-punch"), elements=24),
     "half-plane": lambda: with_overrides(bk.load_scene("cylinder-on-half-plane"), elements=24),
-    "history": lambda: with_overrides(bk.load_scene("friction-loop"), elements=24),
+    "history": history,
 }
 
 

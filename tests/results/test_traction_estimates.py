@@ -168,9 +168,7 @@ def test_errors_at_a_singular_corner_spread_to_its_neighbour() -> None:
         title="leaning", shape=shape, material=bk.Material(1.0, 0.3), parts=parts, law=bk.Coulomb(0.2),
         discretisation=bk.Galerkin(6), mesh=bk.MeshOptions(elements=17, grading=bk.Algebraic(2.0)),
     )  # fmt: skip
-    fine = bk.run(
-        replace(scene, discretisation=bk.Galerkin(2), mesh=bk.MeshOptions(accuracy=1e-4, rising_degrees=True))
-    )
+    fine = bk.run(replace(scene, discretisation=bk.Galerkin(2), mesh=LAYERS))
     coarse = bk.run(scene)
     _, tractions = true_errors(coarse, fine)
     assert coarse.singular_corners

@@ -131,6 +131,7 @@ def test_a_body_on_one_that_is_much_stiffer_is_a_body_on_a_rigid_one(contact: We
     assert or_bounded(joined_exponent(soft, stiff, contact)) == pytest.approx(min(or_bounded(rigid), 0.99), abs=1e-6)
 
 
+@pytest.mark.slow
 @given(angles, angles, st.sampled_from([HELD, ROLLER, WedgeSide(True, friction=0.4)]), kappas, kappas)
 def test_a_mirror_exchanges_the_two_bodies(
     angle: float, other_angle: float, contact: WedgeSide, kappa: float, other_kappa: float

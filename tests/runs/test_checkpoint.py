@@ -25,8 +25,8 @@ from tests.slow import slow_except
 LOOP = replace(bk.load_scene("friction-loop"), mesh=bk.MeshOptions(elements=24))
 LOOP = replace(LOOP, steps=(LOOP.steps[0], replace(LOOP.steps[1], increments=4)))
 PUNCH_STEPS = (
-    bk.Step(1.0, {"rigid.punch.force_y": "-1e-3*t"}, increments=2),
-    bk.Step(3.0, {"rigid.punch.x": "1e-3*sin(pi*(t - 1))"}, increments=4),
+    bk.Step(1.0, {"rigid.punch.force_y": "-1e-3*t"}),
+    bk.Step(3.0, {"rigid.punch.x": "1e-3*sin(pi*(t - 1))"}, increments=3),
 )
 PUNCH = replace(driven(x=0.0, force_y=-1e-3), law=bk.SlipWeakening(0.3, 0.2, 1e-3), steps=PUNCH_STEPS)
 COMPRESSED = replace(
@@ -269,7 +269,7 @@ def test_a_failed_step_leaves_the_finished_ones_in_the_file(
 
 
 @pytest.mark.parametrize("scene", slow_except([LOOP, PUNCH], PUNCH), ids=["one body", "punch"])
-@pytest.mark.parametrize("ending", slow_except(["h5", "hdf5", "json", "csv", "npz", "vtu"], "csv", "vtu"))
+@pytest.mark.parametrize("ending", slow_except(["h5", "hdf5", "json", "csv", "npz", "vtu"], "csv"))
 def test_histories_are_written_in_every_format(scene: bk.Scene | bk.Scene, ending: str, tmp_path: Path) -> None:
     if ending == "vtu":
         pytest.importorskip("meshio")

@@ -9,6 +9,7 @@ import pytest
 
 import bemkit as bk
 from bemkit.testing import check_solution
+from tests.slow import slow_except
 
 SOFT = bk.Material(1.0, 0.3)
 HERTZ_MODULUS = 0.5 * SOFT.plane_modulus
@@ -64,7 +65,7 @@ def test_wavy_half_planes_are_sheared_in_steps() -> None:
     assert solution.force_tangential == pytest.approx(-0.3 * solution.force_normal, rel=1e-9)
 
 
-@pytest.mark.parametrize("far", [{"y": -1e-3}, {"force_y": -1e-3}])
+@pytest.mark.parametrize("far", slow_except([{"y": -1e-3}, {"force_y": -1e-3}], {"force_y": -1e-3}))
 def test_flat_half_planes_press_each_other_like_rigid_punches(far: dict[str, float]) -> None:
     """Two equal strips, of which only one has an edge on the other: P / (pi sqrt(a^2 - x^2))."""
     scene = bk.Scene(

@@ -41,6 +41,7 @@ def check_up_to_collapse(assembly: bk.Scene, expected: float, moved: str, weight
     np.testing.assert_array_equal(beyond.contact.sigma_n, steps[-1].contact.sigma_n)
 
 
+@pytest.mark.slow
 def test_a_wall_is_pushed_up_to_its_collapse() -> None:
     """Friction under the uppermost course, of weight 4, holds the push."""
     check_up_to_collapse(wall(2, 2, push=True), FRICTION * 4.0, "block 1-0", 8.0)

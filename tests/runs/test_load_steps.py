@@ -118,7 +118,7 @@ def test_bodies_and_a_punch_balance_too() -> None:
     """A punch is pressed down by a force and moved to and fro."""
     steps = (
         bk.Step(1.0, {"rigid.punch.force_y": "-1e-3*t"}, increments=2),
-        bk.Step(3.0, {"rigid.punch.x": "1e-3*sin(pi*(t - 1))"}, increments=6),
+        bk.Step(3.0, {"rigid.punch.x": "1e-3*sin(pi*(t - 1))"}, increments=4),
     )
     assembly = replace(driven(x=0.0, force_y=-1e-3), law=bk.Coulomb(0.3), steps=steps)
     loading = solved(assembly)

@@ -53,7 +53,7 @@ def driven(**changes: float | None) -> bk.Scene:
     return replace(PRESSED, rigid=(replace(PUNCH, **changes),))  # type: ignore[arg-type]
 
 
-@pytest.mark.parametrize("law", [bk.Frictionless(), SOME])
+@pytest.mark.parametrize("law", slow_except([bk.Frictionless(), SOME], SOME))
 def test_a_force_and_the_displacement_it_causes_are_one_problem(law: bk.FrictionLaw) -> None:
     by_force = solved(replace(PRESSED, law=law))
     punch = by_force.rigid["punch"]
@@ -136,7 +136,7 @@ def test_a_disc_in_a_v_is_carried_by_both_sides() -> None:
     assert disc.x == pytest.approx(0.0, abs=1e-10 * abs(disc.y))  # meshes are mirror images
 
 
-@pytest.mark.parametrize("push", [0.0, 3e-4])
+@pytest.mark.parametrize("push", slow_except([0.0, 3e-4], 3e-4))
 def test_a_square_in_a_v_divides_its_weight_by_statics(push: float) -> None:
     """On its edge, so that contact forces are at 45 degrees exactly; a push from the side shifts them."""
     diamond = bk.RigidPolygon(((0.0, 0.0), (1.0, 1.0), (0.0, 2.0), (-1.0, 1.0)))
@@ -185,7 +185,7 @@ def test_a_disc_that_contact_alone_holds_rests_between_two_blocks() -> None:
     np.testing.assert_allclose(sparse, dense, atol=1e-12 * np.abs(dense).max())
 
 
-@pytest.mark.parametrize("law", [bk.Frictionless(), SOME])
+@pytest.mark.parametrize("law", slow_except([bk.Frictionless(), SOME], SOME))
 @pytest.mark.parametrize("turn", slow_except([0.0, 30.0], 30.0))
 def test_a_rigid_body_that_does_not_move_is_an_obstacle(law: bk.FrictionLaw, turn: float) -> None:
     """Also for a turned copy, whose own mesh is another."""

@@ -17,6 +17,7 @@ from bemkit.runs.steps import run_on_mesh
 from bemkit.scene.load_history import load_steps
 from bemkit.studies.stability.case import Case
 from bemkit.studies.stability.sweep import condition_number
+from tests.slow import slow_only
 
 PUNCH = bk.Scene(
     title="punch",
@@ -81,7 +82,7 @@ def test_a_load_step_under_another_load_is_that_of_a_run_of_its_own() -> None:
     np.testing.assert_allclose(second.contact.u_n, alone.contact.u_n, atol=1e-9)
 
 
-@pytest.mark.parametrize("scene", [PUNCH, ROUGH], ids=lambda scene: scene.title)
+@pytest.mark.parametrize("scene", slow_only([PUNCH, ROUGH], ROUGH), ids=lambda scene: scene.title)
 def test_steps_change_what_acts_far_away(scene: bk.Scene) -> None:
     assert scene.far is not None
     sheared = bk.Step(2.0, {"far.force_x": "0.002 * (t - 1)"}, increments=2)
@@ -193,6 +194,7 @@ def test_nothing_holds_a_half_plane_that_is_driven_and_not_touched() -> None:
     assert at_rest.boundary.displacement[:, 1].max() < 0.0
 
 
+@pytest.mark.slow
 def test_an_elastic_disk_on_an_elastic_half_plane() -> None:
     """As one body of an assembly a half-plane rests at the distance of its strip; Hertz with both moduli."""
     load = bk.Part("load", bk.PrescribedDisplacement(x=0.0, y=-0.02), ("arc-1", "arc-2"))

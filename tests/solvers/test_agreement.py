@@ -64,7 +64,7 @@ def test_drivers_agree_on_more_random_problems(seed):
 RISING = np.linspace(0.0, 0.6, 12)
 
 
-@pytest.mark.parametrize("law", [Frictionless(), Tresca(0.1), Tresca(RISING), Coulomb(0.5), Coulomb(RISING)], ids=repr)
+@pytest.mark.parametrize("law", [Frictionless(), Tresca(RISING), Coulomb(RISING)], ids=repr)
 @pytest.mark.parametrize("press", slow_except([1.0, 0.1], 0.1))
 def test_drivers_agree_on_a_floating_block(law, press):
     problem = block_problem(law, press=press)
@@ -95,6 +95,7 @@ def test_drivers_agree_with_nodes_that_never_touch():
         assert_same(problem, solve(problem, driver).state, reference.state)
 
 
+@pytest.mark.slow
 def test_results_do_not_depend_on_rho():
     problem = block_problem(Coulomb(0.5))
     reference = solve(problem, SemismoothNewton())

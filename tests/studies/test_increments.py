@@ -66,7 +66,8 @@ def test_refusals(scene: bk.Scene, message: str) -> None:
 
 def test_the_command_prints_and_writes_them(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file = tmp_path / "errors.json"
+    (tmp_path / "loop.toml").write_text(bk.scene_to_toml(loop(4)), "utf-8")
     with pytest.raises(SystemExit, match="0"):
-        main(["study", "increments", "friction-loop", "--elements", "16", "--json", str(file)])
-    assert "32 increments; halving all of them changes" in capsys.readouterr().out
-    assert json.loads(file.read_text())["n_increments"] == 32
+        main(["study", "increments", str(tmp_path / "loop.toml"), "--json", str(file)])
+    assert "6 increments; halving all of them changes" in capsys.readouterr().out
+    assert json.loads(file.read_text())["n_increments"] == 6

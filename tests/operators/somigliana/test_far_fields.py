@@ -44,7 +44,7 @@ def points_of(fields: InteriorFields, seed: int, n: int) -> FloatArray:
     return points[fields.is_inside(points)]
 
 
-@settings(max_examples=settings.default.max_examples // 6)
+@settings(max_examples=settings.default.max_examples // 12)
 @given(
     name=st.sampled_from(sorted(SHAPES)),
     degree=st.integers(0, 2),

@@ -94,6 +94,7 @@ def test_a_scene_that_does_not_allow_an_element_type_is_a_row_among_others() -> 
     assert "after 1 steps of GMRES" in rows[0].message
 
 
+@pytest.mark.slow
 def test_an_accuracy_out_of_reach_shows_what_was_reached() -> None:
     meshes = adaptive((1e-2, 1e-6), most_elements=100)
     near, far = compute(error_tasks(paper_runs(meshes, elements=(QUADRATIC,)), reference(), 1))

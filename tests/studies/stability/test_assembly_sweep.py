@@ -45,6 +45,7 @@ def test_every_axis_is_tested_here(pin):
         list(sweep(load_scene("paper-1"), find_axes(["turn"])))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", slow_except(EXTREMES, "elements"))
 def test_the_ends_of_every_axis_are_right_or_named(pin, name):
     (axis,) = find_axes([name])
@@ -124,6 +125,7 @@ def test_rigid_bodies_and_load_steps_have_similar_ones(sheared, name):
         assert row.deviation < 1e-8  # the certificate of a press by forces, 1e-9, in displacements of a soft half-space
 
 
+@pytest.mark.slow
 def test_steps_count_in_similar_assemblies(sheared):
     """The last step alone, without what slipped before, is another problem."""
     whole = run(sheared)

@@ -139,6 +139,7 @@ def test_multipliers_on_the_other_side_change_forces_by_the_discretisation_error
             assert contact.force_normal == pytest.approx(expected.force_normal, abs=3e-5)
 
 
+@pytest.mark.slow
 def test_copies_are_bodies_that_are_listed() -> None:
     def wall(*, is_copied: bool) -> bk.Scene:
         def brick(name: str, place: bk.Placement, copies: bk.GridCopies | None = None) -> bk.Body:

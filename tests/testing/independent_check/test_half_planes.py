@@ -58,7 +58,7 @@ def solved(name: str) -> bk.Solution:
 
 
 @pytest.mark.parametrize("similarity", slow_only([SIMILARITY, TWIN], TWIN), ids=["moved", "twin"])
-@pytest.mark.parametrize("name", SCENES)
+@pytest.mark.parametrize("name", slow_only(SCENES, "rough", "graded"))
 def test_results_of_a_similar_half_plane_follow_by_its_factors(name: str, similarity: Similarity) -> None:
     one, other = solved(name), bk.run(similarity.apply(SCENES[name]))
     assert one.is_converged
@@ -122,7 +122,7 @@ def with_boundary(solution: bk.Solution, **fields: np.ndarray) -> Violations:
     return changed(solution, boundary=replace(boundary, traction_dofs=traction, **fields))
 
 
-@pytest.mark.parametrize("name", slow_except([*SCENES, *AMONG.values()], "punch", "rough"))
+@pytest.mark.parametrize("name", slow_except([*SCENES, *AMONG.values()], "punch"))
 def test_each_violation_is_seen_under_its_name(name: str) -> None:
     solution = solved(name)
     assert violations_of(solution).is_good
