@@ -126,6 +126,7 @@ def ring_error(degree: int) -> float:
     return float(np.abs(along - exact).max() / exact.max())
 
 
+@pytest.mark.slow
 def test_smooth_fields_converge_with_the_degree() -> None:
     errors = [ring_error(degree) for degree in (1, 2, 3, 4, 6)]
     assert all(finer < 0.5 * coarser for coarser, finer in itertools.pairwise(errors)), errors

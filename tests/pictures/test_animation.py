@@ -18,7 +18,7 @@ from bemkit.atomic_files import OutputFileError
 from bemkit.pictures import save_animation
 from bemkit.scene.toml import with_overrides
 
-FACTORS = (0.3, 0.6, 1.0)
+FACTORS = (0.4, 1.0)
 
 
 @pytest.fixture(scope="module")

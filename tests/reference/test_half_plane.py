@@ -110,7 +110,7 @@ def test_sheared_cylinders_have_their_printed_digits(shear: float, ratio: float,
     assert at(lambda x: hertz_slip(sheared, x), 0.5 * ratio * a) == 0.0
 
 
-@pytest.mark.parametrize("name", list(CONTACTS))
+@pytest.mark.parametrize("name", slow_only(CONTACTS, "rounded"))
 def test_partial_slip_carries_its_load_and_strains_nothing_that_sticks(name: str) -> None:
     contact, _ = CONTACTS[name]
     sheared = PartialSlip(contact, 0.05, 0.4)

@@ -11,8 +11,28 @@ from bemkit.results.stress_mesh import largest_equivalent_stress
 from tests.perforated_plate import NOMINAL, plate
 
 
+def test_a_block_yields_everywhere_at_once() -> None:
+    sides = {
+        "bottom": bk.PrescribedDisplacement(y=0.0),
+        "left": bk.PrescribedDisplacement(x=0.0),
+        "top": bk.Pressure(2.0),
+    }
+    scene = bk.Scene(
+        title="block",
+        shape=bk.Rectangle(1.0, 1.0),
+        material=bk.Material(1.0, 0.3, bk.Plane.STRESS),
+        parts=tuple(bk.Part(side, condition, sides=(side,)) for side, condition in sides.items()),
+        mesh=bk.MeshOptions(elements=8),
+        discretisation=bk.Galerkin(1),
+    )
+    found = bk.first_yield(scene, 3.0)
+    assert found.load_factor == pytest.approx(1.5, rel=1e-9)  # a uniform stress, to round-off
+    assert found.solution.largest_stress().value == pytest.approx(3.0, rel=1e-6)  # as accurate as asked
+
+
+@pytest.mark.slow
 def test_a_plate_yields_at_its_hole() -> None:
-    scene = plate(is_biaxial=False, mesh=bk.MeshOptions(elements=24), discretisation=bk.Galerkin(6))
+    scene = plate(is_biaxial=False, mesh=bk.MeshOptions(elements=48), discretisation=bk.Galerkin(6))
     found = bk.first_yield(scene, 12.0)
     assert found.load_factor == pytest.approx(12.0 / (3.0 * NOMINAL), rel=1e-3)
     assert abs(found.x) < 1e-6

@@ -18,7 +18,7 @@ from bemkit.model.prepared import prepare
 from bemkit.solvers.base import ContactSolver
 from bemkit.solvers.newton import carried_on
 from bemkit.testing.independent_check import violations_of
-from tests.slow import slow_except
+from tests.slow import slow_except, slow_only
 
 DRIVERS = [bk.SemismoothNewton(), bk.AugmentedLagrangian(), bk.FixedPoint(), bk.LemkePivoting()]
 TILT = 0.6
@@ -78,7 +78,7 @@ def assert_right_or_unsolved(scene: bk.Scene, distance: float, push: float) -> b
     return True
 
 
-@DRIVEN
+@pytest.mark.parametrize("driver", slow_only(DRIVERS, bk.LemkePivoting()), ids=lambda driver: type(driver).__name__)
 @pytest.mark.parametrize("push", slow_except([1e-10, 1e-4], 1e-10))
 def test_the_wall_carries_the_push_however_small(driver: ContactSolver, push: float) -> None:
     """Beside what a disc clamped at the wall would exert on it, pushes are nothing; they are all there is."""
