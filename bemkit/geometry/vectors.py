@@ -47,9 +47,10 @@ def winding_numbers(points: FloatArray, start: FloatArray, end: FloatArray) -> I
 
     Segments that cross the ray from a point to the right count 1 upwards, -1 downwards.
     """
-    to_start, to_end = start - points[:, None], end - points[:, None]
-    rise = np.subtract(to_end[..., 1] > 0.0, to_start[..., 1] > 0.0, dtype=int)
-    return np.asarray(np.sum(rise * (rise * cross(to_start, to_end) > 0.0), axis=1))
+    x, y = points[:, :1], points[:, 1:]  # separate coordinates take a fifth of the time of vectors
+    rise = np.subtract(end[:, 1] > y, start[:, 1] > y, dtype=np.int8)
+    side = (start[:, 0] - x) * (end[:, 1] - y) - (start[:, 1] - y) * (end[:, 0] - x)
+    return np.asarray(np.sum(rise * (rise * side > 0.0), axis=1))
 
 
 def circle_centre(first: FloatArray, second: FloatArray, third: FloatArray) -> FloatArray | None:
