@@ -1,14 +1,20 @@
-"""Neighbours along a boundary: elements in order, corners between them, ends of parts."""
+"""Elements along a boundary: in order, with arc lengths, corners, ends of parts, and the centre of all their arcs."""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray, IntArray, read_only
 from bemkit.geometry.mesh import BoundaryMesh
-from bemkit.geometry.vectors import angles_between
+from bemkit.geometry.quadrature import gauss_legendre
+from bemkit.geometry.vectors import angles_between, cross
 
 _POINTS_OF_CURVE = 9
+_POINTS_OF_ARC = 12
+_ROUND_OFF = 1e-9
+"""Distance by which normals of arcs may miss their centre, relative to the diameter."""
 
 
 def along_boundary(mesh: BoundaryMesh, elements: IntArray) -> IntArray:
@@ -96,3 +102,20 @@ def corner_nodes(mesh: BoundaryMesh, angle: float = 1e-6) -> BoolArray:
     round_off = 8.0 * np.finfo(float).eps * np.abs(mesh.nodes).max(axis=1) / shortest
     corners: BoolArray = np.abs(angles_between(before, after)) > angle + round_off
     return corners
+
+
+def common_centre(sides: Sequence[tuple[BoundaryMesh, IntArray]]) -> FloatArray | None:
+    """Return the point (2,) [m] through which all normals of curved elements (k,) of meshes pass.
+
+    None if there is no such point, or if an element is straight.
+    """
+    if any(mesh.is_straight[elements].any() for mesh, elements in sides):
+        return None
+    (first, _), (xi, _) = sides[0], gauss_legendre(_POINTS_OF_ARC)
+    points = np.concatenate([mesh.points(elements, xi).reshape(-1, 2) for mesh, elements in sides])
+    normals = np.concatenate([mesh.normals_at(elements, xi).reshape(-1, 2) for mesh, elements in sides])
+    points -= first.centre
+    arms = np.column_stack([-normals[:, 1], normals[:, 0]])
+    centre = np.linalg.lstsq(arms, cross(normals, points), rcond=None)[0]
+    missed = np.abs(cross(normals, points - centre)).max()
+    return first.centre + centre if missed <= _ROUND_OFF * first.diameter else None

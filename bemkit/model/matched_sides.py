@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from bemkit.geometry.arcs import common_centre
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.meshing.discretise import Uniform
+from bemkit.geometry.neighbours import common_centre
 from bemkit.scene.body_scene import BodyScene
 from bemkit.scene.contacts import ContactPair
 from bemkit.scene.discretisation import Galerkin

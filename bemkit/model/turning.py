@@ -13,7 +13,7 @@ from typing import TypeAlias
 import numpy as np
 
 from bemkit.arrays import FloatArray, IntArray
-from bemkit.geometry.arcs import common_centre
+from bemkit.geometry.neighbours import common_centre
 from bemkit.geometry.quadrature import gauss_legendre
 from bemkit.geometry.vectors import cross, norms
 from bemkit.model.placed import PlacedBody

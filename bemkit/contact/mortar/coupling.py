@@ -26,7 +26,7 @@ from bemkit.contact.mortar.projection import mean_directions, on_rays, rays
 from bemkit.contact.mortar.segments import MortarQuadrature, Segments, common_refinement, quadrature_on
 from bemkit.contact.mortar.sides import ContactSide
 from bemkit.errors import GeometryError, format_point
-from bemkit.geometry.arcs import common_centre
+from bemkit.geometry.neighbours import common_centre
 from bemkit.geometry.quadrature import gauss_legendre
 from bemkit.geometry.spaces import dof_points
 from bemkit.geometry.vectors import turned_left

@@ -10,7 +10,7 @@ import numpy as np
 
 from bemkit.arrays import FloatArray, IntArray
 from bemkit.contact.mortar.sides import ContactSide, faces_away
-from bemkit.geometry.arcs import common_centre
+from bemkit.geometry.neighbours import common_centre
 from bemkit.geometry.vectors import cross, norms, turned_right
 
 _LEAST_OPPOSITION = 0.5
