@@ -18,6 +18,13 @@ except ImportError:  # not a system of the Unix family
     fcntl = None  # type: ignore[assignment]
 
 
+FILE_ENDINGS = frozenset(
+    f".{ending}"
+    for ending in "csv json md jsonl h5 hdf5 npz vtu toml html txt png svg pdf jpg jpeg eps ps tif tiff gif mp4".split()
+)
+"""Endings of files that bemkit reads or writes, and of pictures."""
+
+
 class OutputFileError(BemkitError, OSError):
     """A file that cannot be written; one line with its name and the remedy."""
 

@@ -201,7 +201,7 @@ def opened(path: Path, made_by: str = "bemkit run -o") -> Iterator[Reader]:
                 raise ResultFileError(f"{name}: {kind}: {remedy}")
             content = sealed_content(block + stream.read())
         if content is None:
-            damage = "its content does not match its checksum: the file is damaged, run its scene again"
+            damage = "its content does not match its checksum: the file is damaged, delete it and run its scene again"
             raise ResultFileError(f"{name}: {damage}")
         file = h5py.File(BytesIO(content), "r")
     except ResultFileError:
@@ -235,7 +235,7 @@ class Reader:
 
     def error(self, problem: str) -> ResultFileError:
         """Return an error that names the file."""
-        remedy = "" if ":" in problem else ": the file is damaged, run its scene again"
+        remedy = "" if ":" in problem else ": the file is damaged, delete it and run its scene again"
         return ResultFileError(f"{self._name}: {problem}{remedy}".replace("\n", " "))
 
     def attributes(self, group: str) -> dict[str, Any]:

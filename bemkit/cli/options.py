@@ -22,9 +22,6 @@ if TYPE_CHECKING:
     from bemkit.studies.row_file import R
     from bemkit.table import Table
 
-_ENDINGS = frozenset({".csv", ".json", ".md", ".jsonl", ".h5", ".hdf5", ".npz", ".vtu", ".toml", ".html"})
-"""Endings of files that bemkit reads or writes."""
-
 
 def degree_of(context: click.Context, parameter: click.Parameter, value: str | None) -> int | Literal["hp"] | None:
     """Return a polynomial degree, or the word for degrees that rise until an accuracy is reached."""
@@ -57,7 +54,11 @@ def file_of(ending: str) -> Callable[[click.Context, click.Parameter, str | None
     """Return a check that a file in an option does not have the ending of another kind of file, such as a scene."""
 
     def checked(context: click.Context, parameter: click.Parameter, value: str | None) -> str | None:
-        if value is not None and Path(value).suffix.lower() in _ENDINGS - {ending}:
+        if value is None:
+            return None
+        from bemkit.atomic_files import FILE_ENDINGS
+
+        if Path(value).suffix.lower() in FILE_ENDINGS - {ending}:
             words = f"{value} has the ending of another kind of file: give a name that ends in {ending}"
             raise click.BadParameter(words, context, parameter)
         return value

@@ -7,7 +7,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from bemkit.atomic_files import OutputFileError, check_target, replacing
+from bemkit.atomic_files import FILE_ENDINGS, OutputFileError, check_target, replacing
 from bemkit.pictures.publication import fitted
 
 if TYPE_CHECKING:
@@ -66,12 +66,12 @@ def check_figure_folder(folder: Path | None, figure: str = "figure") -> None:
         return
     if folder.exists() and not folder.is_dir():
         raise OutputFileError(f"{folder}: exists and is not a folder: choose another name for the figures")
-    if folder.suffix[1:].isalpha() and not folder.exists():
+    if folder.suffix.lower() in FILE_ENDINGS and not folder.exists():
         raise OutputFileError(
             f"{folder}: the ending {folder.suffix!r} is that of a file: give a folder, or for one picture of bemkit "
             f"plot a name that ends in {', '.join(FIGURE_FORMATS)}"
         )
-    check_target(folder / f"{figure}.png" if folder.exists() else folder.with_suffix(".png"))
+    check_target(folder / f"{figure}.png" if folder.exists() else folder)
 
 
 def make_folder(folder: Path) -> None:

@@ -58,7 +58,7 @@ class RowFile(Generic[R]):
             return []
         if Path(path).is_file():
             self.read(path)
-        if Path(path).suffix != ENDING:
+        if Path(path).suffix.lower() != ENDING:
             raise OutputFileError(f"{path}: rows are kept as JSON Lines: give a name that ends in {ENDING}")
         return [check_target(Path(path))]
 

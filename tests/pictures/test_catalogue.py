@@ -15,6 +15,7 @@ from bemkit.atomic_files import OutputFileError
 from bemkit.cli.main import main
 from bemkit.pictures import figures, save_pictures
 from bemkit.pictures.catalogue import PICTURES, default_pictures
+from bemkit.pictures.figure_files import check_figure_folder
 from bemkit.results.solution import Solution
 from bemkit.scene.toml import scene_to_toml, with_overrides
 from tests.runs.masonry import wall
@@ -144,6 +145,7 @@ def test_the_command_draws_results_and_scenes(tmp_path: Path, capsys: pytest.Cap
         (("plot", "paper-1", "-o", "x.PNG"), "one file takes one picture"),
         (("plot", "paper-1", "--what", "traction", "-o", "x.jpg"), "x.jpg: the ending '.jpg' is that of a file: give"),
         (("run", "paper-1", "--plot", "x.png"), "x.png: the ending '.png' is that of a file: give a folder, or for"),
+        (("run", "paper-1", "--plot", "no/figures"), "no/figures: the folder"),
         (("run", "paper-1", "--what", "traction"), "--what names figures: add --plot DIR"),
         (("run", "paper-1", "--plot", "p", "--what", "tension"), "'tension' is not a picture"),
     ],
@@ -164,3 +166,8 @@ def test_the_help_lists_all_pictures(capsys: pytest.CaptureFixture[str]) -> None
     assert call("plot", "--help") == 0
     shown = capsys.readouterr().out
     assert all(f"  {name} " in shown for name in (*PICTURES, "animation"))
+
+
+def test_a_folder_may_have_a_dot_in_its_name(tmp_path: Path) -> None:
+    check_figure_folder(tmp_path / "run.final")
+    assert not list(tmp_path.iterdir())

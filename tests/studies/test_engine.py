@@ -138,6 +138,7 @@ def test_an_ending_that_no_table_has_is_refused(tmp_path: Path) -> None:
     with pytest.raises(OutputFileError, match=message):
         Outputs((study_output(str(tmp_path / "rows.xyz"), as_table)[1],)).check()
     assert study_output("rows.jsonl", as_table)[0] == "rows.jsonl"
+    assert FILE.check(study_output("ROWS.JSONL", as_table)[0]) == [Path("ROWS.JSONL").resolve()]
 
 
 def test_texts_are_written_only_where_they_are_wanted(tmp_path: Path) -> None:

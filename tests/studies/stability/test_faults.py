@@ -137,7 +137,9 @@ def test_a_changed_number_is_noticed(result: Path) -> None:
         table = file["last/contact"][()]
         table["sigma_n"][3] *= 1.0 + 1e-15
         file["last/contact"][...] = table
-    with pytest.raises(ResultFileError, match="does not match its checksum: the file is damaged, run its scene again"):
+    with pytest.raises(
+        ResultFileError, match="does not match its checksum: the file is damaged, delete it and run its scene again"
+    ):
         read_result(result)
 
 
