@@ -37,7 +37,7 @@ def adapted(example: int, word: str, accuracy: float) -> tuple[bk.Solution, ...]
         ("quadratic", 1e-3, 1e-3, 4e-3, 2e-5, 1e-5, 6e-5),
         pytest.param("quadratic", 1e-4, 1e-4, 2e-4, 1e-5, 1e-5, 1.5e-5, marks=pytest.mark.slow),
         pytest.param("quadratic", 3e-5, 3e-5, 1.2e-4, 2e-6, 1e-5, 1.5e-5, marks=pytest.mark.slow),
-        ("linear", 4e-3, 1e-3, 4e-3, 5e-4, 1e-3, 3e-4),
+        pytest.param("linear", 4e-3, 1e-3, 4e-3, 5e-4, 1e-3, 3e-4, marks=pytest.mark.slow),
     ],
 )
 def test_the_papers_examples(
