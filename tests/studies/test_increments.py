@@ -43,10 +43,9 @@ def test_load_factors_are_halved_on_their_way() -> None:
     assert errors.tractions < 0.2
 
 
-@pytest.mark.slow
 def test_bodies_without_friction_follow_no_path() -> None:
-    scene = replace(bk.load_scene("two-cylinders"), law=bk.Frictionless(), load_factors=(0.5, 1.0))
-    errors = increment_errors(replace(scene, mesh=bk.MeshOptions(elements=60)))
+    scene = replace(bk.load_scene("paper-1"), law=bk.Frictionless(), load_factors=(0.5, 1.0))
+    errors = increment_errors(replace(scene, mesh=bk.MeshOptions(elements=24)))
     assert errors.dissipation is None
     assert errors.tractions == pytest.approx(0.0, abs=1e-9)  # round-off of the solves
 

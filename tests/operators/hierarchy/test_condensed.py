@@ -102,9 +102,8 @@ def test_where_the_stiffness_may_be_negative_it_is_examined(scene: bk.Scene, slo
     np.testing.assert_allclose(compressed.boundary.traction, dense.boundary.traction, atol=1e-8 * stress)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
-    ("name", "elements"), slow_except(product(("two-cylinders", "pin-in-plate"), (240, 600)), ("two-cylinders", 240))
+    ("name", "elements"), slow_except(product(("two-cylinders", "pin-in-plate"), (200, 600)), ("two-cylinders", 200))
 )
 def test_several_bodies_are_those_of_dense_equations(name: str, elements: int) -> None:
     assembly = bk.load_scene(name)
