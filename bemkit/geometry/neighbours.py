@@ -50,7 +50,7 @@ def along_boundary(mesh: BoundaryMesh, elements: IntArray) -> IntArray:
 def arc_lengths(mesh: BoundaryMesh, elements: IntArray, xi: FloatArray) -> FloatArray:
     """Return the arc lengths (m, q) [m] of points xi (q,) or (m, q) of elements (m,) in their order."""
     lengths = mesh.lengths[elements]
-    starts = np.append(0.0, np.cumsum(lengths)[:-1])
+    starts = np.cumsum(lengths) - lengths
     return np.asarray(starts[:, None] + 0.5 * lengths[:, None] * (xi + 1.0))
 
 
