@@ -6,7 +6,7 @@ import os
 import signal
 import time
 from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
-from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExecutor, as_completed
+from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, ProcessPoolExecutor, wait
 from contextlib import contextmanager
 from dataclasses import dataclass
 from itertools import groupby
@@ -25,6 +25,12 @@ REFUSED = "refused"
 
 MOST_TOGETHER = 16
 """Largest number of tasks of a group that go to another process together."""
+
+
+PATIENCE_SECONDS = 20.0
+"""Time after which a process hands back the finished records of a bundle."""
+SHARED_RATIO = 4.0
+"""The same in units of the time of its first record, most of which may be shared data that the rest needs again."""
 
 
 CONNECT_SECONDS = 10.0
@@ -176,12 +182,22 @@ def _cluster(address: str) -> Iterator[tuple[Executor, int]]:
 
 
 def _computed_elsewhere(tasks: Sequence[Task[R]], executor: Executor, n_workers: int) -> Iterator[R]:
-    futures: list[Future[list[R]]] = []
-    try:
+    left: dict[Future[list[R]], Sequence[Callable[[], R]]] = {}
+
+    def submit(bundle: Sequence[Callable[[], R]]) -> None:
         with uninterrupted():  # a process that is known to nobody until it has started would wait for ever
-            futures = [executor.submit(_all_computed, bundle) for bundle in _bundles(tasks, n_workers)]
-        for future in as_completed(futures):
-            yield from future.result()
+            left[executor.submit(_computed_for_a_while, bundle)] = bundle
+
+    try:
+        for bundle in _bundles(tasks, n_workers):
+            submit(bundle)
+        while left:
+            for future in wait(left, return_when=FIRST_COMPLETED).done:
+                computed, records = left[future], future.result()
+                if len(records) < len(computed):
+                    submit(computed[len(records) :])
+                del left[future]
+                yield from records
     except BrokenExecutor as error:
         reason = str(error) or type(error).__name__
         raise StudyError(
@@ -194,7 +210,7 @@ def _computed_elsewhere(tasks: Sequence[Task[R]], executor: Executor, n_workers:
             f"the scene cannot be sent to another process ({reason}): write its functions as formulas"
         ) from error
     finally:
-        for future in futures:
+        for future in left:
             future.cancel()
 
 
@@ -207,8 +223,15 @@ def _bundles(tasks: Sequence[Task[R]], n_workers: int) -> Iterator[list[Callable
         yield from (left[first : first + size] for first in range(0, len(left), size))
 
 
-def _all_computed(bundle: Sequence[Callable[[], R]]) -> list[R]:
-    return [compute() for compute in bundle]
+def _computed_for_a_while(bundle: Sequence[Callable[[], R]]) -> list[R]:
+    """Compute the first records of a bundle; the rest is computed elsewhere, since what takes long must not be lost."""
+    begin, records = time.perf_counter(), [bundle[0]()]
+    longest = max(PATIENCE_SECONDS, SHARED_RATIO * (time.perf_counter() - begin))
+    for compute_record in bundle[1:]:
+        if time.perf_counter() - begin > longest:
+            break
+        records.append(compute_record())
+    return records
 
 
 def _prepare_process() -> None:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
+from threading import Event
 
 import h5py
 import pytest
@@ -16,6 +18,7 @@ from bemkit.atomic_files import OutputFileError
 from bemkit.cli.options import study_output
 from bemkit.cli.outputs import Outputs, TextFile
 from bemkit.cli.progress import compute_with_progress
+from bemkit.studies import engine
 from bemkit.studies.engine import Task, compute
 from bemkit.studies.row_file import RowFile, RowFileError
 from bemkit.table import Table, column
@@ -129,6 +132,28 @@ def test_a_table_obeys_the_ending_of_its_file(tmp_path: Path, ending: str, begin
             assert dict(file["value"].attrs) == {"unit": "m2", "meaning": "its square"}
     else:
         assert path.read_text().startswith(begin)
+
+
+def test_a_long_bundle_hands_back_what_is_finished(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A study that is killed loses only what its processes have not handed back."""
+    monkeypatch.setattr(engine, "PATIENCE_SECONDS", 0.0)
+    has_arrived = Event()
+
+    def slow(number: int) -> Square:
+        time.sleep(0.05 * number)  # longer than four times the first one
+        return Square(number, 0.0)
+
+    def last() -> Square:
+        return Square(2, float(has_arrived.wait(10.0)))
+
+    computations = (partial(slow, 0), partial(slow, 1), last)
+    shared = [Task(number, "", each, group="one body") for number, each in enumerate(computations)]
+    records = []
+    with ThreadPoolExecutor(1) as executor:
+        for record in compute(shared, executor):
+            records.append(record)
+            has_arrived.set()
+    assert records == [Square(0, 0.0), Square(1, 0.0), Square(2, 1.0)]
 
 
 def test_an_ending_that_no_table_has_is_refused(tmp_path: Path) -> None:
