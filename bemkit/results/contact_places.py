@@ -202,10 +202,13 @@ class ContactPlaces:
 
         solution, degree = self.solution, self.lowest_degree
         if degree <= 2:
-            share = np.ones(solution.contact.n_contact)
+            share, at_ends = np.ones(solution.contact.n_contact), 0.0
             for contact in solution.contact.parts:
-                share[solution.contact.rows(contact)] = self._counted_shares(contact, FAR_END_SHARE[degree - 1])
-            return nodal_error(solution.contact, degree, solution.n_sides, share)
+                rows = solution.contact.rows(contact)
+                share[rows] = self._counted_shares(contact, FAR_END_SHARE[degree - 1])
+                at_ends += solution.n_sides(contact) * self._error_at_held_ends(contact, share[rows])
+            at_nodes = nodal_error(solution.contact, degree, solution.n_sides, share)
+            return None if at_nodes is None else at_nodes + at_ends
         if not any(chosen.size for chosen in self._counted.values()):
             return None
         squared, _ = self._transition_errors
@@ -228,6 +231,19 @@ class ContactPlaces:
             is_excluded[np.clip(np.searchsorted(ends, s + side), 0, elements.size - 1)] for side in (-margin, margin)
         )
         return np.where(before & after, 0.0, np.where(before | after, far_end_share, 1.0))
+
+    def _error_at_held_ends(self, contact: str, share: FloatArray) -> float:
+        """Return the squared error [Pa^2 m] of a contact beyond its first and its last node, by their shares."""
+        from bemkit.results.error_indicators import continuation_error
+
+        table, length = self.solution.contact, self.sides(contact)[0].length
+        if contact in table.circumferences:
+            return 0.0
+        rows = table.rows(contact)
+        s, tractions = table.s[rows], np.stack([table.sigma_n, table.sigma_t], axis=1)[rows]
+        at_start = continuation_error(s, tractions, self.lowest_degree)
+        at_end = continuation_error((length - s)[::-1], tractions[::-1], self.lowest_degree)
+        return float(share[0] * at_start + share[-1] * at_end)
 
     def _squared_error_on(self, name: str, part: str) -> float:
         """Return the squared error [Pa^2 m] on the counted elements of a part, by its coefficients and its neighbours.

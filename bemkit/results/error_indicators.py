@@ -222,6 +222,32 @@ def nodal_error(contact: ContactTable, degree: int, n_sides: Callable[[str], int
     return squared if has_estimate else None
 
 
+def continuation_error(s: FloatArray, tractions: FloatArray, degree: int) -> float:
+    """Estimate the squared L2 error [Pa^2 m] of tractions that go on to a node that a support holds.
+
+    Parameters
+    ----------
+    s : (n,) array [m]
+        Distances of the nodes from that node.
+    tractions : (n, 2) array [Pa]
+        At these nodes, the nearest first.
+    degree : int
+        Of the displacements: 1 or 2.
+
+    Notes
+    -----
+    Linear elements go on with the traction of their other node, quadratic ones with a line. The next difference, d at
+    the held node, is missing: h d^2 / 3 with the distance h of the nearest node. Zero if there are too few nodes.
+    """
+    if s.size <= degree:
+        return 0.0
+    slopes = np.diff(tractions[: degree + 1], axis=0) / np.diff(s[: degree + 1])[:, None]
+    difference = s[0] * slopes[0]
+    if degree == 2:
+        difference = s[0] * s[1] / (s[2] - s[0]) * (slopes[1] - slopes[0])
+    return float(s[0] * (difference @ difference) / 3.0)
+
+
 def mean_traction_errors(mesh: BoundaryMesh, traction: FloatArray) -> FloatArray:
     """Estimate how far constant tractions on the surface of a half-plane are from the exact ones at element centres.
 

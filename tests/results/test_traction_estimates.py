@@ -8,11 +8,12 @@ from functools import cache
 
 import numpy as np
 import pytest
+from scipy.integrate import trapezoid
 
 import bemkit as bk
 from bemkit.results.contact_places import FAR_END_SHARE
 from bemkit.results.contact_table import ContactTable
-from bemkit.results.error_indicators import nodal_error
+from bemkit.results.error_indicators import continuation_error, nodal_error
 from bemkit.results.solution import Solution
 from bemkit.solvers.active_sets import NodeStatus
 from checks.calibration.true_errors import true_errors
@@ -219,3 +220,32 @@ def test_linear_elements_on_flat_sides_are_not_much_too_stiff() -> None:
     _, tractions = true_errors(coarse, fine)
     assert coarse.estimated_traction_error is not None
     assert 0.5 < coarse.estimated_traction_error / tractions < 3.0
+
+
+@pytest.mark.parametrize("degree", [1, 2])
+def test_tractions_continued_to_a_held_node_miss_the_next_power(degree: int) -> None:
+    """Linear elements go on with a constant and miss a line, quadratic ones go on with a line and miss a parabola."""
+    s, x = np.arange(1.0, 4.0), np.linspace(0.0, 1.0, 101)
+    tractions = np.stack([s, -2.0 * s], axis=1) ** degree
+    missed = x - 1.0 if degree == 1 else (x - 1.0) * (x - 2.0)
+    squared = (1.0 + 4.0**degree) * float(trapezoid(missed**2, x))
+    assert 0.75 * continuation_error(s, tractions, degree) < squared < 1.001 * continuation_error(s, tractions, degree)
+    assert continuation_error(s[:degree], tractions[:degree], degree) == 0.0
+
+
+@pytest.mark.parametrize("wall", ["left", "right"])
+def test_ends_of_contact_at_a_support_count(wall: str) -> None:
+    """The wall holds the node where pressure would be lowest: linear elements keep that of its neighbour."""
+    parts = (
+        bk.Part("contact", bk.Contact(bk.RigidHalfPlane()), sides=("bottom",)),
+        bk.Part("wall", bk.Clamped(), sides=(wall,)),
+        bk.Part("top", bk.Pressure(2.7e-4), sides=("top",)),
+    )
+    scene = bk.Scene(
+        title="block at a wall", shape=bk.Rectangle(1.0, 1.13), material=bk.Material(1.0, 0.3), parts=parts,
+        law=bk.Frictionless(), discretisation=bk.Galerkin(1), mesh=bk.MeshOptions(elements=42),
+    )  # fmt: skip
+    coarse = bk.run(scene)
+    _, tractions = true_errors(coarse, bk.run(replace(scene, discretisation=bk.Galerkin(2), mesh=LAYERS)))
+    assert coarse.estimated_traction_error is not None
+    assert 0.7 < coarse.estimated_traction_error / tractions < 2.0  # 0.3 without that
