@@ -61,12 +61,14 @@ def ignore_round_off(axes: Axes, scale: float, axis: Literal["x", "y"] = "y") ->
     axis : {"x", "y"}
         Position of the values.
     """
+    from bemkit.pictures.number_axis import PlainNumbers
+
     low, high = axes.dataLim.intervaly if axis == "y" else axes.dataLim.intervalx
     if 0.0 <= high - low < _NOISE * scale:  # of the values: axes of a single one are widened by matplotlib
         middle = 0.5 * (low + high)
         flat = middle - _FLAT * scale, middle + _FLAT * scale
         _ = axes.set_ylim(flat) if axis == "y" else axes.set_xlim(flat)
-    axes.ticklabel_format(axis=axis, scilimits=(-2, 3), useMathText=True, useOffset=False)
+    (axes.yaxis if axis == "y" else axes.xaxis).set_major_formatter(PlainNumbers())
 
 
 BELOW = "below"

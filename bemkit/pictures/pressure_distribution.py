@@ -15,6 +15,8 @@ def draw_pressure_distribution(solution: Result, part: str, axes: Axes | None = 
     The area below is the share of the contact that touches, which the title states. See
     `bemkit.pictures.contact_curves.draw_contact_displacement` for the parameters.
     """
+    from bemkit.pictures.number_axis import PlainNumbers
+
     units, axes = solution.units, axes_or_new(axes, 5.6, 4.0)
     shares = list(pressure_shares(solution.contact, part))
     edges = [0.0, *(each.pressure_to for each in shares)]
@@ -27,7 +29,8 @@ def draw_pressure_distribution(solution: Result, part: str, axes: Axes | None = 
     axes.set_xlabel(with_unit("pressure", "stress", units))
     unit = unit_of("stress", units)
     axes.set_ylabel(f"probability density [1/{unit}]" if unit else "probability density")
-    axes.ticklabel_format(scilimits=(-2, 3), useMathText=True)
+    for axis in (axes.xaxis, axes.yaxis):
+        axis.set_major_formatter(PlainNumbers())
     axes.set_xlim(left=0.0)
     axes.set_ylim(bottom=0.0)
     show_grid(axes)

@@ -113,11 +113,14 @@ def _draw_scale(axes: Axes, levels: FloatArray, chosen: StressMeasure, units: Un
     from matplotlib.colors import BoundaryNorm
     from matplotlib.ticker import MaxNLocator
 
+    from bemkit.pictures.number_axis import PlainNumbers
+
     norm = BoundaryNorm(levels.tolist(), 256, extend="max" if chosen.is_positive else "both")
     scale = ScalarMappable(norm, colormaps[_colours(chosen)])
     figure = axes.get_figure(root=True)
     place = axes.inset_axes((1.03, 0.0, 0.04, 1.0))
     ticks = MaxNLocator(6, steps=[1, 2, 5, 10])
-    bar = figure.colorbar(scale, cax=place, ticks=ticks, spacing="proportional")  # type: ignore[union-attr]
-    bar.ax.ticklabel_format(scilimits=(-2, 3), useMathText=True, useOffset=False)
+    bar = figure.colorbar(  # type: ignore[union-attr]
+        scale, cax=place, ticks=ticks, format=PlainNumbers(), spacing="proportional"
+    )
     bar.set_label(with_unit(chosen.symbol, "stress", units))

@@ -8,11 +8,13 @@ from pathlib import Path
 import matplotlib.image
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 from matplotlib.text import Annotation, Text
 
 import bemkit as bk
 from bemkit.geometry import Polygon
 from bemkit.pictures import figures, save_pictures
+from bemkit.pictures.drawing import ignore_round_off
 from bemkit.pictures.outline import draw_outline
 from bemkit.pictures.publication import fitted
 from bemkit.scene.toml import with_overrides
@@ -62,3 +64,14 @@ def test_names_of_short_sides_do_not_cover_each_other() -> None:
     assert len(labels) == 11
     boxes = [label.get_window_extent() for label in labels]
     assert not any(first.overlaps(second) for first, second in combinations(boxes, 2))
+
+
+def test_numbers_beside_axes_are_plain_text_below_a_power_of_ten() -> None:
+    axes = Figure().add_subplot()
+    axes.plot([0.0, 1.0], [-3e-5, 2e-5])
+    ignore_round_off(axes, 1e-5)
+    axes.get_figure().draw_without_rendering()
+    texts = [label.get_text() for label in axes.get_yticklabels()]
+    assert "\u22123" in texts
+    assert not any("$" in text for text in texts)
+    assert axes.yaxis.get_offset_text().get_text().startswith(r"$\times\mathdefault{10^{")
