@@ -73,6 +73,17 @@ def test_the_ends_of_every_axis_are_right_or_named(
             assert row.message
 
 
+def test_axes_make_the_scenes_that_they_name() -> None:
+    baseline = bk.run(small_paper_scene(1, 24))
+    values = {"position": 1e3, "poisson-ratio": 0.4, "rho-augmented": 7.0, "elements": 1.5}
+    scenes = {axis.name: axis.make(baseline, values[axis.name]).scene for axis in find_axes(list(values))}
+    moved = scenes["position"].build_mesh().centres.mean(axis=0) - baseline.mesh.centres.mean(axis=0)
+    np.testing.assert_allclose(moved, np.array([0.8, -0.6]) * 1e3 * baseline.mesh.diameter, rtol=1e-12)
+    assert scenes["poisson-ratio"].material.poisson_ratio == 0.4
+    assert scenes["rho-augmented"].solver == bk.AugmentedLagrangian(rho_n=7.0, rho_t=7.0)
+    assert scenes["elements"].mesh.elements == 36
+
+
 @pytest.mark.parametrize("elements", [64, 65])
 @pytest.mark.slow
 def test_curved_bodies_far_away_are_what_they_are_at_home(elements: int) -> None:

@@ -41,7 +41,6 @@ def test_meshes_of_several_bodies_follow_the_solution(name: str) -> None:
     assert not verify([name], quick=True).missed
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     "name",
     slow_except(["westergaard", "disc-between-plates", "paper-1", "paper-2", "complete-contact-90"], "paper-1"),

@@ -199,7 +199,6 @@ def test_no_row_is_wrong_along_axes_that_say_something(name: str) -> None:
         assert row.verdict in ("right", "named"), (axis.name, row.message)
 
 
-@pytest.mark.slow
 def test_a_half_plane_is_pushed_to_the_edge_of_sliding() -> None:
     baseline = bk.run(replace(WAVY, mesh=bk.MeshOptions(elements=64)))
     (axis,) = find_axes(["sliding"])
