@@ -8,6 +8,7 @@ from scipy import sparse
 
 from benchmarks import fem
 from tests.scenes import paper, reference_values
+from tests.slow import slow_except
 
 
 @pytest.fixture(params=["PARDISO", "SuperLU"])
@@ -48,7 +49,7 @@ def test_layers_shrink_towards_breaks_and_short_pieces_spare_some() -> None:
     np.testing.assert_allclose(line.ends, [0.0, 0.02, 0.1, 0.5, 0.9, 0.98, 1.0, 1.01, 1.05, 1.1])
 
 
-@pytest.mark.parametrize("example", [1, 2])
+@pytest.mark.parametrize("example", slow_except([1, 2], 2))
 def test_layered_elements_reach_the_reference(example: int, library: str) -> None:
     values, places = reference_values(example)
     breaks = sorted({0.0, *places, *([0.5, 1.0] if example == 1 else [0.5])})

@@ -35,7 +35,7 @@ from bemkit.scene.steps import Step
 from bemkit.scene.toml import load_scene, scene_from_toml, scene_to_toml, shipped_files
 from bemkit.solvers.base import Status
 from bemkit.solvers.ssn import SemismoothNewton
-from tests.slow import slow_except
+from tests.slow import slow_except, slow_only
 
 pytestmark = pytest.mark.usefixtures("here")
 SMALL = ["--elements", "40"]
@@ -418,6 +418,7 @@ def test_ctrl_c_that_python_drops_while_a_command_loads_ends_it(
     assert "bemkit: error: interrupted" in capsys.readouterr().err
 
 
+ENDINGS = (signal.SIGINT, 130, "interrupted"), (signal.SIGTERM, 143, "terminated")
 STAGES = {
     "compression": (bemkit.operators.hierarchy.skeletons.LevelView, "skeleton"),
     "contact step": (SemismoothNewton, "step"),
@@ -425,9 +426,12 @@ STAGES = {
 }
 
 
-@pytest.mark.parametrize("stage", STAGES)
 @pytest.mark.parametrize(
-    ("sent", "code", "word"), [(signal.SIGINT, 130, "interrupted"), (signal.SIGTERM, 143, "terminated")]
+    ("stage", "sent", "code", "word"),
+    slow_only(
+        [(stage, *ending) for stage in STAGES for ending in ENDINGS],
+        *((stage, *ENDINGS[1]) for stage in ("contact step", "writing")),
+    ),
 )
 def test_a_compressed_run_that_is_ended_says_so_and_leaves_no_file(
     stage: str,

@@ -45,7 +45,13 @@ def relative_error(example: int, solution: bk.Solution, *names: str) -> float:
     return float(np.sqrt(miss / size))
 
 
-@pytest.fixture(params=[(1, "ssn"), (1, "alm"), (2, "ssn"), (2, "alm")], ids=lambda p: f"paper-{p[0]}-{p[1]}")
+CASES = [
+    pytest.param((example, driver), id=f"paper-{example}-{driver}", marks=marks)
+    for example, driver, marks in ((1, "ssn", ()), (1, "alm", ()), (2, "ssn", ()), (2, "alm", pytest.mark.slow))
+]
+
+
+@pytest.fixture(params=CASES)
 def case(request: pytest.FixtureRequest) -> tuple[int, str]:
     return request.param  # type: ignore[no-any-return]
 

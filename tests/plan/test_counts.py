@@ -13,6 +13,7 @@ from bemkit.operators.counts import Entries, Factorisation, FactorKind, Operatio
 from bemkit.plan import make_plan
 from bemkit.results.result_file import read_result, write_result
 from bemkit.scene.toml import load_scene, with_overrides
+from tests.slow import slow_only
 
 LAW_OF_ITS_OWN = bk.Contact(bk.RigidHalfPlane((1.0, 0.0), (-1.0, 0.0)), law=bk.Frictionless())
 
@@ -83,7 +84,19 @@ SCENES: dict[str, Callable[[], bk.Scene]] = {
 }
 
 
-@pytest.mark.parametrize("kind", SCENES)
+@pytest.mark.parametrize(
+    "kind",
+    slow_only(
+        SCENES,
+        "frictionless, linear",
+        "no contact, quadratic",
+        "curved, linear",
+        "exterior, quadratic",
+        "load history",
+        "symmetry, constant",
+        "nu = 1/2, quadratic",
+    ),
+)
 def test_a_run_counts_what_its_plan_foresees(kind: str) -> None:
     scene = SCENES[kind]()
     planned = make_plan(scene, scene.build_mesh()).work

@@ -50,6 +50,7 @@ SLOW += [(case, DISCRETISATIONS[0], 0.5) for case in ("disk", "ring")] + [
     ("disk", DISCRETISATIONS[1], 0.5),
     ("ring", DISCRETISATIONS[1], 0.5),
 ]
+SLOW += [("ring", DISCRETISATIONS[2], 0.5)]
 SLOW += [(case, DISCRETISATIONS[1], 0.3) for case in ("plate with a hole", "square")] + [
     ("ring", DISCRETISATIONS[1], 0.5)
 ]
