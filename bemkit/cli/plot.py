@@ -48,7 +48,7 @@ def plot(
         from bemkit.cli.sources import solved, solved_steps
         from bemkit.pictures.files import ANIMATION, check_place, save_pictures
 
-        if what is None and Path(target).suffix in (".gif", ".mp4"):
+        if what is None and Path(target).suffix.lower() in (".gif", ".mp4"):
             what = (ANIMATION,)
         reserve(check_place(target, what))
         moves = what is not None and ANIMATION in what

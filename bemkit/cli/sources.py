@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
 
 from bemkit.errors import InputError, concerning
 from bemkit.pictures.shown import Result
@@ -27,13 +26,10 @@ def solved(source: str, callback: Callable[[StepRecord], None] | None) -> Result
 
 
 def solved_steps(source: str, callback: Callable[[StepRecord], None] | None) -> Sequence[Result]:
-    """Return the solutions of all load steps of a scene, or of the finished ones in a result file."""
+    """Return the solutions of the finished load steps, the last one with the status of the whole history."""
+    solution = solved(source, callback)
+    if solution.loading is not None:
+        return [*solution.each_step()[:-1], solution]
     if Path(source).suffix.lower() in RESULT_ENDINGS:
-        solution = read_result(source)
-        if solution.loading is None:
-            raise InputError(f"{source}: the result has no load steps: give a scene with [[steps]] or load_factors")
-        return solution.each_step()
-    scene: Any = load_scene(source)
-    with concerning(source):
-        steps: Sequence[Result] = run([scene], callback=callback)
-    return steps
+        raise InputError(f"{source}: the result has no load steps: give a scene with [[steps]] or load_factors")
+    return [solution]

@@ -7,9 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from bemkit.errors import InputError
+from bemkit.errors import InputError, NoResultError
 from bemkit.runs.run import run
 from bemkit.scene.scene import Scene
+
+
+class UnsolvedHistoryError(NoResultError):
+    """A load history that does not converge up to its end."""
 
 
 @dataclass(frozen=True)
@@ -50,7 +54,9 @@ def increment_errors(scene: Scene) -> IncrementErrors:
     Raises
     ------
     InputError
-        If the scene has a single load or an accuracy, whose meshes would differ, or one of the runs does not converge.
+        If the scene has a single load or an accuracy, whose meshes would differ.
+    UnsolvedHistoryError
+        If one of the runs does not converge.
     ValueError
         As for `bemkit.run`.
     """
@@ -63,7 +69,7 @@ def increment_errors(scene: Scene) -> IncrementErrors:
     coarse, fine = (run([each]) for each in (scene, with_halved_increments(scene)))
     for steps, words in ((coarse, "as stated"), (fine, "with halved increments")):
         if not steps[-1].is_converged:
-            raise InputError(f"the history {words} is not solved: {steps[-1].message}")
+            raise UnsolvedHistoryError(f"the history {words} is not solved: {steps[-1].message}")
     whole, halves = (steps[-1].loading.total() for steps in (coarse, fine))
     return IncrementErrors(
         len(coarse),

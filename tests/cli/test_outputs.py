@@ -50,6 +50,22 @@ def test_report_and_plot_have_the_exit_code_of_run(without: Callable[..., None])
     assert call("report", "bad.h5", "-o", "r.html", "-q") == 1
 
 
+def test_the_animation_of_a_history_that_fails_has_its_exit_code(capsys) -> None:
+    """All of its finished steps are right."""
+    parts = (
+        bk.Part("floor", bk.Contact(bk.RigidHalfPlane()), sides=("bottom",)),
+        bk.Part("top", bk.Traction(y=-1.0), sides=("top",)),
+    )
+    slides = bk.Step(2.0, {"parts.top.condition.x": 0.9})
+    scene = bk.Scene(
+        title="slides", shape=bk.Rectangle(1.0, 1.0), material=bk.Material(1e4, 0.2), law=bk.Coulomb(0.5), parts=parts,
+        mesh=bk.MeshOptions(elements=16), steps=(bk.Step(1.0), slides),
+    )  # fmt: skip
+    bk.write_result("bad.h5", bk.run(scene))
+    assert call("plot", "bad.h5", "-o", "a.gif", "-q") == 1
+    assert "unsolvable_load" in capsys.readouterr().err
+
+
 def test_a_reference_belongs_to_a_scene_whatever_its_units_and_linear_solver() -> None:
     scene = bk.load_scene("wavy-obstacle")
     assert find_reference(dataclasses.replace(scene, linear_solver=bk.DenseCholesky())) is not None

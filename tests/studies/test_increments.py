@@ -10,7 +10,7 @@ import pytest
 
 import bemkit as bk
 from bemkit.cli.main import main
-from bemkit.studies.increments import increment_errors, with_halved_increments
+from bemkit.studies.increments import UnsolvedHistoryError, increment_errors, with_halved_increments
 
 LOOP = replace(bk.load_scene("friction-loop"), mesh=bk.MeshOptions(elements=32))
 
@@ -55,12 +55,16 @@ def test_bodies_without_friction_follow_no_path() -> None:
     [
         (bk.load_scene("paper-1"), "the scene has a single load: increments need"),
         (replace(LOOP, discretisation=bk.Galerkin(2), mesh=bk.MeshOptions(accuracy=0.1)), "the scene has an accuracy"),
-        (replace(loop(1), solver=bk.SemismoothNewton(max_steps=1)), "the history as stated is not solved: "),
     ],
 )
 def test_refusals(scene: bk.Scene, message: str) -> None:
     with pytest.raises(bk.InputError, match=message):
         increment_errors(scene)
+
+
+def test_a_history_that_fails_has_no_errors() -> None:
+    with pytest.raises(UnsolvedHistoryError, match="the history as stated is not solved: "):
+        increment_errors(replace(loop(1), solver=bk.SemismoothNewton(max_steps=1)))
 
 
 def test_the_command_prints_and_writes_them(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
