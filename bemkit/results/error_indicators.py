@@ -34,7 +34,7 @@ wave number k, of saw teeth h^3 |step|^2 / 115 for each element and of parabolas
 are wrong nearby leave more."""
 CONTACT_CALIBRATION = (1.0 / 8.0, 1.0 / 16.0)
 """Factors between second differences of nodal contact tractions and their squared errors."""
-PAIR_CALIBRATION = (1.0, 1.25)
+PAIR_CALIBRATION = (1.0, 1.75)
 """Further factors between two elastic bodies, where tractions follow the elements of both sides."""
 STIFFNESS_CALIBRATION = (1.0, 0.15)
 """Factors between squared relative errors in the energy norm and relative errors of contact tractions, for degree 1 and

@@ -149,12 +149,12 @@ def l2_errors(solution: bk.Solution, exact: bk.Solution) -> tuple[float, float]:
 
 @pytest.mark.parametrize("accuracy", slow_except([1e-2, 1e-3, 1e-4, 1e-5], 1e-2))
 def test_what_is_asked_for_is_reached_but_at_the_corners(accuracy: float) -> None:
-    """The estimate holds to a factor of 2.5; at the corners errors in L2 stay above a few per mille."""
+    """The estimate holds to a factor of 3; at the corners errors in L2 stay above a few per mille."""
     solution, exact = solved(accuracy), solved(0.05 * accuracy)
     counted, everywhere = l2_errors(solution, exact)
     assert solution.is_converged
     assert solution.estimated_traction_error is not None
-    assert 0.4 <= solution.estimated_traction_error / counted <= 2.5
+    assert 0.4 <= solution.estimated_traction_error / counted <= 3.0
     assert counted <= 1.2 * accuracy
     assert everywhere >= 4e-3
     assert abs(solution.energy / exact.energy - 1.0) <= accuracy**2
