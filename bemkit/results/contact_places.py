@@ -200,7 +200,7 @@ class ContactPlaces:
         """
         from bemkit.results.error_indicators import nodal_error
 
-        solution, degree = self.solution, self.lowest_degree
+        solution, degree = self.solution, max(self.lowest_degree, 1)  # constant elements count as linear
         if degree <= 2:
             share, at_ends = np.ones(solution.contact.n_contact), 0.0
             for contact in solution.contact.parts:
@@ -233,16 +233,20 @@ class ContactPlaces:
         return np.where(before & after, 0.0, np.where(before | after, far_end_share, 1.0))
 
     def _error_at_held_ends(self, contact: str, share: FloatArray) -> float:
-        """Return the squared error [Pa^2 m] of a contact beyond its first and its last node, by their shares."""
+        """Return the squared error [Pa^2 m] of a contact beyond its first and its last node, by their shares.
+
+        Nodes of constant elements do not lie at their ends.
+        """
         from bemkit.results.error_indicators import continuation_error
 
-        table, length = self.solution.contact, self.sides(contact)[0].length
-        if contact in table.circumferences:
+        table, side = self.solution.contact, self.sides(contact)[0]
+        degree = int(self._degrees[side.body].min())
+        if degree == 0 or contact in table.circumferences:
             return 0.0
         rows = table.rows(contact)
         s, tractions = table.s[rows], np.stack([table.sigma_n, table.sigma_t], axis=1)[rows]
-        at_start = continuation_error(s, tractions, self.lowest_degree)
-        at_end = continuation_error((length - s)[::-1], tractions[::-1], self.lowest_degree)
+        at_start = continuation_error(s, tractions, degree)
+        at_end = continuation_error((side.length - s)[::-1], tractions[::-1], degree)
         return float(share[0] * at_start + share[-1] * at_end)
 
     def _squared_error_on(self, name: str, part: str) -> float:

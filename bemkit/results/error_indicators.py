@@ -232,13 +232,15 @@ def continuation_error(s: FloatArray, tractions: FloatArray, degree: int) -> flo
     tractions : (n, 2) array [Pa]
         At these nodes, the nearest first.
     degree : int
-        Of the displacements: 1 or 2.
+        Of the displacements, at least 1.
 
     Notes
     -----
     Linear elements go on with the traction of their other node, quadratic ones with a line. The next difference, d at
     the held node, is missing: h d^2 / 3 with the distance h of the nearest node. Zero if there are too few nodes.
+    Higher degrees count as quadratic.
     """
+    degree = min(degree, 2)
     if s.size <= degree:
         return 0.0
     slopes = np.diff(tractions[: degree + 1], axis=0) / np.diff(s[: degree + 1])[:, None]

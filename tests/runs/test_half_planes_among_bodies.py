@@ -51,6 +51,15 @@ def test_wavy_half_planes_touch_on_the_length_of_westergaard(share: float) -> No
     assert solution.force_normal == pytest.approx(share * np.pi * HERTZ_MODULUS * WAVE, rel=1e-10)
 
 
+def test_tractions_of_two_half_planes_have_an_estimate() -> None:
+    """It falls by more than two with twice the elements."""
+    coarse, fine = (bk.run(wavy(0.5, n, law=bk.Coulomb(0.3))).estimated_traction_error for n in (30, 60))
+    assert coarse is not None
+    assert fine is not None
+    assert 2.0 < coarse / fine < 4.0
+    assert 0.01 < fine < 0.03
+
+
 @pytest.mark.slow
 def test_wavy_half_planes_are_sheared_in_steps() -> None:
     """Partial slip by Jaeger's principle: the stick zone is the contact under the pressure less T / mu, at T < mu P."""
