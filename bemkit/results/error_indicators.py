@@ -243,11 +243,12 @@ def continuation_error(s: FloatArray, tractions: FloatArray, degree: int) -> flo
     degree = min(degree, 2)
     if s.size <= degree:
         return 0.0
-    slopes = np.diff(tractions[: degree + 1], axis=0) / np.diff(s[: degree + 1])[:, None]
+    steps = np.diff(s[: degree + 1])
+    slopes = np.diff(tractions[: degree + 1], axis=0) / np.where(steps > 0.0, steps, np.inf)[:, None]  # 0 at a corner
     difference = s[0] * slopes[0]
     if degree == 2:
         difference = s[0] * s[1] / (s[2] - s[0]) * (slopes[1] - slopes[0])
-    return float(s[0] * (difference @ difference) / 3.0)
+    return max(float(s[0]), 0.0) * float(difference @ difference) / 3.0
 
 
 def mean_traction_errors(mesh: BoundaryMesh, traction: FloatArray) -> FloatArray:

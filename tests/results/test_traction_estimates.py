@@ -231,6 +231,9 @@ def test_tractions_continued_to_a_held_node_miss_the_next_power(degree: int) -> 
     squared = (1.0 + 4.0**degree) * float(trapezoid(missed**2, x))
     assert 0.75 * continuation_error(s, tractions, degree) < squared < 1.001 * continuation_error(s, tractions, degree)
     assert continuation_error(s[:degree], tractions[:degree], degree) == 0.0
+    at_corner = np.array([1.0, 1.0, 2.0])  # two nodes of one point, where one side follows another
+    assert np.isfinite(continuation_error(at_corner, tractions, degree))
+    assert continuation_error(s - 1.0 - 1e-17, tractions, degree) == 0.0
 
 
 @pytest.mark.parametrize("wall", ["left", "right"])
