@@ -13,7 +13,7 @@ from bemkit.arrays import FloatArray, IntArray
 from bemkit.contact.body import SlipHistory
 from bemkit.geometry.local_values import element_degrees
 from bemkit.geometry.mesh import BoundaryMesh
-from bemkit.geometry.neighbours import along_boundary
+from bemkit.geometry.neighbours import along_boundary, at_arc_lengths
 from bemkit.geometry.vectors import norms
 from bemkit.results.contact_table import ContactTable
 from bemkit.results.transitions import (
@@ -198,56 +198,43 @@ class ContactPlaces:
         Elements of degree 3 and more have estimates by their coefficients; if a body has lower degrees, nodes have.
         Those near `singular_points` are excluded. None if too few are left.
         """
-        from bemkit.results.error_indicators import nodal_error
-
-        solution, degree = self.solution, max(self.lowest_degree, 1)  # constant elements count as linear
-        if degree <= 2:
-            share, at_ends = np.ones(solution.contact.n_contact), 0.0
-            for contact in solution.contact.parts:
-                rows = solution.contact.rows(contact)
-                share[rows] = self._counted_shares(contact, FAR_END_SHARE[degree - 1])
-                at_ends += solution.n_sides(contact) * self._error_at_held_ends(contact, share[rows])
-            at_nodes = nodal_error(solution.contact, degree, solution.n_sides, share)
-            return None if at_nodes is None else at_nodes + at_ends
+        if self.lowest_degree <= 2:
+            return self._squared_error_at_nodes()
         if not any(chosen.size for chosen in self._counted.values()):
             return None
         squared, _ = self._transition_errors
-        for contact in solution.contact.parts:
-            name, part = solution.contact_sides[contact][0]
-            squared += solution.n_sides(contact) * self._squared_error_on(name, part)
+        for contact in self.solution.contact.parts:
+            name, part = self.solution.contact_sides[contact][0]
+            squared += self.solution.n_sides(contact) * self._squared_error_on(name, part)
         return squared
 
-    def _counted_shares(self, contact: str, far_end_share: float) -> FloatArray:
-        """Return the share of the squared error of the nodes of a contact: of none on excluded elements only.
+    def _squared_error_at_nodes(self) -> float | None:
+        """Return the squared error of linear and quadratic elements; constant ones take the factors of linear ones."""
+        from bemkit.results.error_indicators import continuation_error, nodal_error
+
+        table, degree, at_ends = self.solution.contact, max(self.lowest_degree, 1), 0.0
+        share, tractions = np.ones(table.n_contact), np.stack([table.sigma_n, table.sigma_t], axis=1)
+        for contact in table.parts:
+            rows, side = table.rows(contact), self.sides(contact)[0]
+            s, own_degree = table.s[rows], int(self._degrees[side.body].min())
+            share[rows] = shares = self._counted_shares(side, s, FAR_END_SHARE[degree - 1])
+            if own_degree == 0 or contact in table.circumferences:  # nodes at centres; no ends
+                continue
+            at_start = continuation_error(s, tractions[rows], own_degree)
+            at_end = continuation_error((side.length - s)[::-1], tractions[rows][::-1], own_degree)
+            at_ends += self.solution.n_sides(contact) * float(shares[0] * at_start + shares[-1] * at_end)
+        at_nodes = nodal_error(table, degree, self.solution.n_sides, share)
+        return None if at_nodes is None else at_nodes + at_ends
+
+    def _counted_shares(self, side: Side, s: FloatArray, far_end_share: float) -> FloatArray:
+        """Return the share (n,) of the squared error at nodes (n,) [m] of a side: of none on excluded elements only.
 
         At the far end of an excluded element the second difference takes nodes nearer to the singular point.
         """
-        (name, part), table = self.solution.contact_sides[contact][0], self.solution.contact
-        mesh, s = self.solution.bodies[name].mesh, table.s[table.rows(contact)]
-        elements = along_boundary(mesh, mesh.part(part))
-        ends, is_excluded = np.cumsum(mesh.lengths[elements]), ~np.isin(elements, self._counted[name])
-        margin = LYING_AT * ends[-1]
-        before, after = (
-            is_excluded[np.clip(np.searchsorted(ends, s + side), 0, elements.size - 1)] for side in (-margin, margin)
-        )
+        elements = along_boundary(side.mesh, side.mesh.part(side.part))
+        is_excluded, margin = ~np.isin(elements, self._counted[side.body]), LYING_AT * side.length
+        before, after = (is_excluded[at_arc_lengths(side.mesh, elements, s + step)[0]] for step in (-margin, margin))
         return np.where(before & after, 0.0, np.where(before | after, far_end_share, 1.0))
-
-    def _error_at_held_ends(self, contact: str, share: FloatArray) -> float:
-        """Return the squared error [Pa^2 m] of a contact beyond its first and its last node, by their shares.
-
-        Nodes of constant elements do not lie at their ends.
-        """
-        from bemkit.results.error_indicators import continuation_error
-
-        table, side = self.solution.contact, self.sides(contact)[0]
-        degree = int(self._degrees[side.body].min())
-        if degree == 0 or contact in table.circumferences:
-            return 0.0
-        rows = table.rows(contact)
-        s, tractions = table.s[rows], np.stack([table.sigma_n, table.sigma_t], axis=1)[rows]
-        at_start = continuation_error(s, tractions, degree)
-        at_end = continuation_error((side.length - s)[::-1], tractions[::-1], degree)
-        return float(share[0] * at_start + share[-1] * at_end)
 
     def _squared_error_on(self, name: str, part: str) -> float:
         """Return the squared error [Pa^2 m] on the counted elements of a part, by its coefficients and its neighbours.
