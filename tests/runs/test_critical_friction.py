@@ -80,6 +80,12 @@ def test_a_leg_has_three_solutions_above_and_one_below() -> None:
     assert len(distinct_solutions(with_friction(1.02, 48.0))) == 3
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize(("coefficient", "degrees", "number"), [(0.85, 48.0, 1), (0.93, 50.0, 3)])
+def test_a_leg_has_its_solutions_at_other_angles(coefficient: float, degrees: float, number: int) -> None:
+    assert len(distinct_solutions(with_friction(coefficient, degrees))) == number
+
+
 def test_one_of_several_bodies_is_as_critical_as_alone() -> None:
     body = bk.Body(name="leg", shape=LEG.shape, material=LEG.material, parts=LEG.parts, mesh=LEG.mesh)
     assembly = bk.Scene(title="leg", bodies=(body,), law=LEG.law, discretisation=LEG.discretisation)
