@@ -81,8 +81,10 @@ def _at_held_nodes(contact: MeasuredContact, contacts: Iterable[MeasuredContact]
         values = _continued(traction[nodes[own]], is_known[own], nodes[own])[0]
         lengths = boundary.basis[elements[k]] @ boundary.shares[elements[k]]
         force = (np.isin(nodes[k], held) * lengths) @ values
-        distances = norms(contact.table.points - body.solved.boundary.points[nodes[k]][np.isin(nodes[k], held)][0])
-        total += contact.frame[int(np.argmin(distances))] @ force
+        # along the frame of the nearest contact node of the element; others may lie across a thin body
+        beside = np.flatnonzero(np.isin(contact.nodes, nodes[k]))
+        point = body.solved.boundary.points[nodes[k]][np.isin(nodes[k], held)][0]
+        total += contact.frame[beside[int(np.argmin(norms(contact.table.points[beside] - point)))]] @ force
     return total
 
 

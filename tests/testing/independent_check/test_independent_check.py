@@ -37,6 +37,14 @@ def test_right_answers_pass(number: int, discretisation: bk.Galerkin, among: boo
     assert check.reciprocity <= (0.03 if among else 0.02)  # the discretisation error at N = 64, of 16 in the company
 
 
+def test_forces_at_held_corners_have_the_normal_of_their_own_side() -> None:
+    """Across the wall of a ring, nearer than the next node of that side, another part of the contact faces away."""
+    contact = bk.Part("contact", bk.Contact(bk.Gap(-1e-3)), ("outer-4", "inner-3"))
+    held = bk.Part("held", bk.PrescribedDisplacement(x=1e-4, y=0.0), ("inner-4",))
+    solution = run(block(contact, held, shape=bk.Ring(0.8, 1.0), discretisation=LINEAR, mesh=bk.MeshOptions(36)), False)
+    assert violations_of(solution).table <= 1e-12
+
+
 def tampered(solution: bk.Solution, **columns: np.ndarray) -> Violations:
     return violations_of(dataclasses.replace(solution, contact=dataclasses.replace(solution.contact, **columns)))
 
