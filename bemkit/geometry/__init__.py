@@ -30,13 +30,13 @@ from bemkit.geometry.shapes import Shape as Shape
 if TYPE_CHECKING:
     from bemkit.geometry.files.meshio_files import read_mesh as read_mesh
     from bemkit.geometry.files.meshio_files import write_mesh as write_mesh
-    from bemkit.geometry.symmetry import Symmetry as Symmetry
+    from bemkit.geometry.symmetry.lines import Symmetry as Symmetry
 else:
 
     def __getattr__(name: str) -> Any:
         """Import symmetry, and what reads and writes files of meshes, when it is first used."""
         if name == "Symmetry":
-            from bemkit.geometry.symmetry import Symmetry
+            from bemkit.geometry.symmetry.lines import Symmetry
 
             return Symmetry
         if name not in ("read_mesh", "write_mesh"):

@@ -16,7 +16,7 @@ from bemkit.geometry.quadrature import gauss_legendre
 from bemkit.geometry.vectors import norms
 
 if TYPE_CHECKING:
-    from bemkit.geometry.arclength import ArcLength
+    from bemkit.geometry.free_form.arc_length import ArcLength
 
 CURVE_MEMBERS = ("is_straight", "is_analytic", "magnitude", "point", "derivative")
 """Members of every curve; see `Curve`."""
@@ -226,7 +226,7 @@ class ParametricCurve(Curve):
 
     @cached_property
     def _arc_length(self) -> ArcLength:
-        from bemkit.geometry.arclength import ArcLength
+        from bemkit.geometry.free_form.arc_length import ArcLength
 
         return ArcLength(self._velocity)
 

@@ -25,7 +25,7 @@ from bemkit.geometry.quadrature import gauss_legendre
 from bemkit.geometry.vectors import check_magnitude, cross, norms, winding_numbers
 
 if TYPE_CHECKING:
-    from bemkit.geometry.symmetry import Symmetry
+    from bemkit.geometry.symmetry.lines import Symmetry
 
 _N_AREA_POINTS = 10  # round-off on pieces that turn by less than LARGEST_TURNING
 _CURVE_TOLERANCE = 1e-2  # of the chord: finds a wrong curve or span, forgives a body moved here from far away

@@ -23,13 +23,13 @@ from bemkit.geometry.loops import (
     restrict_loops,
     swept_areas,
 )
-from bemkit.geometry.pieces import Elements, Pieces, evaluate_curves, make_pieces
+from bemkit.geometry.pieces import Elements, Pieces, bisected, evaluate_curves, make_pieces
 from bemkit.geometry.quadrature import gauss_legendre
 from bemkit.geometry.vectors import norms, turned_right
 
 if TYPE_CHECKING:
-    from bemkit.geometry.surface import Surface
-    from bemkit.geometry.symmetry import Symmetry
+    from bemkit.geometry.outline import Surface
+    from bemkit.geometry.symmetry.lines import Symmetry
 
 _N_LENGTH_POINTS = 16
 
@@ -304,8 +304,6 @@ class BoundaryMesh:
             Both halves take the place of the element in its parts and in the order of elements; curved elements are
             halved on their curve. The surface of a half-plane is divided anew instead.
         """
-        from bemkit.geometry.bisection import bisected
-
         marked = as_index(marked, "marked")
         if marked.size and not (marked.min() >= 0 and marked.max() < self.n_elements):
             raise GeometryError(

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bemkit.arrays import FloatArray, IntArray, read_only
-from bemkit.geometry.reflection import element_images
 from bemkit.geometry.spaces import BoundarySpace, element_coefficients
+from bemkit.geometry.symmetry.images import element_images
 
 if TYPE_CHECKING:
     from scipy.sparse import csc_array

@@ -12,7 +12,7 @@ import numpy as np
 
 from bemkit.errors import GeometryError
 from bemkit.geometry.curves import Arc, Segment, as_point, require_positive, reverse_curve
-from bemkit.geometry.outline import Outline, Side
+from bemkit.geometry.outline import Outline, Side, Surface
 from bemkit.geometry.vectors import enclosed_area
 
 _QUADRANTS = np.pi / 2 * np.arange(5)
@@ -333,8 +333,6 @@ class PeriodicHalfPlane(CheckedShape):
 
 
 def _strip(left: float, right: float, *, is_periodic: bool = False) -> Outline:
-    from bemkit.geometry.surface import Surface
-
     side = Side("surface", Segment((right, 0.0), (left, 0.0)))
     return Outline(((side,),), is_exterior=True, surface=Surface(is_periodic))
 

@@ -16,9 +16,9 @@ from bemkit.contact.mortar.sides import ContactSide
 from bemkit.errors import InputError
 from bemkit.formulas import choices
 from bemkit.geometry.mesh import BoundaryMesh
-from bemkit.geometry.reflection import antisymmetric_dofs
 from bemkit.geometry.spaces import BoundarySpace
-from bemkit.geometry.symmetry import Symmetry
+from bemkit.geometry.symmetry.images import antisymmetric_dofs
+from bemkit.geometry.symmetry.lines import Symmetry
 from bemkit.model.contacts import ContactInterface, check_overlap
 from bemkit.model.placed import PlacedBody
 from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions

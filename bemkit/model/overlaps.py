@@ -9,7 +9,7 @@ import numpy as np
 from bemkit.arrays import FloatArray
 from bemkit.contact.obstacle import Obstacle, RigidCircle
 from bemkit.contact.polygon import RigidPolygon
-from bemkit.geometry.overlap import ROUND_OFF, Polyline, deepest_overlap, near_pairs
+from bemkit.geometry.proximity.overlap import ROUND_OFF, Polyline, deepest_overlap, near_pairs
 from bemkit.model.contacts import OverlapError
 from bemkit.model.placed import PlacedBody
 from bemkit.scene.body_scene import BodyScene

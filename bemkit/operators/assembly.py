@@ -18,9 +18,9 @@ import numpy as np
 from bemkit.arrays import FloatArray, IntArray, consecutive_runs
 from bemkit.errors import GeometryError
 from bemkit.geometry.local_values import element_degrees
-from bemkit.geometry.reflection import antisymmetric_dofs
 from bemkit.geometry.series import columns_of, series
 from bemkit.geometry.spaces import BoundarySpace
+from bemkit.geometry.symmetry.images import antisymmetric_dofs
 from bemkit.operators.forms import Functions, PairForm
 from bemkit.operators.integrals.pairs import Degrees, PairIntegrals
 from bemkit.operators.integrals.sweep import FEW, PairSweep

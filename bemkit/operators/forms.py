@@ -20,9 +20,9 @@ import numpy as np
 
 from bemkit.arrays import FloatArray
 from bemkit.errors import GeometryError
-from bemkit.geometry.reflection import antisymmetric_dofs
 from bemkit.geometry.series import columns_of, series
 from bemkit.geometry.spaces import BoundarySpace
+from bemkit.geometry.symmetry.images import antisymmetric_dofs
 from bemkit.operators.linear_solvers import Tag
 from bemkit.operators.material import Material
 

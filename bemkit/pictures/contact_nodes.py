@@ -11,7 +11,7 @@ from scipy.spatial import KDTree
 from bemkit.arrays import FloatArray, IntArray
 from bemkit.contact.contact_nodes import contact_frame
 from bemkit.geometry.spaces import dof_points
-from bemkit.geometry.symmetry import Symmetry
+from bemkit.geometry.symmetry.lines import Symmetry
 from bemkit.pictures.shown import DrawnScene, Result
 
 _AT = 1e-6

@@ -8,7 +8,7 @@ import numpy as np
 
 from bemkit.arrays import FloatArray, IntArray
 from bemkit.geometry.neighbours import along_boundary, at_arc_lengths
-from bemkit.geometry.symmetry import Symmetry
+from bemkit.geometry.symmetry.lines import Symmetry
 from bemkit.pictures.drawing import BLUE, GREY, Axes, axes_or_new
 from bemkit.pictures.shown import DrawnBody, DrawnScene
 from bemkit.scene.unit_names import UnitNames, with_unit

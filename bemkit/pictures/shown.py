@@ -13,8 +13,8 @@ from bemkit.arrays import FloatArray, IntArray
 from bemkit.geometry.local_values import values_on_elements
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.neighbours import drawn_points
-from bemkit.geometry.reflection import reflected_to_whole
 from bemkit.geometry.spaces import BoundarySpace
+from bemkit.geometry.symmetry.images import reflected_to_whole
 from bemkit.model.placed import place
 from bemkit.results.contact_table import ContactTable
 from bemkit.results.part_forces import RigidResult

@@ -18,7 +18,7 @@ from bemkit.scene.registry import BODY_FORCES
 from bemkit.scene.scene import Scene
 
 if TYPE_CHECKING:
-    from bemkit.geometry.symmetry import Symmetry
+    from bemkit.geometry.symmetry.lines import Symmetry
 
 _MOST_NAMED = 12
 """Largest number of different bodies that have a line each."""

@@ -28,7 +28,7 @@ from bemkit.stopwatch import announce
 
 if TYPE_CHECKING:
     from bemkit.geometry.outline import Outline
-    from bemkit.geometry.symmetry import Symmetry
+    from bemkit.geometry.symmetry.lines import Symmetry
     from bemkit.scene.body_scene import BodyScene
 
 _BYTES = 8

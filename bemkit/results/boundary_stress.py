@@ -13,8 +13,8 @@ from bemkit.arrays import BoolArray, FloatArray, IntArray
 from bemkit.geometry.local_values import mean_tractions, values_on_elements
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.neighbours import corner_nodes
-from bemkit.geometry.reflection import reflected_to_whole
 from bemkit.geometry.spaces import BoundarySpace, ElementwiseSpace, local_coefficients
+from bemkit.geometry.symmetry.images import reflected_to_whole
 from bemkit.geometry.vectors import turned_right
 from bemkit.operators.material import Material
 from bemkit.operators.somigliana.fields import InteriorFields

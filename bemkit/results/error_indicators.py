@@ -20,8 +20,8 @@ from bemkit.arrays import BoolArray, FloatArray
 from bemkit.geometry.local_values import values_on_elements
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.neighbours import break_nodes
-from bemkit.geometry.reflection import reflected_to_whole
 from bemkit.geometry.spaces import BoundarySpace, ConstantSpace, dof_points
+from bemkit.geometry.symmetry.images import reflected_to_whole
 from bemkit.operators.rigid_modes import without_motion
 from bemkit.results.contact_table import ContactTable
 

@@ -10,7 +10,7 @@ import numpy as np
 from bemkit.arrays import BoolArray, FloatArray
 from bemkit.contact.obstacle import Obstacle
 from bemkit.errors import ResultWarning
-from bemkit.geometry.overlap import ROUND_OFF, Polyline, deepest_overlap, near_pairs
+from bemkit.geometry.proximity.overlap import ROUND_OFF, Polyline, deepest_overlap, near_pairs
 from bemkit.model.overlaps import finite_obstacles, is_finite
 from bemkit.results.between_nodes import Interpolation
 from bemkit.results.solved_body import SolvedBody

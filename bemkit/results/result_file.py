@@ -45,8 +45,8 @@ from bemkit.atomic_files import OutputFileError
 from bemkit.errors import InputError
 from bemkit.geometry.curves import Curve
 from bemkit.geometry.mesh import BoundaryMesh
-from bemkit.geometry.surface import Surface
-from bemkit.geometry.symmetry import Symmetry
+from bemkit.geometry.outline import Surface
+from bemkit.geometry.symmetry.lines import Symmetry
 from bemkit.hdf5 import FileFormat, Reader, ResultFileError, write_array, write_table
 from bemkit.plan import Plan
 from bemkit.results.file_meanings import annotate

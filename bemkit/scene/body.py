@@ -19,7 +19,7 @@ from bemkit.scene.discretisation import Discretisation, MeshOptions
 from bemkit.scene.objects import check_names, check_objects, outline_of
 
 if TYPE_CHECKING:
-    from bemkit.geometry.symmetry import Symmetry
+    from bemkit.geometry.symmetry.lines import Symmetry
     from bemkit.scene.body_forces import BodyForce
     from bemkit.scene.copies import Copies
     from bemkit.scene.plane_motion import FarField

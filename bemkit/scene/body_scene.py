@@ -23,7 +23,7 @@ from bemkit.scene.objects import check_laws
 
 if TYPE_CHECKING:
     from bemkit.geometry.meshing.partition import Partition
-    from bemkit.geometry.symmetry import Symmetry
+    from bemkit.geometry.symmetry.lines import Symmetry
     from bemkit.scene.body_forces import BodyForce
     from bemkit.scene.plane_motion import FarField
     from bemkit.scene.steps import Step

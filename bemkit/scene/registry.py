@@ -161,7 +161,7 @@ SHAPES = Registry(
         "exterior-of": "bemkit.geometry.shapes:ExteriorOf",
         "half-plane": "bemkit.geometry.shapes:ElasticHalfPlane",
         "periodic-half-plane": "bemkit.geometry.shapes:PeriodicHalfPlane",
-        "outline": "bemkit.geometry.drawn:OutlineShape",
+        "outline": "bemkit.geometry.free_form.drawn:OutlineShape",
         "mesh": "bemkit.geometry.files.shape_file:MeshFile",
         "drawing": "bemkit.geometry.files.shape_file:DrawingFile",
     },
@@ -175,12 +175,12 @@ FILE_KINDS = ("mesh", "drawing", "profile")
 SIDES = Registry(
     "side",
     {
-        "line": "bemkit.geometry.drawn:LineTo",
-        "arc": "bemkit.geometry.drawn:ArcTo",
-        "spline": "bemkit.geometry.drawn:SplineTo",
-        "nurbs": "bemkit.geometry.drawn:NurbsTo",
+        "line": "bemkit.geometry.free_form.drawn:LineTo",
+        "arc": "bemkit.geometry.free_form.drawn:ArcTo",
+        "spline": "bemkit.geometry.free_form.drawn:SplineTo",
+        "nurbs": "bemkit.geometry.free_form.drawn:NurbsTo",
     },
-    protocol="bemkit.geometry.drawn:DrawnSide",
+    protocol="bemkit.geometry.free_form.drawn:DrawnSide",
 )
 
 GRADINGS = Registry(
@@ -319,7 +319,7 @@ _DEFERRED: Mapping[str, str] = MappingProxyType(
         for reference in (
             *(*HEADINGS, COPIES.protocol, "bemkit.scene.plane_motion:FarField", "bemkit.scene.steps:Step"),
             *("bemkit.scene.contacts:ContactPair", "bemkit.scene.contacts:Touching"),
-            *("bemkit.scene.body_forces:BodyForce", "bemkit.geometry.symmetry:Symmetry"),
+            *("bemkit.scene.body_forces:BodyForce", "bemkit.geometry.symmetry.lines:Symmetry"),
         )
     }
 )

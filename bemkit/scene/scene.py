@@ -31,7 +31,7 @@ from bemkit.solvers.base import ContactSolver
 from bemkit.solvers.fallbacks import Fallbacks
 
 if TYPE_CHECKING:
-    from bemkit.geometry.symmetry import Symmetry
+    from bemkit.geometry.symmetry.lines import Symmetry
     from bemkit.scene.body_forces import BodyForce
     from bemkit.scene.contacts import ContactPair, Touching
     from bemkit.scene.plane_motion import FarField, RigidBody

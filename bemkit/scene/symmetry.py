@@ -17,7 +17,7 @@ from bemkit.contact.obstacle import measure_contact
 from bemkit.errors import GeometryError, InputError, format_point
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.meshing.division import divide
-from bemkit.geometry.symmetry import Symmetry
+from bemkit.geometry.symmetry.lines import Symmetry
 from bemkit.scene.body_forces import Heating
 from bemkit.scene.body_scene import BodyScene
 from bemkit.scene.conditions import Clamped, Contact, Load, Part, PrescribedDisplacement, Roller

@@ -7,7 +7,7 @@ import numpy as np
 from bemkit.arrays import FloatArray
 from bemkit.formulas import Expression
 from bemkit.geometry.shapes import Ring, Shape
-from bemkit.geometry.symmetry import Symmetry
+from bemkit.geometry.symmetry.lines import Symmetry
 from bemkit.scene.body_forces import BodyForce, Gravity, Heating, Rotation
 from checks.random_scenes.draw import Draw
 

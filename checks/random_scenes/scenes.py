@@ -11,7 +11,7 @@ from bemkit.contact.obstacle import Gap, Obstacle, RigidCavity, RigidCircle, Rig
 from bemkit.formulas import Expression
 from bemkit.geometry.meshing.discretise import Algebraic, Geometric, Grading, Uniform
 from bemkit.geometry.shapes import Disk, PlateWithHole, Rectangle, Ring, Shape
-from bemkit.geometry.symmetry import Symmetry
+from bemkit.geometry.symmetry.lines import Symmetry
 from bemkit.operators.linear_solvers import Automatic, DenseCholesky, LinearSolverChoice
 from bemkit.operators.material import Material, Plane
 from bemkit.scene.conditions import Condition, Contact, Part, PrescribedDisplacement, Pressure, Roller, Traction

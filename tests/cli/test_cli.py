@@ -508,7 +508,7 @@ except SystemExit as end:
 wanted = {"matplotlib", "meshio", "h5py", "rich", "pyamg", "distributed", "scipy.sparse"}
 names = ("operators.somigliana.fields", "operators.somigliana.moments", "operators.matrix_free.factor",
     "results.boundary_stress", "pictures.files", "results.result_file", "hdf5", "cli.console",
-    "runs.adaptive", "contact.mortar", "geometry.drawn", "operators.forms", "solvers.homotopy")
+    "runs.adaptive", "contact.mortar", "geometry.free_form.drawn", "operators.forms", "solvers.homotopy")
 wanted |= {f"bemkit.{name}" for name in names}
 print(sorted(wanted & set(sys.modules)), file=sys.stderr)
 from importlib.util import find_spec

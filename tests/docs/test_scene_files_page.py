@@ -11,7 +11,7 @@ import tomli_w
 
 from bemkit import formulas as expression
 from bemkit.formulas import Expression
-from bemkit.geometry.symmetry import Symmetry
+from bemkit.geometry.symmetry.lines import Symmetry
 from bemkit.operators.material import Material
 from bemkit.scene import registry as kinds
 from bemkit.scene.conditions import Part

@@ -7,9 +7,9 @@ import pytest
 
 from bemkit.errors import GeometryError
 from bemkit.geometry.curves import Arc, Curve, reverse_curve
-from bemkit.geometry.drawn import ArcTo, DrawnSide, LineTo, Loop, NurbsTo, OutlineShape, SplineTo
+from bemkit.geometry.free_form.drawn import ArcTo, DrawnSide, LineTo, Loop, NurbsTo, OutlineShape, SplineTo
+from bemkit.geometry.free_form.nurbs import Nurbs, clamped_knots, conic_arc
 from bemkit.geometry.meshing.discretise import discretise
-from bemkit.geometry.nurbs import Nurbs, clamped_knots, conic_arc
 from bemkit.geometry.outline import Drawing, Selection
 from bemkit.geometry.shapes import ExteriorOf, Rectangle
 from bemkit.testing.spaces import check_curve

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from bemkit.geometry.meshing.discretise import discretise
-from bemkit.geometry.overlap import Polyline, deepest_overlap, near_pairs
+from bemkit.geometry.proximity.overlap import Polyline, deepest_overlap, near_pairs
 from bemkit.geometry.shapes import Disk, PlateWithHole, Rectangle
-from bemkit.geometry.symmetry import Symmetry
+from bemkit.geometry.symmetry.lines import Symmetry
 
 
 def polyline(shape, n: int = 40, symmetry: Symmetry | None = None) -> Polyline:

@@ -5,8 +5,8 @@ import pytest
 from mpmath import log, mpf, workdps
 
 from bemkit.geometry.mesh import BoundaryMesh
+from bemkit.geometry.outline import Surface
 from bemkit.geometry.shapes import ElasticHalfPlane
-from bemkit.geometry.surface import Surface
 from bemkit.operators.half_plane.elasticity import HalfPlaneElasticity, half_plane_map
 from bemkit.operators.half_plane.equations import HalfPlaneEquations
 from bemkit.operators.half_plane.flexibility import mean_logarithms

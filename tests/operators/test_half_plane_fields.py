@@ -11,7 +11,7 @@ from scipy.optimize import minimize_scalar
 
 import bemkit as bk
 from bemkit.geometry.mesh import BoundaryMesh
-from bemkit.geometry.surface import Surface
+from bemkit.geometry.outline import Surface
 from bemkit.operators.half_plane.elasticity import half_plane_map
 from bemkit.operators.half_plane.fields import HalfPlaneFields, dilogarithm
 from bemkit.operators.material import Material, Plane

@@ -11,9 +11,9 @@ import bemkit as bk
 from bemkit.errors import GeometryError, InputError
 from bemkit.geometry.local_values import continued_to_ends, dof_weights, summed_at_dofs, values_on_elements
 from bemkit.geometry.quadrature import gauss_lobatto
-from bemkit.geometry.reflection import antisymmetric_dofs
 from bemkit.geometry.series import series
 from bemkit.geometry.spaces import LagrangeSpace, dof_points, lagrange_polynomials
+from bemkit.geometry.symmetry.images import antisymmetric_dofs
 from bemkit.operators.boundary import hypersingular
 from bemkit.runs.element_degrees import LEAST_DEGREE, below_layers, few_kinds, sufficient_degrees
 from bemkit.scene.toml import scene_from_toml, scene_to_toml

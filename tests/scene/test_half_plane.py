@@ -11,8 +11,7 @@ import pytest
 
 import bemkit as bk
 from bemkit.errors import GeometryError
-from bemkit.geometry.outline import Outline, Side
-from bemkit.geometry.surface import Surface
+from bemkit.geometry.outline import Outline, Side, Surface
 from bemkit.runs.steps import run_on_mesh
 from bemkit.scene.load_history import load_steps
 from bemkit.studies.stability.case import Case

@@ -8,7 +8,7 @@ import pytest
 
 import bemkit as bk
 from bemkit.errors import InputError
-from bemkit.geometry.drawn import OutlineShape
+from bemkit.geometry.free_form.drawn import OutlineShape
 from bemkit.results.result_file import read_result, write_result
 from bemkit.scene.starting_scene import starting_scene
 from bemkit.scene.toml import SceneError, load_scene, scene_from_toml, scene_to_toml

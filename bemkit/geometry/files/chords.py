@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray
-from bemkit.geometry.drawn import ArcTo, LineTo, SplineTo
 from bemkit.geometry.files.strokes import Stroke, StrokeSide, pair
+from bemkit.geometry.free_form.drawn import ArcTo, LineTo, SplineTo
 from bemkit.geometry.vectors import angles_between, circle_centre, cross, norms
 
 CORNER_ANGLE = 25.0

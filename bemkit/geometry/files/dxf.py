@@ -15,8 +15,8 @@ import numpy as np
 
 from bemkit.errors import GeometryError, printable
 from bemkit.formulas import closest
-from bemkit.geometry.drawn import ArcTo, LineTo, Point
 from bemkit.geometry.files.strokes import Stroke, ellipse_strokes, nurbs_strokes
+from bemkit.geometry.free_form.drawn import ArcTo, LineTo, Point
 
 _UNITS: Mapping[int, str] = MappingProxyType({1: "in", 2: "ft", 4: "mm", 5: "cm", 6: "m", 13: "um"})
 """Units of length by their number in the header of a DXF file."""

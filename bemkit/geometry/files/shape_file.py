@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING
 
 from bemkit.errors import GeometryError, shown_path
 from bemkit.geometry.curves import require_positive
-from bemkit.geometry.drawn import OutlineShape
 from bemkit.geometry.files.chords import CORNER_ANGLE
 from bemkit.geometry.files.strokes import Stroke, extent, join_strokes, named_loops
+from bemkit.geometry.free_form.drawn import OutlineShape
 from bemkit.geometry.outline import Outline
 
 if TYPE_CHECKING:

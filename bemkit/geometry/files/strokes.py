@@ -14,9 +14,9 @@ import numpy as np
 
 from bemkit.arrays import FloatArray, IntArray
 from bemkit.errors import GeometryError, format_point
-from bemkit.geometry.drawn import ArcTo, LineTo, Loop, NurbsTo, Point, SplineTo
+from bemkit.geometry.free_form.drawn import ArcTo, LineTo, Loop, NurbsTo, Point, SplineTo
+from bemkit.geometry.free_form.nurbs import conic_arc
 from bemkit.geometry.loops import closed_chains
-from bemkit.geometry.nurbs import conic_arc
 from bemkit.geometry.vectors import cross, norms, senses_of
 
 StrokeSide: TypeAlias = LineTo | ArcTo | SplineTo | NurbsTo

@@ -15,8 +15,8 @@ import numpy as np
 
 from bemkit.errors import GeometryError, printable
 from bemkit.formulas import closest
-from bemkit.geometry.drawn import ArcTo, LineTo, Point
 from bemkit.geometry.files.strokes import Stroke, bezier_stroke, ellipse_strokes
+from bemkit.geometry.free_form.drawn import ArcTo, LineTo, Point
 
 _LENGTH = re.compile(r"\s*([-+.\deE]+?)\s*(mm|cm|in|pt|pc)\s*$")
 _MILLIMETRES = {"mm": 1.0, "cm": 10.0, "in": 25.4, "pt": 25.4 / 72.0, "pc": 25.4 / 6.0}

@@ -21,7 +21,7 @@ from bemkit.geometry.meshing.division import Division, divide
 from bemkit.geometry.outline import Outline, Selection
 
 if TYPE_CHECKING:
-    from bemkit.geometry.symmetry import Symmetry
+    from bemkit.geometry.symmetry.lines import Symmetry
 
 ALIKE = 1.2
 """Largest ratio of two neighbouring element lengths without a gradual transition."""

@@ -18,7 +18,7 @@ from bemkit.geometry.quadrature import gauss_legendre
 from bemkit.geometry.vectors import norms
 
 if TYPE_CHECKING:
-    from bemkit.geometry.symmetry import Symmetry
+    from bemkit.geometry.symmetry.lines import Symmetry
 
 _INNER = np.array([0.25, 0.5, 0.75])
 _N_PANELS, _N_POINTS = 64, 6

@@ -13,7 +13,7 @@ from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.meshing.discretise import share_elements
 from bemkit.geometry.meshing.division import Division, Piece, divide
 from bemkit.geometry.outline import Outline, Selection
-from bemkit.geometry.symmetry import Symmetry
+from bemkit.geometry.symmetry.lines import Symmetry
 from bemkit.geometry.vectors import norms
 
 EXPONENT = 2.5

@@ -13,8 +13,8 @@ from bemkit.errors import InputError
 from bemkit.geometry.local_values import values_on_elements
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.quadrature import gauss_legendre
-from bemkit.geometry.reflection import antisymmetric_dofs
 from bemkit.geometry.spaces import BoundarySpace, ConstantSpace, LinearSpace, dof_points, element_nodes
+from bemkit.geometry.symmetry.images import antisymmetric_dofs
 from bemkit.geometry.vectors import turned_right
 from bemkit.operators.forms import mass_matrix
 from bemkit.operators.linear_solvers import (

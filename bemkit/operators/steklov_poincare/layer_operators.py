@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray, read_only
-from bemkit.geometry.reflection import antisymmetric_dofs
 from bemkit.geometry.spaces import BoundarySpace, dof_points
+from bemkit.geometry.symmetry.images import antisymmetric_dofs
 from bemkit.operators.assembly import assemble_together
 from bemkit.operators.counts import Entries, OperationCounts
 from bemkit.operators.forms import double_layer_form, hypersingular_form, mass_matrix, single_layer_form

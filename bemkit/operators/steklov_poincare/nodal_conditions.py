@@ -284,7 +284,7 @@ def _mirrors(space: BoundarySpace) -> list[Support]:
     """Return the supports of symmetry lines, which exclude displacements across them."""
     if space.mesh.symmetry is None:
         return []
-    from bemkit.geometry.reflection import antisymmetric_dofs
+    from bemkit.geometry.symmetry.images import antisymmetric_dofs
 
     is_held = antisymmetric_dofs(space).reshape(-1, 2)[space.element_dofs]
     elements = np.flatnonzero(is_held.any(axis=(1, 2)))

@@ -15,7 +15,7 @@ from bemkit.formulas import ScalarField, evaluate_field
 from bemkit.geometry.curves import Curve, ParametricCurve, Segment, scaled_curve
 from bemkit.geometry.outline import Outline, Side
 from bemkit.geometry.shapes import CheckedShape, Shape
-from bemkit.geometry.symmetry import Symmetry
+from bemkit.geometry.symmetry.lines import Symmetry
 from bemkit.scene.body_forces import BodyForce, Gravity, Heating, Rotation
 from bemkit.scene.conditions import (
     Condition,

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from bemkit.errors import GeometryError
-from bemkit.geometry.drawn import ArcTo, LineTo, NurbsTo, OutlineShape
 from bemkit.geometry.files.shape_file import DrawingFile
+from bemkit.geometry.free_form.drawn import ArcTo, LineTo, NurbsTo, OutlineShape
 from bemkit.geometry.meshing.discretise import discretise
 
 from .parts import AREA, PART_DXF, PART_SVG, dxf, line, needs_ezdxf, needs_svgpathtools

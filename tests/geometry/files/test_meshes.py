@@ -14,9 +14,9 @@ import numpy as np
 import pytest
 
 from bemkit.errors import GeometryError
-from bemkit.geometry.drawn import ArcTo, LineTo, SplineTo
 from bemkit.geometry.files.gmsh_files import why_no_gmsh
 from bemkit.geometry.files.shape_file import DrawingFile, MeshFile
+from bemkit.geometry.free_form.drawn import ArcTo, LineTo, SplineTo
 from bemkit.geometry.meshing.discretise import discretise
 
 from .parts import AREA, DATA, MESHES

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from bemkit.geometry.drawn import ArcTo, LineTo, NurbsTo, OutlineShape, SplineTo
 from bemkit.geometry.files.strokes import Stroke, StrokeSide, join_strokes, named_loops
+from bemkit.geometry.free_form.drawn import ArcTo, LineTo, NurbsTo, OutlineShape, SplineTo
 from bemkit.geometry.meshing.discretise import discretise
 from tests.slow import slow_except
 

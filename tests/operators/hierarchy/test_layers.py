@@ -9,7 +9,7 @@ import pytest
 
 from bemkit.arrays import ComplexArray, IntArray
 from bemkit.geometry import BoundaryMesh, PlateWithHole, Rectangle, discretise
-from bemkit.geometry.symmetry import Symmetry
+from bemkit.geometry.symmetry.lines import Symmetry
 from bemkit.operators.collocation import compiled
 from bemkit.operators.collocation.curved_elements import CurvedElements
 from bemkit.operators.collocation.equations import NOWHERE, collocation_equations, point_forces

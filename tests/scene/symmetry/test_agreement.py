@@ -10,8 +10,8 @@ import pytest
 
 import bemkit as bk
 from bemkit.geometry.neighbours import break_nodes
-from bemkit.geometry.reflection import antisymmetric_dofs, reflected_to_whole
 from bemkit.geometry.spaces import BoundarySpace, ConstantSpace, LinearSpace, QuadraticSpace
+from bemkit.geometry.symmetry.images import antisymmetric_dofs, reflected_to_whole
 from bemkit.model.model import build_model
 from bemkit.model.prepared import prepare
 from bemkit.operators.boundary import (

@@ -9,8 +9,8 @@ import pytest
 
 import bemkit as bk
 from bemkit.errors import GeometryError
-from bemkit.geometry.reflection import element_images
 from bemkit.geometry.spaces import LinearSpace
+from bemkit.geometry.symmetry.images import element_images
 from bemkit.scene.symmetry import AsymmetricSceneError, find_symmetry
 from tests.scenes import EccentricRing, square, squeezed
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from bemkit.formulas import Expression
 from bemkit.geometry.shapes import Disk, ExteriorOf, Ring
-from bemkit.geometry.symmetry import Symmetry
+from bemkit.geometry.symmetry.lines import Symmetry
 from bemkit.operators.material import Material, Plane
 from bemkit.reference import BrazilianDisc, KirschHole, LameRing, RotatingDisc
 from bemkit.results.solution import Solution

@@ -11,7 +11,7 @@ from bemkit.contact.laws import Coulomb
 from bemkit.contact.obstacle import RigidHalfPlane
 from bemkit.formulas import Expression
 from bemkit.geometry.shapes import Disk, ElasticHalfPlane, ExteriorOf, Rectangle, Ring
-from bemkit.geometry.symmetry import Symmetry
+from bemkit.geometry.symmetry.lines import Symmetry
 from bemkit.operators.material import Material
 from bemkit.reference import (
     GravityColumn,

@@ -10,8 +10,8 @@ from scipy.special import ellipe, ellipeinc
 
 from bemkit.arrays import FloatArray
 from bemkit.geometry import BoundaryMesh, GeometryError
-from bemkit.geometry.arclength import ArcLength
 from bemkit.geometry.curves import ParametricCurve
+from bemkit.geometry.free_form.arc_length import ArcLength
 
 
 def ellipse(a: float, b: float) -> ParametricCurve:

@@ -17,7 +17,7 @@ from bemkit.arrays import BoolArray, FloatArray, IntArray
 from bemkit.errors import GeometryError
 from bemkit.geometry.local_values import element_degrees
 from bemkit.geometry.spaces import BoundarySpace
-from bemkit.geometry.symmetry import is_reversing
+from bemkit.geometry.symmetry.lines import is_reversing
 
 
 def element_images(space: BoundarySpace) -> Iterator[tuple[slice, FloatArray, IntArray]]:

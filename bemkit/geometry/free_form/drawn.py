@@ -12,7 +12,7 @@ import numpy as np
 from bemkit.arrays import FloatArray
 from bemkit.errors import GeometryError, format_point
 from bemkit.geometry.curves import Arc, Curve, ParametricCurve, Segment, as_point
-from bemkit.geometry.nurbs import Nurbs, clamped_knots
+from bemkit.geometry.free_form.nurbs import Nurbs, clamped_knots
 from bemkit.geometry.outline import Drawing, Outline, Side
 from bemkit.geometry.shapes import CheckedShape, reversed_loop
 from bemkit.geometry.vectors import circle_centre, cross, norms, senses_of

@@ -1,0 +1,1 @@
+"""Positions of bodies and points relative to one another."""

@@ -1,0 +1,1 @@
+"""Lines of symmetry, the images of elements, and functions on these images."""
