@@ -25,9 +25,9 @@ from rich.console import Console
 from rich.table import Table
 
 import bemkit as bk
+from bemkit.geometry.proximity.cluster_tree import ClusterTree
 from bemkit.operators.collocation import compiled
 from bemkit.operators.collocation.equations import CollocationEquations, collocation_equations
-from bemkit.operators.hierarchy.tree import ClusterTree
 from bemkit.operators.matrix_free.fast_multipole import LEAF_SIZE, FastMultipole
 from bemkit.operators.steklov_poincare.hierarchical import HierarchicalCollocation
 

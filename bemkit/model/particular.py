@@ -100,7 +100,7 @@ def _fitted(values: FloatArray, z: ComplexArray, degree: int, hole: _Ring | None
 
 def _sample_points(mesh: BoundaryMesh) -> FloatArray:
     """Return points on the boundary, just beneath it, and on a grid inside."""
-    from bemkit.operators.somigliana.locate import Locator  # only temperatures given by a formula need it
+    from bemkit.geometry.proximity.location import Locator  # only temperatures given by a formula need it
 
     whole = mesh.whole
     elements = np.unique(np.linspace(0, whole.n_elements - 1, _MOST_ELEMENTS).astype(np.intp))
@@ -141,7 +141,7 @@ def _reason(
     miss: float,
     accuracy: float,
 ) -> str:
-    from bemkit.operators.somigliana.locate import Locator
+    from bemkit.geometry.proximity.location import Locator
 
     whole = mesh.whole
     angles = 2.0 * np.pi * np.arange(16) / 16

@@ -13,12 +13,12 @@ from bemkit.arrays import BoolArray, FloatArray, IntArray
 from bemkit.geometry.local_values import mean_tractions, values_on_elements
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.neighbours import corner_nodes
+from bemkit.geometry.proximity.location import Location, Locator, PointNotInsideError
 from bemkit.geometry.spaces import BoundarySpace, ElementwiseSpace, local_coefficients
 from bemkit.geometry.symmetry.images import reflected_to_whole
 from bemkit.geometry.vectors import turned_right
 from bemkit.operators.material import Material
 from bemkit.operators.somigliana.fields import InteriorFields
-from bemkit.operators.somigliana.locate import Location, Locator, PointNotInsideError
 from bemkit.operators.somigliana.potentials import PotentialFields
 from bemkit.scene.discretisation import on_whole_body
 

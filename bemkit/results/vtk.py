@@ -19,9 +19,9 @@ from bemkit.arrays import FloatArray, IntArray
 from bemkit.atomic_files import replacing
 from bemkit.geometry.local_values import values_on_elements
 from bemkit.geometry.neighbours import drawn_points
+from bemkit.geometry.proximity.location import Locator
 from bemkit.geometry.vectors import norms
 from bemkit.operators.material import Material, Plane
-from bemkit.operators.somigliana.locate import Locator
 from bemkit.operators.somigliana.stress import von_mises
 from bemkit.results.solution import Solution
 from bemkit.results.solved_body import SolvedBody

@@ -154,12 +154,13 @@ class _Whole:
 
     def difference(self, line: Symmetry, samples: _Samples) -> str | None:
         """Describe a difference from symmetry about a line; None if there is none."""
-        from bemkit.operators.somigliana.locate import Locator  # only scenes with a symmetry need it
+        from bemkit.geometry.proximity.location import Locator  # only scenes with a symmetry need it
 
         signs = line.images[1]
         points = line.reflected(samples.points, signs)
         location = Locator(self.mesh).locate(points)
-        distance = np.hypot(*(self._points(location.element, location.xi) - points).T)
+        nearest = self.mesh.points(location.element, location.xi[:, None])[:, 0]
+        distance = np.hypot(*(nearest - points).T)
         k = int(np.argmax(distance))
         if distance[k] > _TOLERANCE * self.mesh.diameter:
             return (
@@ -179,13 +180,6 @@ class _Whole:
             if difference is not None:
                 return difference
         return None
-
-    def _points(self, elements: IntArray, xi: FloatArray) -> FloatArray:
-        points = np.empty((len(elements), 2))
-        for element in np.unique(elements):
-            rows = np.flatnonzero(elements == element)
-            points[rows] = self.mesh.points(np.array([element]), xi[rows])[0]
-        return points
 
     def _compare(self, samples: _Samples, images: _Samples, signs: FloatArray) -> str | None:
         """Compare the conditions at points of one part with those at their images, which all lie in one part."""

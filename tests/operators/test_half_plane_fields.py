@@ -12,10 +12,10 @@ from scipy.optimize import minimize_scalar
 import bemkit as bk
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.outline import Surface
+from bemkit.geometry.proximity.location import PointNotInsideError
 from bemkit.operators.half_plane.elasticity import half_plane_map
 from bemkit.operators.half_plane.fields import HalfPlaneFields, dilogarithm
 from bemkit.operators.material import Material, Plane
-from bemkit.operators.somigliana.locate import PointNotInsideError
 
 MATERIAL = Material(2.0, 0.3)
 

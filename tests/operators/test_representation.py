@@ -16,12 +16,12 @@ from bemkit.errors import GeometryError
 from bemkit.geometry import BoundaryMesh, Disk, ExteriorOf, ParametricCurve, Polygon, Rectangle, Ring, discretise
 from bemkit.geometry.neighbours import corner_nodes
 from bemkit.geometry.outline import Outline, Side
+from bemkit.geometry.proximity.location import PointNotInsideError
 from bemkit.geometry.spaces import BoundarySpace, ConstantSpace, LinearSpace, QuadraticSpace, dof_points
 from bemkit.operators.boundary import SteklovPoincareOperator
 from bemkit.operators.element_geometry import ElementGeometry
 from bemkit.operators.material import Material, Plane
 from bemkit.operators.somigliana.fields import InteriorFields
-from bemkit.operators.somigliana.locate import PointNotInsideError
 from bemkit.operators.somigliana.moments import local_moments, straight_gradient_moments
 from bemkit.operators.somigliana.stress import principal_stresses, von_mises
 from bemkit.operators.steklov_poincare.collocation import CollocationElasticity

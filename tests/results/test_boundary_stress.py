@@ -10,7 +10,7 @@ import pytest
 import bemkit as bk
 from bemkit.errors import InputError
 from bemkit.geometry.mesh import UnknownPartError
-from bemkit.operators.somigliana.locate import PointNotInsideError
+from bemkit.geometry.proximity.location import PointNotInsideError
 from bemkit.results.tables import table_of
 from bemkit.testing import check_solution
 from tests.perforated_plate import NOMINAL, plate

@@ -10,6 +10,7 @@ import numpy as np
 
 from bemkit.arrays import ComplexArray, FloatArray
 from bemkit.geometry.mesh import BoundaryMesh
+from bemkit.geometry.proximity.cluster_tree import ClusterTree
 from bemkit.operators.counts import OperationCounts
 from bemkit.operators.half_plane.cost import flexibility_work, strip_cost
 from bemkit.operators.half_plane.equations import HalfPlaneEquations, StripView, potential_of
@@ -18,7 +19,6 @@ from bemkit.operators.half_plane.flexibility import mean_logarithms
 from bemkit.operators.half_plane.periodic import PeriodicElasticity
 from bemkit.operators.half_plane.surface import SurfaceElasticity
 from bemkit.operators.hierarchy.factor import Factor
-from bemkit.operators.hierarchy.tree import ClusterTree
 from bemkit.operators.material import Material
 from bemkit.operators.steklov_poincare.cost import BodyCase, BodyCost
 

@@ -22,9 +22,9 @@ import numpy as np
 from bemkit.arrays import BoolArray, ComplexArray, FloatArray
 from bemkit.errors import InputError
 from bemkit.geometry.mesh import BoundaryMesh
+from bemkit.geometry.proximity.location import PointNotInsideError
 from bemkit.operators.half_plane.equations import HalfPlaneEquations
 from bemkit.operators.material import Material
-from bemkit.operators.somigliana.locate import PointNotInsideError
 from bemkit.operators.somigliana.potentials import PotentialFields, as_points
 
 _CHUNK = 500_000

@@ -19,12 +19,12 @@ from functools import partial
 import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray, IntArray
+from bemkit.geometry.proximity.cluster_tree import ClusterTree
 from bemkit.operators.boundary_equations import BoundaryEquations
 from bemkit.operators.hierarchy.known_loads import KnownLoads
 from bemkit.operators.hierarchy.merge import ClusterResponse, merge_siblings
 from bemkit.operators.hierarchy.skeletons import Compression, LevelView, Skeleton
 from bemkit.operators.hierarchy.system import LocalConditions
-from bemkit.operators.hierarchy.tree import ClusterTree
 from bemkit.operators.linear_solvers import SingularMatrixError, SmallLU
 from bemkit.operators.threads import for_each_chunk
 

@@ -19,9 +19,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from bemkit.arrays import BoolArray, ComplexArray, FloatArray, IntArray
+from bemkit.geometry.proximity.cluster_tree import ClusterTree, Discs
 from bemkit.operators.boundary_equations import BoundaryEquations
 from bemkit.operators.hierarchy.interpolative import Block, Interpolation, sketched
-from bemkit.operators.hierarchy.tree import ClusterTree, Discs
 from bemkit.operators.threads import for_each_chunk
 
 PROXY_RATIO = 2.0

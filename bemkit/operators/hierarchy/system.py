@@ -10,8 +10,8 @@ from typing import Protocol
 import numpy as np
 
 from bemkit.arrays import FloatArray, IntArray
+from bemkit.geometry.proximity.cluster_tree import ClusterTree
 from bemkit.operators.boundary_equations import BoundaryEquations, LinearConditions
-from bemkit.operators.hierarchy.tree import ClusterTree
 from bemkit.operators.linear_solvers import SingularMatrixError
 
 _PREFERRED = 0.1

@@ -9,9 +9,9 @@ import numpy as np
 from bemkit.arrays import FloatArray, IntArray
 from bemkit.errors import InputError, NoResultError
 from bemkit.geometry.mesh import BoundaryMesh
+from bemkit.geometry.proximity.cluster_tree import ClusterTree
 from bemkit.operators.collocation.equations import CollocationEquations, collocation_border
 from bemkit.operators.hierarchy.system import LocalConditions
-from bemkit.operators.hierarchy.tree import ClusterTree
 from bemkit.operators.linear_solvers import MatrixFree
 from bemkit.operators.material import Material
 from bemkit.operators.matrix_free.fast_multipole import LEAF_SIZE, FastMultipole

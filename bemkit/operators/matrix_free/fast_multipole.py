@@ -13,9 +13,9 @@ from typing import NamedTuple
 import numpy as np
 
 from bemkit.arrays import ComplexArray, FloatArray, IntArray
+from bemkit.geometry.proximity.cluster_tree import Clusters, ClusterTree, Discs
 from bemkit.geometry.quadrature import gauss_legendre
 from bemkit.operators.collocation.equations import CollocationEquations, Densities
-from bemkit.operators.hierarchy.tree import Clusters, ClusterTree, Discs
 from bemkit.operators.material import Material
 from bemkit.operators.somigliana.expansions import Expansions, Sources, layer_sources
 from bemkit.operators.somigliana.source_series import SEPARATION, SourceSeries, order_for

@@ -14,9 +14,9 @@ from typing import TypeAlias
 import numpy as np
 
 from bemkit.arrays import BoolArray, ComplexArray, IntArray
+from bemkit.geometry.proximity.cluster_tree import Clusters, Pairs
 from bemkit.geometry.quadrature import gauss_legendre
 from bemkit.operators.element_geometry import ElementGeometry
-from bemkit.operators.hierarchy.tree import Clusters, Pairs
 from bemkit.operators.kernels import legendre_values
 from bemkit.operators.material import Material
 from bemkit.operators.somigliana.expansions import Expansions, Sources, layer_sources

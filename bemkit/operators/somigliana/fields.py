@@ -24,17 +24,18 @@ from bemkit.errors import GeometryError, InputError
 from bemkit.geometry.curves import scaled_curve
 from bemkit.geometry.local_values import values_on_elements
 from bemkit.geometry.mesh import BoundaryMesh
+from bemkit.geometry.proximity.cluster_tree import Pairs
+from bemkit.geometry.proximity.location import Location, Locator, PointNotInsideError
 from bemkit.geometry.spaces import BoundarySpace, local_coefficients
 from bemkit.operators.element_geometry import ElementGeometry
-from bemkit.operators.hierarchy.tree import Pairs
 from bemkit.operators.kernels import legendre_of_monomials, legendre_values
 from bemkit.operators.material import Material
 from bemkit.operators.somigliana.far_fields import FarFields
-from bemkit.operators.somigliana.locate import Location, Locator, PointNotInsideError
 from bemkit.operators.somigliana.moments import (
     CENTRE,
     END,
     START,
+    ArcQuadrature,
     straight_displacement_moments,
     straight_gradient_moments,
 )
@@ -111,7 +112,7 @@ class InteriorFields(PotentialFields):
         self._displacement = _element_polynomials(mesh, displacement_space, displacement_dofs, "displacement")
         self._traction = _element_polynomials(mesh, traction_space, traction_dofs, "traction")
         self._locator = Locator(mesh)
-        self._curved = self._locator.curved
+        self._curved = ArcQuadrature(mesh, mesh.centre)
         centre = (float(mesh.centre[0]), float(mesh.centre[1]))
         curves = tuple(scaled_curve(curve, centre, (1.0, 1.0)) for curve in mesh.curves)
         self.geometry = ElementGeometry(mesh.unchecked_copy(mesh.nodes - mesh.centre, curves))

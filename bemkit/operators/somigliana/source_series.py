@@ -10,7 +10,7 @@ from typing import TypeAlias
 import numpy as np
 
 from bemkit.arrays import ComplexArray, FloatArray, IntArray
-from bemkit.operators.hierarchy.tree import Clusters
+from bemkit.geometry.proximity.cluster_tree import Clusters
 from bemkit.operators.somigliana.expansions import Expansions, Sources
 from bemkit.operators.threads import for_each_chunk
 

@@ -9,11 +9,11 @@ import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray, IntArray
 from bemkit.geometry.mesh import BoundaryMesh
+from bemkit.geometry.proximity.cluster_tree import ClusterTree
 from bemkit.operators.boundary_equations import LinearConditions
 from bemkit.operators.collocation.equations import collocation_equations
 from bemkit.operators.hierarchy.factor import Factor
 from bemkit.operators.hierarchy.system import BodyFactor, HierarchicalSystem, LocalConditions
-from bemkit.operators.hierarchy.tree import ClusterTree
 from bemkit.operators.linear_solvers import Hierarchical, MatrixFree, SingularMatrixError
 from bemkit.operators.material import Material
 from bemkit.operators.steklov_poincare.collocation import CollocationElasticity

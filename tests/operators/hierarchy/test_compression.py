@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from bemkit.geometry import BoundaryMesh, Polygon, Rectangle, discretise
+from bemkit.geometry.proximity.cluster_tree import ClusterTree, Discs
 from bemkit.operators.collocation.equations import collocation_equations
 from bemkit.operators.hierarchy.skeletons import PROXY_RATIO, Compression, n_proxies, near_clusters, proxy_points
-from bemkit.operators.hierarchy.tree import ClusterTree, Discs
 from bemkit.operators.material import Material
 from tests.slow import slow_except, slow_only
 

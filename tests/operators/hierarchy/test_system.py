@@ -9,11 +9,11 @@ import pytest
 
 from bemkit.arrays import BoolArray, FloatArray
 from bemkit.geometry import BoundaryMesh, ExteriorOf, PlateWithHole, Polygon, Rectangle, discretise
+from bemkit.geometry.proximity.cluster_tree import ClusterTree
 from bemkit.operators.boundary_equations import LinearConditions
 from bemkit.operators.collocation.equations import collocation_equations
 from bemkit.operators.hierarchy.factor import Factor, SingularClusterError
 from bemkit.operators.hierarchy.system import HierarchicalSystem, LocalConditions, UndeterminedError
-from bemkit.operators.hierarchy.tree import ClusterTree
 from bemkit.operators.linear_solvers import SingularMatrixError
 from bemkit.operators.material import Material
 from bemkit.operators.steklov_poincare.collocation import MixedSystem

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from bemkit.geometry import BoundaryMesh
+from bemkit.geometry.proximity.cluster_tree import ClusterTree
 from bemkit.operators.collocation.equations import CollocationEquations, collocation_equations
-from bemkit.operators.hierarchy.tree import ClusterTree
 from bemkit.operators.material import Material
 from bemkit.operators.matrix_free.fast_multipole import LEAF_SIZE, FastMultipole
 from tests.operators.hierarchy.test_system import SHAPES, graded, mesh_of

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bemkit.geometry import Rectangle, discretise
-from bemkit.operators.hierarchy.tree import ClusterTree
+from bemkit.geometry.proximity.cluster_tree import ClusterTree
 
 
 @given(n=st.integers(4, 300), leaf_size=st.integers(2, 60), seed=st.integers(0, 9))

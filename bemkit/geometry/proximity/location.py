@@ -10,8 +10,7 @@ from bemkit.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from bemkit.errors import GeometryError
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.pieces import RESOLUTION
-from bemkit.operators.hierarchy.tree import Clusters, ClusterTree, consecutive
-from bemkit.operators.somigliana.moments import ArcQuadrature
+from bemkit.geometry.proximity.cluster_tree import Clusters, ClusterTree, consecutive
 
 LEAF_SIZE = 20
 """Elements of a leaf."""
@@ -26,6 +25,7 @@ N_REFINEMENTS = 20
 _ROUND_OFF = 4.0 * np.finfo(float).eps
 """Largest step of a local coordinate that is round-off, relative to one and to the largest coordinate in lengths of
 the tangent."""
+_PLANE = np.array([1.0, 1.0j])
 
 
 class PointNotInsideError(GeometryError):
@@ -61,7 +61,6 @@ class Locator:
 
     def __init__(self, mesh: BoundaryMesh) -> None:
         self._mesh = mesh
-        self.curved = ArcQuadrature(mesh, mesh.centre)
         self._centre = complex(*mesh.centre)
         n_chords = np.where(mesh.is_straight, 1, N_CHORDS)
         self._owner: IntArray = np.repeat(np.arange(mesh.n_elements), n_chords)
@@ -70,30 +69,25 @@ class Locator:
         self._low: FloatArray = -1.0 + 2.0 * index / n_chords[self._owner]
         self._high: FloatArray = -1.0 + 2.0 * (index + 1) / n_chords[self._owner]
         self._start, middle, self._end = (
-            self._on_elements(at) for at in (self._low, 0.5 * (self._low + self._high), self._high)
+            self._points(self._owner, at) for at in (self._low, 0.5 * (self._low + self._high), self._high)
         )
         self._bulge = _BULGE * np.abs(middle - 0.5 * (self._start + self._end))
+        self._largest_bulge = float(self._bulge.max())
         tree = ClusterTree.of(mesh.centres, LEAF_SIZE)
         # ends of the chords (rows) of each element (column); the last chord is repeated
         chord = self._first + np.minimum(np.arange(n_chords.max())[:, None], n_chords - 1)
-        ends = np.concatenate([self._start[self._first][None], self._end[chord]])[:, tree.order]
-        self._node = ends[0]
-        self.clusters = Clusters.around(tree, ends)
-        self._boxes = [_boxes(self.clusters, ends, level) for level in range(tree.n_levels + 1)]
-        self._largest_bulge = float(self._bulge.max())
-        first, last = self._start[self._first], self._end[self._first + n_chords - 1]
-        self._middle = 0.5 * (first + last)
-        arms = np.abs(self._end - self._middle[self._owner]) + self._bulge
-        self._radius: FloatArray = np.maximum(np.maximum.reduceat(arms, self._first), np.abs(first - self._middle))
+        ends = np.concatenate([self._start[self._first][None], self._end[chord]])
+        self._middle = 0.5 * (ends[0] + ends[-1])
+        self._radius = np.abs(ends - self._middle).max(axis=0) + np.maximum.reduceat(self._bulge, self._first)
+        self.clusters = Clusters.around(tree, ends[:, tree.order])
 
-    def _on_elements(self, xi: FloatArray) -> ComplexArray:
-        start, end = (
-            (ends[:, 0] + 1j * ends[:, 1] - self._centre)[self._owner] for ends in (self._mesh.start, self._mesh.end)
-        )
-        points: ComplexArray = (0.5 - 0.5 * xi) * start + (0.5 + 0.5 * xi) * end
-        curved = np.flatnonzero(~self._mesh.is_straight[self._owner])
-        points[curved] = self.curved.points(self._owner[curved], xi[curved, None])[0][:, 0]
-        return points
+    def _points(self, elements: IntArray, xi: FloatArray) -> ComplexArray:
+        """Return points (n,) of elements (n,) at local coordinates (n,), relative to the centre."""
+        return np.asarray(self._mesh.points(elements, xi[:, None])[:, 0] @ _PLANE - self._centre)
+
+    def _tangents(self, elements: IntArray, xi: FloatArray) -> ComplexArray:
+        """Return the derivatives (n,) there by the local coordinates."""
+        return np.asarray(self._mesh.derivatives(elements, xi[:, None])[:, 0] @ _PLANE)
 
     def locate(self, points: FloatArray) -> Location:
         """Locate points (n, 2) [m]."""
@@ -121,18 +115,16 @@ class Locator:
         That point is given by its local coordinate, its distance, and the sine of the angle between the element and
         the line to the point x. The search descends the tree with an upper bound of the distance of each point.
         """
-        bound = np.full(x.size, np.inf)
+        tree, bound = self.clusters.tree, np.full(x.size, np.inf)
 
         def is_far(level: int, point: IntArray, cluster: IntArray) -> BoolArray:
             # the first node of each cluster improves the bound
-            positions = self.clusters.tree.bounds[: -1 : 2**level]
-            to_node = np.abs(x[point] - self._node[positions[cluster]]) * (1.0 + 1e-9) + self._largest_bulge
+            first = self._first[tree.order[tree.bounds[: -1 : 2**level]]]
+            to_node = np.abs(x[point] - self._start[first[cluster]]) * (1.0 + 1e-9) + self._largest_bulge
             np.minimum(bound, _smallest(to_node, point, x.size), out=bound)
-            # a cluster is far if its box is farther than the bound
-            (axis, half), centre = self._boxes[level], self.clusters.levels[level].centre
-            local = (x[point] - centre[cluster]) * axis[cluster].conj()
-            along, across = np.abs(local.real) - half.real[cluster], np.abs(local.imag) - half.imag[cluster]
-            return np.asarray(np.hypot(np.maximum(along, 0.0), np.maximum(across, 0.0)) > bound[point])
+            # a cluster is far if its disc is farther than the bound
+            discs = self.clusters.levels[level]
+            return np.asarray(np.abs(x[point] - discs.centre[cluster]) - discs.radius[cluster] > bound[point])
 
         _, (point, element) = self.clusters.divided(x.size, is_far)
         # elements whose disc is farther than the start of another one drop out
@@ -174,39 +166,20 @@ class Locator:
 
         Return their local coordinates, the vectors from there to the points x, and the tangents.
         """
-        _, ends = self.curved.points(element, np.tile([-1.0, 1.0], (element.size, 1)))
-        bend = 0.5 * (ends[:, 1] - ends[:, 0])
+        bend = 0.5 * (self._tangents(element, np.ones(xi.size)) - self._tangents(element, -np.ones(xi.size)))
         largest = float(np.abs(self._mesh.nodes).max())
         xi, moves = xi.copy(), np.arange(xi.size)
         for _ in range(N_REFINEMENTS):
-            y, slope = self.curved.points(element[moves], xi[moves, None])
-            way, square = x[moves] - y[:, 0], np.abs(slope[:, 0]) ** 2
-            step = (way * slope[:, 0].conj()).real / np.maximum(square - (way * bend[moves].conj()).real, 0.5 * square)
-            before = xi[moves]
+            before, slope = xi[moves], self._tangents(element[moves], xi[moves])
+            way, square = x[moves] - self._points(element[moves], before), np.abs(slope) ** 2
+            step = (way * slope.conj()).real / np.maximum(square - (way * bend[moves].conj()).real, 0.5 * square)
             xi[moves] = np.clip(before + step, -1.0, 1.0)
             moves = moves[np.abs(xi[moves] - before) > _ROUND_OFF * (1.0 + largest / np.sqrt(square))]
             if not moves.size:
                 break
-        y, slope = self.curved.points(element, xi[:, None])
-        return xi, x - y[:, 0], slope[:, 0]
+        return xi, x - self._points(element, xi), self._tangents(element, xi)
 
 
 def _smallest(values: FloatArray, point: IntArray, n_points: int) -> FloatArray:
     """Return the smallest value of each point; points are ascending and complete."""
     return np.minimum.reduceat(values, np.searchsorted(point, np.arange(n_points))) if n_points else values
-
-
-def _boxes(clusters: Clusters, points: ComplexArray, level: int) -> tuple[ComplexArray, ComplexArray]:
-    """Return the axes of boxes around the centres of the clusters of a level, and their half lengths and widths.
-
-    The axis is the principal axis of the points (k, n), so that boxes along a side are thin.
-    """
-    tree, centre = clusters.tree, clusters.levels[level].centre
-    begins = tree.bounds[: -1 : 2**level]
-    cluster = np.repeat(np.arange(begins.size), np.diff(np.append(begins, points.shape[1])))
-    arms = points - centre[cluster]
-    moment = np.add.reduceat(np.sum(arms * arms, axis=0), begins)
-    along = np.exp(0.5j * np.angle(moment))
-    arms *= along[cluster].conj()
-    half = [np.maximum.reduceat(np.abs(part).max(axis=0), begins) for part in (arms.real, arms.imag)]
-    return along, half[0] + 1j * half[1]
