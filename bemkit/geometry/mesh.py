@@ -341,12 +341,12 @@ class BoundaryMesh:
     def unit(self) -> BoundaryMesh:
         """The same mesh about the origin, in units of its diameter."""
         # coordinates lose nothing there: what was found valid is not checked again
-        return _unchecked(self._moved(tuple(self.centre.tolist()), 1.0 / self.diameter))
+        return unchecked_mesh(*self._moved(tuple(self.centre.tolist()), 1.0 / self.diameter))
 
     def unchecked_copy(self, nodes: FloatArray, curves: tuple[Curve, ...]) -> BoundaryMesh:
         """Return the mesh of the body moved rigidly, with its nodes (n_nodes, 2) [m] and curves there; no symmetry."""
         moved = self._content._replace(nodes=read_only(nodes), curves=curves)
-        return _unchecked((*moved, self.is_exterior, None, self.surface))
+        return unchecked_mesh(*moved, self.is_exterior, None, self.surface)
 
     @cached_property
     def _unfolded(self) -> BoundaryMesh:
@@ -389,9 +389,9 @@ class BoundaryMesh:
         return straight
 
 
-def _unchecked(content: tuple[Any, ...]) -> BoundaryMesh:
-    """Return a mesh from what its constructor takes, all of it valid."""
+def unchecked_mesh(*content: Any) -> BoundaryMesh:
+    """Return a mesh from the first arguments of its constructor, at least three, all of them valid."""
     mesh = object.__new__(BoundaryMesh)
-    for entry, value in zip(fields(BoundaryMesh), content, strict=True):
+    for entry, value in zip(fields(BoundaryMesh), content, strict=False):
         object.__setattr__(mesh, entry.name, value)
     return mesh

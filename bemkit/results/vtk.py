@@ -20,7 +20,6 @@ from bemkit.atomic_files import replacing
 from bemkit.geometry.local_values import values_on_elements
 from bemkit.geometry.neighbours import drawn_points
 from bemkit.geometry.proximity.location import Locator
-from bemkit.geometry.vectors import norms
 from bemkit.operators.material import Material, Plane
 from bemkit.operators.somigliana.stress import von_mises
 from bemkit.results.solution import Solution
@@ -179,10 +178,9 @@ def _contact_nodes(solution: Solution, bodies: Sequence[SolvedBody]) -> Block:
         boundary = body.boundary_stress
         location = Locator(boundary.mesh).locate(points)
         element, xi = location.element, location.xi[:, None]
-        distance = norms(boundary.mesh.points(element, xi)[:, 0] - points)
         moved, stress = boundary.displacement_at(element, xi)[:, 0], boundary.at(element, xi)[:, 0]
-        is_closer = distance < nearest
-        nearest = np.minimum(nearest, distance)
+        is_closer = location.distance < nearest
+        nearest = np.minimum(nearest, location.distance)
         for name, field in _fields(body.scene.material, moved, stress).items():
             is_new = is_closer.reshape(-1, *[1] * (field.ndim - 1))
             on_bodies[name] = np.where(is_new, field, on_bodies.get(name, field))

@@ -159,13 +159,11 @@ class _Whole:
         signs = line.images[1]
         points = line.reflected(samples.points, signs)
         location = Locator(self.mesh).locate(points)
-        nearest = self.mesh.points(location.element, location.xi[:, None])[:, 0]
-        distance = np.hypot(*(nearest - points).T)
-        k = int(np.argmax(distance))
-        if distance[k] > _TOLERANCE * self.mesh.diameter:
+        k = int(np.argmax(location.distance))
+        if location.distance[k] > _TOLERANCE * self.mesh.diameter:
             return (
                 f"the image {format_point(points[k])} of the boundary point {format_point(samples.points[k])} lies "
-                f"{distance[k]:.3g} away from the boundary"
+                f"{location.distance[k]:.3g} away from the boundary"
             )
         inside = _inside(self.scene, samples.points), _inside(self.scene, points)
         difference = _first_difference(*inside, (samples.points, points), signs)

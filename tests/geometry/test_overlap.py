@@ -52,3 +52,13 @@ def test_a_halved_body_counts_as_a_whole() -> None:
     halved = polyline(Rectangle(2.0, 1.0, (-1.0, 0.0)), 40, Symmetry(x=0.0))
     assert halved.box[0].tolist() == [-1.0, 0.0]
     assert deepest_overlap(halved, polyline(Rectangle(1.0, 1.0, (-1.8, 0.0))), 1e-9)[0] == pytest.approx(0.2)
+
+
+@pytest.mark.parametrize("symmetry", [Symmetry(x=0.0), Symmetry(y=0.0), Symmetry(x=0.0, y=0.0)])
+def test_a_block_beside_a_halved_disc_overlaps_it_in_no_corner_of_its_box(symmetry: Symmetry) -> None:
+    """The images of a single reflection run the other way round."""
+    disc = polyline(Disk(1.0), 64, symmetry)
+    corners = np.array([[-0.8, -0.8], [0.8, -0.8], [0.8, 0.8], [-0.8, 0.8]])
+    assert disc.deepest(corners, 1e-9) == (0.0, -1)
+    depth, k = disc.deepest(np.append(corners, [[-0.6, -0.6]], axis=0), 1e-9)
+    assert (depth, k) == (pytest.approx(1.0 - 0.6 * np.sqrt(2.0), rel=1e-3), 4)

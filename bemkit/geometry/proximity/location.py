@@ -39,6 +39,8 @@ class Location:
     Parameters
     ----------
     is_inside, is_on_boundary : (n,) bool arrays
+    distance : (n,) array [m]
+        From the boundary.
     element : (n,) int array
         The nearest element.
     xi : (n,) array
@@ -47,6 +49,7 @@ class Location:
 
     is_inside: BoolArray
     is_on_boundary: BoolArray
+    distance: FloatArray
     element: IntArray
     xi: FloatArray
 
@@ -97,7 +100,7 @@ class Locator:
         chunks = [self._chunk(x[first : first + _CHUNK], resolution) for first in range(0, max(1, x.size), _CHUNK)]
         is_left, distance, element, xi = (np.concatenate([chunk[i] for chunk in chunks]) for i in range(4))
         is_on_boundary = distance <= resolution
-        return Location(is_left.astype(bool) & ~is_on_boundary, is_on_boundary, element.astype(np.intp), xi)
+        return Location(is_left.astype(bool) & ~is_on_boundary, is_on_boundary, distance, element.astype(np.intp), xi)
 
     def _chunk(self, x: ComplexArray, resolution: float) -> tuple[BoolArray, FloatArray, IntArray, FloatArray]:
         """Return whether points are left of the boundary, their distance, nearest element and local coordinate."""
