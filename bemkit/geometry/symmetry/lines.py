@@ -147,7 +147,11 @@ class Symmetry:
         """
         images = self.images
         n_elements, n_curves = len(half.elements), len(half.curves)
-        number, nodes = _unfolded_nodes(self, half.nodes)
+        points = np.concatenate([self.reflected(half.nodes, image) for image in images])
+        # nodes on a line are their own images, to the last digit; others come in the order of images
+        _, first, place = np.unique(points, axis=0, return_index=True, return_inverse=True)
+        number = np.argsort(np.argsort(first))[place].reshape(len(images), -1)
+        nodes = points[np.sort(first)]
         elements = [
             nodes_of_image[half.elements][:, :: -1 if is_reversing(image) else 1]
             for nodes_of_image, image in zip(number, images, strict=True)
@@ -176,23 +180,3 @@ class Symmetry:
 def is_reversing(image: FloatArray) -> bool:
     """Return whether an image is traversed from the images of ends to the images of starts."""
     return bool(np.prod(image) < 0.0)
-
-
-def _unfolded_nodes(symmetry: Symmetry, nodes: FloatArray) -> tuple[IntArray, FloatArray]:
-    """Return the number (n_images, n_nodes) of each image of each node, and all nodes; those on a line are shared."""
-    on_line = symmetry.meets(nodes)
-    number = np.empty((symmetry.n_images, len(nodes)), dtype=np.intp)
-    new_nodes: list[FloatArray] = []
-    n_nodes = 0
-    images = symmetry.images
-    for g, image in enumerate(images):
-        is_new = np.ones(len(nodes), dtype=bool)
-        for component in np.flatnonzero(image < 0.0).tolist():
-            # a node on this line is its own image: the same as without this reflection
-            other = int(np.flatnonzero((images == np.where(np.arange(2) == component, 1.0, image)).all(axis=1))[0])
-            number[g] = np.where(is_new & on_line[:, component], number[other], number[g])
-            is_new &= ~on_line[:, component]
-        number[g, is_new] = n_nodes + np.arange(int(is_new.sum()))
-        new_nodes.append(symmetry.reflected(nodes[is_new], image))
-        n_nodes += int(is_new.sum())
-    return number, np.concatenate(new_nodes)
