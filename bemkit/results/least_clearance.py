@@ -104,8 +104,9 @@ def with_least_clearances(sample: Sample, n_pieces: int, xi: FloatArray) -> Poin
     -----
     A parabola falls below the least of three equidistant points by at most a quarter of the difference between them,
     and the distance from a sharp corner between two points by at most what it rises beyond them. An interval about the
-    least of the points is searched where the difference of the points beside it leads below zero: on every piece that
-    is free of traction or apart at all points, because its contact may be missed, and on the deepest of the others.
+    least of the points is searched where the difference of the points beside it leads below zero: about each minimum of
+    a piece that is free of traction or apart at all points, because its contact may be missed (also beside points that
+    face nothing), and on the deepest of the others.
     """
     pieces, low, high = np.arange(n_pieces), np.full(n_pieces, -1.0), np.ones(n_pieces)
     values = sample(pieces, low, high)
@@ -113,16 +114,16 @@ def with_least_clearances(sample: Sample, n_pieces: int, xi: FloatArray) -> Poin
     # friction that acts across a gap has a normal component where the direction of contact turns
     is_free = np.all((values.is_free | (values.clearance > 0.0)).reshape(n_pieces, xi.size), axis=1)
     while pieces.size:
-        clearance = values.clearance.reshape(pieces.size, xi.size)
-        least = clearance.min(axis=1)
-        nearest = np.argmin(clearance, axis=1)
-        beside = np.clip(nearest[:, None] + np.arange(-2, 3), 0, xi.size - 1)
-        about, first = np.take_along_axis(clearance, beside, axis=1), np.clip(nearest - 1, 0, xi.size - 3)
-        bound = 2.0 * least - about.max(axis=1)
-        chosen = (bound < np.minimum(0.0, np.where(is_free, 0.0, least.min()))) & (high - low > 2.0 * _SHORTEST)
-        half, middle = 0.5 * (high - low), 0.5 * (high + low)
-        low, high = ((middle + half * xi[end])[chosen] for end in (first, first + 2))
-        pieces, is_free = pieces[chosen], is_free[chosen]
+        clearance, size = values.clearance.reshape(pieces.size, xi.size), high - low
+        row, nearest = np.nonzero(_least(clearance) | ((is_free & (size == 2.0))[:, None] & _minima(clearance)))
+        least = clearance[row, nearest]
+        beside, first = nearest[:, None] + np.arange(-2, 3), np.clip(nearest - 1, 0, xi.size - 3)
+        bound = 2.0 * least - clearance[row[:, None], np.clip(beside, 0, xi.size - 1)].max(axis=1)
+        goal = np.where(is_free[row], 0.0, least.min(initial=0.0))
+        chosen = (bound < np.minimum(0.0, goal)) & (size[row] > 2.0 * _SHORTEST)
+        row, first = row[chosen], first[chosen]
+        middle, pieces, is_free = 0.5 * (high + low)[row], pieces[row], is_free[row]
+        low, high = (middle + 0.5 * size[row] * xi[end] for end in (first, first + 2))
         if pieces.size:
             values = sample(pieces, low, high)
             found.append(values)
@@ -134,6 +135,18 @@ def with_least_clearances(sample: Sample, n_pieces: int, xi: FloatArray) -> Poin
     is_new = np.diff(joined.s[order], prepend=-np.inf) > _SAME * joined.s.max(initial=0.0)
     is_new |= np.diff(owner[order], prepend=-1) > 0
     return joined.take(order[is_new & (joined.clearance[order] != np.inf)])
+
+
+def _least(clearance: FloatArray) -> BoolArray:
+    """Mark the least of each row (m, q) of clearances that are not all infinite."""
+    places = np.arange(clearance.shape[1]) == np.argmin(clearance, axis=1)[:, None]
+    return np.asarray(places & np.isfinite(clearance))
+
+
+def _minima(clearance: FloatArray) -> BoolArray:
+    """Mark the minima (m, q) of each row of clearances, those at the ends included."""
+    beside = np.pad(clearance, ((0, 0), (1, 1)), constant_values=np.inf)
+    return np.asarray((clearance < beside[:, :-2]) & (clearance <= beside[:, 2:]))
 
 
 def deepest(values: PointsBetween) -> tuple[float, FloatArray]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -114,17 +115,16 @@ def test_a_rigid_body_that_meets_no_node_ends_by_name(approach: float) -> None:
         assert solution.missed_contacts["block.top / ball"] == pytest.approx((0.013, 0.0), abs=1e-3)
 
 
-def sampled(low: float, middle: float, power: int = 2, n: int = 9, friction: float = 0.0) -> PointsBetween:
-    """Return the points of one piece whose clearance rises with a power of the distance from `low` at `middle`."""
+def sampled(clearance_of: Callable[[np.ndarray], np.ndarray], n: int = 9, friction: float = 0.0) -> PointsBetween:
+    """Return the points of one piece; friction acts against the place (n,) [-] on it."""
     xi = -np.cos(np.linspace(0.0, np.pi, n))
 
     def sample(pieces, low_end, high_end):
         at = (0.5 * (low_end + high_end)[:, None] + 0.5 * (high_end - low_end)[:, None] * xi).ravel()
-        nothing = np.zeros_like(at)
+        nothing, clearance = np.zeros_like(at), clearance_of(at)
         points = np.stack([at, nothing], axis=1)
-        clearance = np.abs(at - middle) ** power + low
-        # friction across the gap points to the corner from one side, and away from it on the other
-        along = friction * np.sign(middle - at)
+        # friction across the gap points to a corner from one side, and away from it on the other
+        along = -friction * np.sign(np.gradient(clearance, at)) if friction else nothing
         return PointsBetween(points, at, points, clearance, along, nothing, nothing)
 
     return with_least_clearances(sample, 1, xi)
@@ -132,10 +132,26 @@ def sampled(low: float, middle: float, power: int = 2, n: int = 9, friction: flo
 
 @pytest.mark.parametrize("middle", [-0.99, -0.1, 0.37, 0.875, 1.0])
 def test_the_least_clearance_is_found_where_no_point_is_inside(middle: float) -> None:
-    depth, place = deepest(sampled(-1e-9, middle))
+    depth, place = deepest(sampled(lambda at: (at - middle) ** 2 - 1e-9))
     assert depth == pytest.approx(1e-9, rel=1e-6)
     assert place[0] == pytest.approx(middle, abs=1e-2)
-    assert deepest(sampled(1e-9, middle))[0] == 0.0
+    assert deepest(sampled(lambda at: (at - middle) ** 2 + 1e-9))[0] == 0.0
+
+
+@pytest.mark.parametrize(
+    ("of_deeper", "begin"),
+    # a corner between two points, and the end of a piece that faces away
+    [(lambda at: 0.2 * np.abs(at + 0.61) - 0.005, -1.0), (lambda at: at + 0.99, -0.995)],
+)
+def test_the_deeper_of_two_minima_is_found_though_points_beside_it_are_higher(
+    of_deeper: Callable[[np.ndarray], np.ndarray], begin: float
+) -> None:
+    def clearance(at: np.ndarray) -> np.ndarray:
+        return np.where(at < begin, np.inf, np.minimum(of_deeper(at), (at - 0.71) ** 2 + 1e-3))
+
+    depth, place = deepest(sampled(clearance))
+    assert place[0] < -0.5
+    assert depth == pytest.approx(0.005, rel=0.4)  # points are a part of the overlap apart
 
 
 @pytest.mark.parametrize("friction", [0.0, 1.0])
@@ -143,7 +159,7 @@ def test_the_least_clearance_is_found_where_no_point_is_inside(middle: float) ->
 @given(middle=st.floats(-0.98, 0.98))
 def test_a_sharp_corner_between_two_points_is_found(n: int, friction: float, middle: float) -> None:
     """The deepest points lie in the smallest interval, which is as long as the overlap."""
-    depth, place = deepest(sampled(-0.005, middle, 1, n, friction))
+    depth, place = deepest(sampled(lambda at: np.abs(at - middle) - 0.005, n, friction))
     assert depth == pytest.approx(0.005, abs=0.003)
     assert place[0] == pytest.approx(middle, abs=0.005)
 
