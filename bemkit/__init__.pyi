@@ -51,7 +51,7 @@ from bemkit.operators.linear_solvers import MatrixFree as MatrixFree
 from bemkit.operators.material import Material as Material
 from bemkit.operators.material import Plane as Plane
 from bemkit.pictures.files import save_pictures as save_pictures
-from bemkit.plan import make_plan as make_plan
+from bemkit.plan.plan import make_plan as make_plan
 from bemkit.results.result_file import read_result as read_result
 from bemkit.results.result_file import write_result as write_result
 from bemkit.results.solution import Solution as Solution

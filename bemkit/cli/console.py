@@ -11,7 +11,7 @@ from rich.text import Text
 from bemkit.cli.outputs import plain_table, stdout_console
 from bemkit.errors import ResultWarning
 from bemkit.operators.counts import OperationCounts
-from bemkit.plan import Plan
+from bemkit.plan.plan import Plan
 from bemkit.results.solution import Solution
 from bemkit.results.summary_rows import summary_rows
 from bemkit.solvers.base import StepRecord

@@ -13,7 +13,7 @@ from bemkit.errors import concerning
 from bemkit.table import json_text
 
 if TYPE_CHECKING:
-    from bemkit.plan import Plan
+    from bemkit.plan.plan import Plan
     from bemkit.scene.scene import Scene
 
 
@@ -63,7 +63,7 @@ def _as_json(made: Plan) -> str:
 
 def _planned(scene: Scene) -> Plan:
     """Return the plan of a scene, with a symmetry that it could use."""
-    from bemkit.plan import check_elements, make_plan
+    from bemkit.plan.plan import check_elements, make_plan
     from bemkit.scene.symmetry import find_symmetry
 
     check_elements(scene)

@@ -1,4 +1,4 @@
-"""Dimensionless data of a body: supports, loads, motion far away; and its linear solver."""
+"""Dimensionless data of a body: supports, loads, motion far away."""
 
 from __future__ import annotations
 
@@ -14,17 +14,7 @@ from bemkit.errors import InputError
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.spaces import BoundarySpace, element_nodes
 from bemkit.model.units import Units
-from bemkit.operators.linear_solvers import (
-    Automatic,
-    ChosenLinearSolver,
-    Hierarchical,
-    LinearSolverChoice,
-    MatrixFree,
-    Tag,
-    choose_linear_solver,
-)
 from bemkit.operators.steklov_poincare import SteklovPoincare, TractionField
-from bemkit.operators.steklov_poincare.cost import BodyCase, physical_memory
 from bemkit.operators.steklov_poincare.nodal_conditions import (
     ConflictingSupportsError,
     GivenData,
@@ -48,13 +38,6 @@ from bemkit.scene.conditions import (
 if TYPE_CHECKING:
     from bemkit.operators.half_plane.far_motion import FarMotion
     from bemkit.operators.steklov_poincare.forces_inside import ForcesInside
-
-_FEWEST_ELEMENTS = 200
-"""Smallest number of elements of compressed equations."""
-_MOST_LOOPS = 41
-"""An outer curve and 40 holes: each closed curve adds an equation that passes through the whole tree."""
-_LEAST_COMPRESSIBILITY = 1e-8
-"""Smallest 1/2 - nu of a body with holes; below, the clusters of the tree are nearly singular."""
 
 
 def held_nodes(scene: BodyScene, mesh: BoundaryMesh, units: Units, space: BoundarySpace) -> NodalConditions:
@@ -234,92 +217,3 @@ def _layout(part: Part) -> tuple[object, ...]:
     elif isinstance(condition, Force):
         components = (condition.is_rigid,)
     return part.name, part.sides, part.where, type(condition), components
-
-
-def linear_solver_of(
-    requested: LinearSolverChoice, elastic: SteklovPoincare, method: str, case: BodyCase
-) -> ChosenLinearSolver:
-    """Choose the linear solver of a map.
-
-    Parameters
-    ----------
-    requested : LinearSolver, Hierarchical or Automatic
-    elastic : SteklovPoincare
-        With dense equations.
-    method : str
-        Name of the discretisation in messages.
-    case : BodyCase
-        Its linear solver is not used.
-
-    Raises
-    ------
-    InputError
-        If compressed equations of Galerkin's method are requested: there are none.
-    """
-    if Tag.SYMMETRIC not in elastic.tags:
-        from bemkit.operators.steklov_poincare.collocation import CollocationElasticity
-
-        # a map that derives from collocation may change what it condenses: only bemkit's own equations are compressed
-        hindrance = "" if type(elastic) is CollocationElasticity else f"{method} has no such equations"
-        return _collocation_solver(requested, case, hindrance)
-    if isinstance(requested, Hierarchical) and case.mesh.surface is None:
-        raise InputError(
-            f"linear_solver is 'hierarchical', but discretisation {method} has dense equations only: "
-            'take discretisation = "constant", whose equations are compressed, or hp with an accuracy and '
-            'linear_solver = "automatic"'
-        )
-    return choose_linear_solver(requested)
-
-
-def _collocation_solver(requested: LinearSolverChoice, case: BodyCase, hindrance: str = "") -> ChosenLinearSolver:
-    """Choose between the dense and the compressed equations of collocation.
-
-    Parameters
-    ----------
-    requested : LinearSolver, Hierarchical or Automatic
-    case : BodyCase
-        Its linear solver is ignored.
-    hindrance : str, optional
-        Further reason why the equations cannot be compressed.
-
-    Returns
-    -------
-    ChosenLinearSolver
-        Compressed equations if they are requested, predicted to be at least twice as fast, or the only ones that fit
-        into memory.
-    """
-    if isinstance(requested, MatrixFree):
-        from bemkit.operators.matrix_free.cost import why_stored
-
-        if not (stored := hindrance or why_stored(case)):
-            return ChosenLinearSolver("asked for", requested)
-        other = _collocation_solver(Automatic(), case, hindrance)
-        return replace(other, reason=f"not matrix-free, because {stored}; {other.reason}")
-    if not isinstance(requested, Automatic | Hierarchical):
-        return ChosenLinearSolver("asked for", solver=requested)
-    if hindrance := hindrance or _why_dense(case):
-        return ChosenLinearSolver(f"the equations are not compressed, because {hindrance}")
-    if isinstance(requested, Hierarchical):
-        return ChosenLinearSolver("asked for", requested)
-    from bemkit.operators.steklov_poincare.hierarchical_cost import compressed_if_cheaper
-
-    return compressed_if_cheaper(case, physical_memory())
-
-
-def _why_dense(case: BodyCase) -> str:
-    """Return why the equations of a body cannot be compressed; empty if they can."""
-    mesh = case.mesh
-    if mesh.n_elements < _FEWEST_ELEMENTS:
-        return f"{mesh.n_elements} elements are few"
-    if len(mesh.loops) > _MOST_LOOPS:
-        return f"the boundary has {len(mesh.loops)} closed curves"
-    if _is_incompressible_with_holes(case):
-        return "the material is incompressible, and the body has holes"
-    if case.is_enclosed:  # clusters do not determine the pressure
-        return "contact and supports take all of the boundary of the incompressible body"
-    return ""
-
-
-def _is_incompressible_with_holes(case: BodyCase) -> bool:
-    """Whether the pressure in each hole is nearly undetermined, which makes clusters around holes nearly singular."""
-    return len(case.mesh.loops) > 1 and case.material.effective_poisson_ratio > 0.5 - _LEAST_COMPRESSIBILITY

@@ -21,14 +21,14 @@ from bemkit.geometry.spaces import dof_points
 from bemkit.model.contact_data import ContactData
 from bemkit.model.contacts import ContactInterface, candidates_of, law_of_rows, may_overlap, obstacle_rows, retained_for
 from bemkit.model.fields import TractionRecovery
-from bemkit.model.given import far_motion_of, given_data, held_nodes, linear_solver_of, nodal_forces, with_far_motion
+from bemkit.model.given import far_motion_of, given_data, held_nodes, nodal_forces, with_far_motion
 from bemkit.model.placed import Meshes, PlacedBody, bodies_under, check_step, find_units, place, with_found_contacts
 from bemkit.model.units import Units
 from bemkit.operators.linear_solvers import ChosenLinearSolver, DenseCholesky, LinearSolver, Tag
 from bemkit.operators.material import Material
 from bemkit.operators.steklov_poincare import SteklovPoincare
-from bemkit.operators.steklov_poincare.cost import BodyCase
 from bemkit.operators.steklov_poincare.nodal_conditions import GivenData, NodalConditions, free_modes, turning
+from bemkit.plan.costs import BodyCase, choose
 from bemkit.scene.discretisation import thinness_warnings
 from bemkit.scene.scene import Scene
 
@@ -36,6 +36,9 @@ if TYPE_CHECKING:
     from bemkit.operators.half_plane.far_motion import FarMotion
     from bemkit.operators.steklov_poincare.forces_inside import ForcesInside
     from bemkit.scene.contacts import ContactPair
+
+_LARGEST_BLOCK = 1000
+"""Typical order of the largest dense block of equations over a tree."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,10 +140,8 @@ class Prepared:
 
     def linear_solver(self, body: PreparedBody) -> ChosenLinearSolver:
         """Return the linear solver of the map of a body, and the reason."""
-        elastic = self._map_of(body, DenseCholesky())
-        data = (body.map_data,)
-        case = BodyCase(body.own_mesh.unit, elastic.material, body.conditions, data, is_condensed=self.is_condensed)
-        return linear_solver_of(self.scene.linear_solver, elastic, body.scene.discretisation.method, case)
+        case = BodyCase(self._map_of(body, DenseCholesky()), body.conditions, (body.map_data,), self.is_condensed)
+        return choose(self.scene.linear_solver, case, body.scene.discretisation.method)
 
     def _map_of(self, body: PreparedBody, linear_solver: LinearSolver) -> SteklovPoincare:
         return body.scene.discretisation.elastic_map(body.own_mesh.unit, self.material_of(body), linear_solver)
@@ -173,9 +174,7 @@ class Prepared:
         body = max(self.bodies, key=lambda body: body.space.n_dofs)
         if self.linear_solver(body).hierarchical is None:
             return body.space.n_dofs
-        from bemkit.operators.steklov_poincare.hierarchical_cost import LARGEST_BLOCK
-
-        return min(LARGEST_BLOCK, body.space.n_dofs)
+        return min(_LARGEST_BLOCK, body.space.n_dofs)
 
     def column(self, name: str) -> FloatArray:
         """Return a column of `ContactInterface` for all contact nodes."""

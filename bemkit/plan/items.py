@@ -11,8 +11,9 @@ import numpy as np
 from bemkit.contact.laws import FrictionLaw
 from bemkit.model.placed import PlacedBody, groups
 from bemkit.model.prepared import Prepared
+from bemkit.operators.linear_solvers import MatrixFree, Tag
 from bemkit.operators.rigid_modes import admissible_modes
-from bemkit.operators.steklov_poincare.cost import PlanItem
+from bemkit.plan.costs import HALF_PLANE_OVER_TREE, BodyCase, cost_of, rates_of
 from bemkit.scene.body_scene import BodyScene
 from bemkit.scene.registry import BODY_FORCES
 from bemkit.scene.scene import Scene
@@ -23,6 +24,30 @@ if TYPE_CHECKING:
 _MOST_NAMED = 12
 """Largest number of different bodies that have a line each."""
 _DEGREES = ("constant", "linear", "quadratic")
+
+
+@dataclass(frozen=True)
+class PlanItem:
+    """One operator, matrix or library that a scene needs or skips, and why.
+
+    Parameters
+    ----------
+    name : str
+    is_needed : bool
+    reason : str
+    """
+
+    name: str
+    is_needed: bool
+    reason: str
+
+    def as_dict(self) -> dict[str, str | bool]:
+        """Return the item as a JSON object."""
+        return {"name": self.name, "needed": self.is_needed, "reason": self.reason}
+
+
+_NO_MULTIGRID = PlanItem("algebraic multigrid (pyamg)", False, "the linear solver is direct")
+_NO_HYPERSINGULAR = PlanItem("hypersingular operator W", False, "collocation takes only the displacement equation")
 
 
 @dataclass(frozen=True)
@@ -76,9 +101,9 @@ def find_sizes(prepared: Prepared) -> Sizes:
         traction_degree=max(body.traction_space.degree for body in bodies),
         n_displacements=sum(body.space.n_dofs for body in bodies),
         n_tractions=sum(body.traction_space.n_dofs for body in bodies),
-        n_fixed=sum(int(np.count_nonzero(body.conditions.is_fixed)) for body in bodies),
-        n_free=sum(int(np.count_nonzero(body.conditions.is_free)) for body in bodies),
-        n_open=sum(int(np.count_nonzero(body.conditions.is_retained)) for body in bodies),
+        n_fixed=sum(body.conditions.n_fixed for body in bodies),
+        n_free=sum(body.conditions.n_free for body in bodies),
+        n_open=sum(body.conditions.n_retained for body in bodies),
         n_contact=prepared.n_contact,
         n_contact_unknowns=2 * prepared.n_contact - int(np.count_nonzero(prepared.tangent_follows)),
         n_motions=sum(len(admissible_modes(body.mesh)) for body in bodies) + 3 * len(prepared.scene.rigid),
@@ -87,7 +112,7 @@ def find_sizes(prepared: Prepared) -> Sizes:
 
 
 def items_of_one(
-    scene: BodyScene, sizes: Sizes, of_body: tuple[PlanItem, ...], n_steps: int, proposal: Symmetry | None = None
+    scene: BodyScene, sizes: Sizes, case: BodyCase, n_steps: int, proposal: Symmetry | None = None
 ) -> tuple[PlanItem, ...]:
     """Return the needed and skipped items of a scene of one body, in the order of their use.
 
@@ -95,11 +120,128 @@ def items_of_one(
     """
     return (
         *_mesh_items(scene, sizes, proposal),
-        *of_body,
+        *_items_of_body(case),
         _body_force_item(scene),
         *_contact_items(scene, sizes, n_steps),
         *_last_items(n_steps, "displacement inside the body", "stress inside the body"),
     )
+
+
+def _items_of_body(case: BodyCase) -> Iterator[PlanItem]:
+    """Yield what the elastic map of a body needs."""
+    if case.mesh.surface is not None:
+        yield from _half_plane_items(case)
+    elif case.chosen.hierarchical is not None:
+        yield from _compressed_items(case)
+    elif Tag.SYMMETRIC in case.elastic.tags:
+        yield from _galerkin_items(case)
+    elif case.work.element_pairs:
+        yield from _collocation_items(case)
+
+
+def _galerkin_items(case: BodyCase) -> Iterator[PlanItem]:
+    t, u = case.elastic.traction_space.n_dofs, case.elastic.displacement_space.n_dofs
+    yield PlanItem("single layer V", True, f"maps tractions to displacements; symmetric; {t} x {t}")
+    yield PlanItem("double layer K", True, f"maps displacements to displacements; {t} x {u}")
+    yield PlanItem("adjoint double layer K'", False, "it is the transpose of K")
+    yield PlanItem("hypersingular operator W", True, f"makes the Steklov-Poincare map symmetric; {u} x {u}")
+    inverse = f"V^-1 by Cholesky, because V is symmetric and positive definite; order {t}"
+    yield PlanItem("Steklov-Poincare map", True, inverse)
+    solver = f"{case.chosen.reason}; order {case.conditions.n_free}"
+    yield PlanItem("linear solver of the body", True, solver)
+    yield _NO_MULTIGRID
+    is_incompressible = case.elastic.material.is_incompressible and not case.mesh.is_exterior
+    volume = "Poisson's ratio is 1/2" if is_incompressible else "the body is compressible"
+    yield PlanItem("pressure that keeps the volume", is_incompressible, volume)
+
+
+def _collocation_items(case: BodyCase) -> Iterator[PlanItem]:
+    work, conditions = case.work, case.conditions
+    u, n_retained, single, double = (
+        conditions.is_fixed.size,
+        conditions.n_retained,
+        work.single_layer,
+        work.double_layer,
+    )
+    n_single, n_double = conditions.n_fixed + n_retained, conditions.n_free + n_retained
+    yield PlanItem("single layer V", True, f"unknown tractions: held and retained directions; {u} x {n_single}")
+    zero = u - single.computed // u
+    yield _zero_columns("columns of V on the free surface", "the traction is zero there", zero, u)
+    yield PlanItem("double layer K", True, f"unknown displacements: free and retained directions; {u} x {n_double}")
+    zero = u - double.computed // u
+    yield _zero_columns("columns of K where supports hold", "the displacement is zero there", zero, u)
+    n_given = (single.computed - single.stored + double.computed - double.stored) // u
+    given = f"{n_given} columns are multiplied by given data at once" if n_given else "all given data are zero"
+    yield PlanItem("storage of columns under given data", False, given)
+    yield from _slopes_items(case)
+    yield PlanItem("adjoint double layer K'", False, _NO_HYPERSINGULAR.reason)
+    yield _NO_HYPERSINGULAR
+    order = max((factorisation.order for factorisation in work.factorisations), default=0)
+    solver = f"LU, because the equations of collocation are not symmetric; order {order}; {case.chosen.reason}"
+    yield PlanItem("linear solver of the body", True, solver)
+    yield _NO_MULTIGRID
+    is_incompressible = case.elastic.material.is_incompressible
+    volume = "collocation has it among the tractions" if is_incompressible else "the body is compressible"
+    yield PlanItem("pressure that keeps the volume", False, volume)
+
+
+def _zero_columns(name: str, reason: str, n_columns: int, n_all: int) -> PlanItem:
+    if n_columns <= 0:
+        return PlanItem(name, True, "no column can be skipped")
+    return PlanItem(name, False, f"{reason}; {n_columns} of {n_all} columns")
+
+
+def _slopes_items(case: BodyCase) -> Iterator[PlanItem]:
+    from bemkit.operators.steklov_poincare.collocation import CollocationElasticity
+
+    if isinstance(case.elastic, CollocationElasticity):
+        slopes = case.elastic.slopes
+        reason = "rotations then cause no tractions" if slopes else "the method of the source paper"
+        yield PlanItem("slopes between constant elements", slopes, reason)
+
+
+def _compressed_items(case: BodyCase) -> Iterator[PlanItem]:
+    """Yield what equations need that are compressed over a tree, or not stored."""
+    from bemkit.operators.collocation import compiled
+
+    options, (is_compiled, why) = case.chosen.hierarchical, compiled.expected(case.mesh.n_elements)
+    assert options is not None
+    is_free = isinstance(options, MatrixFree)
+    form = "products by the fast multipole method"
+    if not is_free:
+        form = f"single and double layer, compressed over a tree to {options.tolerance:g}"
+    yield PlanItem("boundary equations", True, f"{form}: {case.chosen.reason}")
+    yield from _slopes_items(case)
+    yield _NO_HYPERSINGULAR
+    solver = "LU of the clusters of the tree; no matrix of the whole body"
+    if is_free:
+        solver = f"GMRES to {options.tolerance:g}, about 17 steps from cold"
+    yield PlanItem("linear solver of the body", True, solver)
+    chosen, other = (cost_of(case, is_compiled=choice).seconds for choice in (is_compiled, not is_compiled))
+    others = "numpy" if is_compiled else "compiled ones"
+    reason = f"{why}; {others} would take about {other:.3g} s instead of {chosen:.3g} s"
+    yield PlanItem("compiled kernels (numba)", is_compiled, reason)
+    hierarchy = PlanItem("algebraic multigrid (pyamg)", True, "its hierarchy inverts the single layer between elements")
+    yield hierarchy if is_free else _NO_MULTIGRID
+
+
+def _half_plane_items(case: BodyCase) -> Iterator[PlanItem]:
+    n, surface, conditions = case.mesh.n_elements, case.mesh.surface, case.conditions
+    is_periodic = surface is not None and surface.is_periodic
+    form = f"closed form: {n} x {n} means of logarithms"
+    if is_periodic:
+        form = f"one number for each of {n} waves, by Fourier transforms"
+    yield PlanItem("flexibility of the surface", True, form)
+    around = "waves die out below the surface" if is_periodic else "the surface beyond the strip is free"
+    yield PlanItem("elements inside, around or below", False, f"{around} in closed form")
+    if is_periodic:
+        reason = f"each response is found by GMRES, with 120 vectors of {conditions.n_retained} numbers"
+        yield PlanItem("matrices", False, reason)
+    else:
+        yield PlanItem("double layer, hypersingular operator", False, "they vanish on a straight free surface")
+    yield PlanItem("supports", conditions.n_fixed > 0, "the half-plane is held or driven far away")
+    if rates_of(case) is HALF_PLANE_OVER_TREE:
+        yield PlanItem("tree of clusters", True, f"{n} elements are many: one factor over them")
 
 
 def _further_meshes(accuracy: float | None, given: str, first: str) -> PlanItem:

@@ -6,23 +6,14 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from bemkit.errors import InputError, ResultWarning, first_of_each_kind
 from bemkit.model.placed import Meshes, groups
 from bemkit.model.prepared import Prepared, prepare_steps
 from bemkit.notebook import ShownInNotebooks
 from bemkit.operators.counts import OperationCounts
 from bemkit.operators.linear_solvers import LinearSolver
-from bemkit.operators.steklov_poincare.cost import (
-    CONTACT_STEPS,
-    BodyCase,
-    BodyCost,
-    PlanItem,
-    physical_memory,
-    seconds_of,
-)
-from bemkit.plan.items import Sizes, find_sizes, items_of_one, items_of_several
+from bemkit.plan.costs import BYTES, CONTACT_STEPS, SECONDS_PER_FLOP, BodyCase, cost_of, physical_memory
+from bemkit.plan.items import PlanItem, Sizes, find_sizes, items_of_one, items_of_several
 from bemkit.scene.scene import Scene
 from bemkit.stopwatch import announce
 
@@ -31,7 +22,6 @@ if TYPE_CHECKING:
     from bemkit.geometry.symmetry.lines import Symmetry
     from bemkit.scene.body_scene import BodyScene
 
-_BYTES = 8
 _FLOPS_PER_NUMBER = 30.0
 """Flops of a factorisation in the time that a number takes to move through memory."""
 LEAST_SECONDS = 0.1
@@ -121,14 +111,15 @@ def plan_steps(steps: Sequence[Prepared], proposal: Symmetry | None = None) -> P
     """
     first = steps[0]
     firsts = [int(group[0]) for group in groups(first.bodies)]
-    costs, drawn = [_cost_of(steps, number) for number in firsts], [first.bodies[number] for number in firsts]
+    cases, drawn = [_case_of(steps, number) for number in firsts], [first.bodies[number] for number in firsts]
+    costs = [cost_of(case) for case in cases]
     sizes = find_sizes(first)
     linear_solver = first.linear_solver(max(first.bodies, key=lambda body: body.space.n_dofs))
-    contact = _ContactSystem.of(first, sizes, is_matrix_free=any(each.is_matrix_free for each in costs))
+    contact = _ContactSystem.of(first, sizes, forms_matrix=not any(each.forms_no_matrix for each in cases))
     kept = sum(each.kept for each in costs)
-    flops = sum(each.flops for each in costs) + CONTACT_STEPS * len(steps) * contact.flops
+    seconds = LEAST_SECONDS + CONTACT_STEPS * len(steps) * SECONDS_PER_FLOP * contact.flops
     if first.scene.has_obstacles_only:
-        items = items_of_one(first.only.scene, sizes, costs[0].items, len(steps), proposal)
+        items = items_of_one(first.only.scene, sizes, cases[0], len(steps), proposal)
     else:
         items = tuple(items_of_several(first, sizes, len(steps), is_dense=contact.is_dense))
     thinness = [warning for body in drawn for warning in first.thinness_warnings(body)]
@@ -138,7 +129,7 @@ def plan_steps(steps: Sequence[Prepared], proposal: Symmetry | None = None) -> P
         sizes=sizes,
         work=sum((each.work for each in costs), OperationCounts(contact_unknowns=sizes.n_contact_unknowns)),
         memory=int(kept + max(contact.memory, *(each.memory - each.kept for each in costs))),
-        seconds=LEAST_SECONDS + seconds_of(sum(each.evaluations for each in costs), flops),
+        seconds=seconds + sum(each.seconds for each in costs),
         items=items,
         warnings=first_of_each_kind(dict.fromkeys([*thinness, *of_profiles, *map(_too_short, first.unresolved)])),
         is_compressed=linear_solver.hierarchical is not None,
@@ -160,17 +151,10 @@ def _profile_warnings(scene: BodyScene) -> Iterator[ResultWarning]:
         yield from profile_warnings(scene.obstacles, scene.units)
 
 
-def _cost_of(steps: Sequence[Prepared], number: int) -> BodyCost:
+def _case_of(steps: Sequence[Prepared], number: int) -> BodyCase:
     first, body = steps[0], steps[0].bodies[number]
-    case = BodyCase(
-        body.own_space.mesh,
-        first.material_of(body),
-        body.conditions,
-        tuple(step.bodies[number].map_data for step in steps),
-        first.linear_solver(body),
-        first.is_condensed,
-    )
-    return first.elastic_map(body).cost(case)
+    loads = tuple(step.bodies[number].map_data for step in steps)
+    return BodyCase(first.elastic_map(body), body.conditions, loads, first.is_condensed, first.linear_solver(body))
 
 
 @dataclass(frozen=True)
@@ -182,16 +166,16 @@ class _ContactSystem:
     is_dense: bool
 
     @classmethod
-    def of(cls, prepared: Prepared, sizes: Sizes, *, is_matrix_free: bool) -> _ContactSystem:
+    def of(cls, prepared: Prepared, sizes: Sizes, *, forms_matrix: bool) -> _ContactSystem:
         """Count the numbers of the matrix of relative displacements and of its factors."""
         n, u = sizes.n_contact_unknowns + sizes.n_free_motions, sizes.n_displacements
-        if is_matrix_free or not prepared.n_contact:
+        if not forms_matrix or not prepared.n_contact:
             return cls(0.0, 0.0, is_dense=True)
         if prepared.scene.has_obstacles_only or n <= _most_dense():
             flops = 2.0 / 3.0 * n**3 + _FLOPS_PER_NUMBER * (60.0 * n * n + u * u)
-            return cls(6.0 * _BYTES * n**2, flops, is_dense=True)
-        coupled = sum(int(np.count_nonzero(body.conditions.is_retained)) ** 2 for body in prepared.bodies)
-        return cls(_BYTES * _FILL * coupled, 40.0 * _FILL * coupled, is_dense=False)
+            return cls(6.0 * BYTES * n**2, flops, is_dense=True)
+        coupled = sum(body.conditions.n_retained**2 for body in prepared.bodies)
+        return cls(BYTES * _FILL * coupled, 40.0 * _FILL * coupled, is_dense=False)
 
 
 def _most_dense() -> int:

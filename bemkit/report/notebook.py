@@ -11,7 +11,7 @@ from bemkit.pictures.deformation import draw_deformation, draw_scene
 from bemkit.pictures.drawing import Axes
 from bemkit.pictures.load_history import draw_friction_loop
 from bemkit.pictures.shown import Result
-from bemkit.plan import Plan
+from bemkit.plan.plan import Plan
 from bemkit.report.html import Element, element, facts, image, render, table
 from bemkit.report.pictures import has_pictures
 from bemkit.report.sections import badge, plan_section

@@ -7,7 +7,7 @@ from typing import Any
 
 from bemkit.hdf5 import provenance
 from bemkit.pictures.shown import Result
-from bemkit.plan import Plan
+from bemkit.plan.plan import Plan
 from bemkit.report.html import Element, element, facts, number, table
 from bemkit.results.file_meanings import CONTACT_COLUMNS
 from bemkit.results.tables import RESULTANT_COLUMNS, history_columns, in_units

@@ -48,7 +48,7 @@ from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.outline import Surface
 from bemkit.geometry.symmetry.lines import Symmetry
 from bemkit.hdf5 import FileFormat, Reader, ResultFileError, write_array, write_table
-from bemkit.plan import Plan
+from bemkit.plan.plan import Plan
 from bemkit.results.file_meanings import annotate
 from bemkit.results.load_history import LoadHistory, LoadStep
 from bemkit.results.solution import Solution

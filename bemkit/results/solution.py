@@ -18,7 +18,7 @@ from bemkit.contact.certificate import Certificate
 from bemkit.errors import InputError, ResultWarning
 from bemkit.notebook import Explorable
 from bemkit.operators.counts import OperationCounts
-from bemkit.plan import Plan
+from bemkit.plan.plan import Plan
 from bemkit.results.between_nodes import BetweenNodes, missed_contacts, unfound_contacts
 from bemkit.results.contact_table import ContactTable as ContactTable
 from bemkit.results.contact_table import narrow_contacts

@@ -20,7 +20,7 @@ from bemkit.errors import ResultWarning
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.hdf5 import Reader, write_array, write_table
 from bemkit.operators.counts import OperationCounts
-from bemkit.plan import Plan
+from bemkit.plan.plan import Plan
 from bemkit.results.contact_table import ContactTable
 from bemkit.results.load_history import LoadStep, StepWork
 from bemkit.results.part_forces import ContactForce, PartForce, RigidResult

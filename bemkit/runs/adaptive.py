@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, cast
 
 from bemkit.errors import BemkitError, InputError
-from bemkit.plan import make_plan
+from bemkit.plan.plan import make_plan
 from bemkit.results.solution import Solution
 from bemkit.results.solved_steps import with_totals
 from bemkit.runs.density import DensityMeshes

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from bemkit.contact.body import ContactState
 from bemkit.errors import BemkitError, InputError
 from bemkit.model.model import Model
-from bemkit.plan import check_elements
+from bemkit.plan.plan import check_elements
 from bemkit.results.solution import Solution
 from bemkit.runs.steps import joined, solved_history
 from bemkit.runs.warm_start import state_on, take_sticking_state

@@ -17,7 +17,7 @@ from bemkit.geometry.spaces import dof_points
 from bemkit.model.fields import HeldForces
 from bemkit.model.model import Model
 from bemkit.model.solved_contact import contact_warnings
-from bemkit.plan import Plan
+from bemkit.plan.plan import Plan
 from bemkit.results.contact_table import ContactTable, bound_at, free_contacts
 from bemkit.results.part_forces import PartForce, RigidResult, contact_forces, forces_on_parts, nodal_resultant
 from bemkit.results.solution import Solution

@@ -18,7 +18,7 @@ from bemkit.model.placed import Meshes
 from bemkit.model.prepared import Prepared, prepare_steps
 from bemkit.model.solved_contact import with_energies_checked, with_sliding_checked
 from bemkit.operators.threads import blas_threads_for
-from bemkit.plan import Plan, announce_plan, check_elements, check_memory, plan_steps
+from bemkit.plan.plan import Plan, announce_plan, check_elements, check_memory, plan_steps
 from bemkit.runs.load_path import Callback, IncrementEnd, Path, ReachedStep, advance
 from bemkit.runs.solution_of import solution_of, with_missed_contact_named
 from bemkit.scene.scene import Scene

@@ -128,8 +128,8 @@ def _solved(scene: Scene, name: str) -> Solution:
     )
     demand(
         solution.work == solution.plan.work,
-        f"{name}.elastic_map: its cost predicts {solution.plan.work.as_dict()}, "
-        f"but it counts {solution.work.as_dict()}",
+        f"{name}.elastic_map: its counts are {solution.plan.work.as_dict()}, "
+        f"but the run counts {solution.work.as_dict()}",
     )
     return solution
 

@@ -8,7 +8,7 @@ import pytest
 
 import bemkit as bk
 from bemkit.operators.linear_solvers import choose_linear_solver
-from bemkit.plan import make_plan
+from bemkit.plan.plan import make_plan
 
 SCENE = replace(bk.load_scene("paper-1"), mesh=bk.MeshOptions(elements=60))
 

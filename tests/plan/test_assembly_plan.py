@@ -1,8 +1,7 @@
 import bemkit as bk
 from bemkit.contact.joined.sparse_form import sparse_solver_name
 from bemkit.model.prepared import prepare
-from bemkit.plan import make_plan
-from bemkit.plan.plan import plan_steps
+from bemkit.plan.plan import make_plan, plan_steps
 from tests.runs.masonry import wall
 
 

@@ -10,7 +10,7 @@ import pytest
 
 import bemkit as bk
 from bemkit.operators.counts import Entries, Factorisation, FactorKind, OperationCounts
-from bemkit.plan import make_plan
+from bemkit.plan.plan import make_plan
 from bemkit.results.result_file import read_result, write_result
 from bemkit.scene.toml import load_scene, with_overrides
 from tests.slow import slow_only

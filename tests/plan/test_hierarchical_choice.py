@@ -15,7 +15,8 @@ import bemkit as bk
 from bemkit.model.prepared import prepare
 from bemkit.operators.linear_solvers import ChosenLinearSolver, DenseCholesky
 from bemkit.operators.steklov_poincare.galerkin import GalerkinElasticity
-from bemkit.plan import check_elements, plan
+from bemkit.plan import plan
+from bemkit.plan.plan import check_elements
 from bemkit.results.solved_steps import with_times
 from bemkit.runs.nested import run_nested
 from tests.scenes import Perforated, paper, squeezed

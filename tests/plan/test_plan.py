@@ -17,8 +17,8 @@ from bemkit.contact.laws import Frictionless
 from bemkit.contact.obstacle import RigidHalfPlane
 from bemkit.geometry.shapes import Disk, Rectangle
 from bemkit.operators.material import Material
-from bemkit.operators.steklov_poincare.cost import physical_memory
-from bemkit.plan import Plan, TooLargeError, check_elements, check_memory, make_plan
+from bemkit.plan.costs import physical_memory
+from bemkit.plan.plan import Plan, TooLargeError, check_elements, check_memory, make_plan
 from bemkit.scene.body_scene import BodyScene
 from bemkit.scene.conditions import Clamped, Condition, Contact, Part, PrescribedDisplacement, Roller
 from bemkit.scene.discretisation import MeshOptions

@@ -15,7 +15,7 @@ from bemkit.cli.main import main
 from bemkit.hdf5 import ResultFileError
 from bemkit.pictures import figures as pictures_of
 from bemkit.pictures.catalogue import default_pictures
-from bemkit.plan import make_plan
+from bemkit.plan.plan import make_plan
 from bemkit.results.solution import Solution
 from bemkit.results.tables import to_csv, to_json
 from bemkit.scene.toml import with_overrides

@@ -19,7 +19,7 @@ from bemkit.errors import ResultWarning, first_of_each_kind, without_duplicates
 from bemkit.formulas import Expression
 from bemkit.geometry.shapes import Rectangle
 from bemkit.operators.material import Material
-from bemkit.plan import make_plan
+from bemkit.plan.plan import make_plan
 from bemkit.results.result_file import read_result, write_result
 from bemkit.results.solution import Solution
 from bemkit.results.tables import to_json

@@ -7,7 +7,7 @@ import pytest
 
 import bemkit as bk
 from bemkit.geometry import discretise
-from bemkit.plan import make_plan
+from bemkit.plan.plan import make_plan
 from bemkit.scene.discretisation import thicknesses
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -14,12 +14,12 @@ import bemkit as bk
 from bemkit.arrays import FloatArray
 from bemkit.cli.main import main
 from bemkit.geometry.spaces import BoundarySpace, ConstantSpace, LinearSpace, QuadraticSpace
+from bemkit.operators.counts import OperationCounts
 from bemkit.operators.linear_solvers import LinearSolver, Tag
 from bemkit.operators.steklov_poincare import CondensedMap
 from bemkit.operators.steklov_poincare.collocation import CollocationElasticity
-from bemkit.operators.steklov_poincare.cost import BodyCase, BodyCost
 from bemkit.operators.steklov_poincare.galerkin import GalerkinElasticity
-from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions
+from bemkit.operators.steklov_poincare.nodal_conditions import GivenData, NodalConditions
 from bemkit.scene.discretisation import Discretisation
 from bemkit.scene.registry import DISCRETISATIONS
 from bemkit.testing import CheckFailed, check_discretisation
@@ -164,9 +164,9 @@ class TooHigh(Own):
 class Unforeseen(CollocationElasticity):
     """Predicts nothing."""
 
-    def cost(self, case: BodyCase) -> BodyCost:
+    def counts(self, conditions: NodalConditions, loads: Sequence[GivenData]) -> OperationCounts:
         """Return nothing."""
-        return BodyCost()
+        return OperationCounts()
 
 
 @dataclass(frozen=True)
@@ -247,7 +247,7 @@ class HalfTheTractions(bk.ConstantCollocation):
         (Vague(), "Vague.estimates_error is None, not a bool"),
         (OtherSpace(), "OtherSpace.displacement_space is not the displacement_space of its map"),
         (TooHigh(), r"TooHigh.estimates_error is True with .* of the degrees \(2, 0\)"),
-        (Uncounted(), "Uncounted.elastic_map: its cost predicts .*'element_pairs': 0.*, but it counts"),
+        (Uncounted(), "Uncounted.elastic_map: its counts are .*'element_pairs': 0.*, but the run counts"),
         (NotSymmetric(), "NotSymmetric.elastic_map says it is symmetric: it differs from its transpose by"),
         (Turning(), "Turning.elastic_map says it is zero on rigid motions: a turn causes"),
         (Springs(), "Springs.elastic_map: a translation causes forces"),

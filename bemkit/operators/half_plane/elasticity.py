@@ -11,8 +11,7 @@ import numpy as np
 from bemkit.arrays import ComplexArray, FloatArray
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.proximity.cluster_tree import ClusterTree
-from bemkit.operators.counts import OperationCounts
-from bemkit.operators.half_plane.cost import flexibility_work, strip_cost
+from bemkit.operators.counts import Entries, OperationCounts
 from bemkit.operators.half_plane.equations import HalfPlaneEquations, StripView, potential_of
 from bemkit.operators.half_plane.far_motion import FarMotion
 from bemkit.operators.half_plane.flexibility import mean_logarithms
@@ -20,7 +19,6 @@ from bemkit.operators.half_plane.periodic import PeriodicElasticity
 from bemkit.operators.half_plane.surface import SurfaceElasticity
 from bemkit.operators.hierarchy.factor import Factor
 from bemkit.operators.material import Material
-from bemkit.operators.steklov_poincare.cost import BodyCase, BodyCost
 
 LARGEST_DENSE = 1500
 """Largest number of elements of a half-plane whose flexibility is stored as a matrix."""
@@ -46,11 +44,8 @@ class HalfPlaneElasticity(SurfaceElasticity):
     @property
     def work(self) -> OperationCounts:
         """Operation counts of the flexibility."""
-        return flexibility_work(self.mesh.n_elements)
-
-    def cost(self, case: BodyCase) -> BodyCost:
-        """Return counts, memory and time of the map."""
-        return strip_cost(case, has_tree=False)
+        n = self.mesh.n_elements
+        return OperationCounts(element_pairs=n**2, single_layer=Entries.full(n, n))
 
     def _displaced(self, traction: ComplexArray) -> ComplexArray:
         force = self.mesh.lengths * traction
@@ -89,10 +84,6 @@ class LargeHalfPlane(HalfPlaneElasticity):
     def work(self) -> OperationCounts:
         """Return no counts, because no matrix is formed."""
         return OperationCounts()
-
-    def cost(self, case: BodyCase) -> BodyCost:
-        """Return memory and time of the map."""
-        return strip_cost(case, has_tree=True)
 
     @cached_property
     def factor(self) -> Factor:

@@ -15,10 +15,8 @@ import numpy as np
 
 from bemkit.arrays import ComplexArray, FloatArray
 from bemkit.errors import InputError
-from bemkit.operators.half_plane.cost import periodic_cost
 from bemkit.operators.half_plane.surface import SurfaceElasticity
 from bemkit.operators.material import Material
-from bemkit.operators.steklov_poincare.cost import BodyCase, BodyCost
 
 _EQUAL = 1e-6
 """Largest relative difference of the lengths of equal elements; round-off of a million elements is 1e-10."""
@@ -66,10 +64,6 @@ class PeriodicElasticity(SurfaceElasticity):
                 f"elements of a periodic half-plane have lengths from {lengths.min():.4g} to {lengths.max():.4g} of a "
                 "period: remove the grading, and let parts end where equal elements do"
             )
-
-    def cost(self, case: BodyCase) -> BodyCost:
-        """Return memory and time of the map."""
-        return periodic_cost(case)
 
     @cached_property
     def flexibility(self) -> FloatArray:

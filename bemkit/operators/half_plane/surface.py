@@ -7,6 +7,7 @@ that along the normal.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Self
@@ -16,13 +17,11 @@ import numpy as np
 from bemkit.arrays import ComplexArray, FloatArray
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.spaces import ConstantSpace, dof_points
-from bemkit.operators.counts import OperationCounts
-from bemkit.operators.half_plane.cost import inverse_work
+from bemkit.operators.counts import Factorisation, FactorKind, OperationCounts
 from bemkit.operators.half_plane.far_motion import FarMotion
 from bemkit.operators.linear_solvers import Tag
 from bemkit.operators.material import Material
-from bemkit.operators.steklov_poincare.cost import BodyCase, BodyCost
-from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions
+from bemkit.operators.steklov_poincare.nodal_conditions import GivenData, NodalConditions
 from bemkit.operators.steklov_poincare.protocol import BoundaryMap, CondensedMap
 
 
@@ -66,14 +65,16 @@ class SurfaceElasticity(BoundaryMap, ABC):
         """The map is symmetric."""
         return frozenset({Tag.SYMMETRIC})
 
-    @abstractmethod
-    def cost(self, case: BodyCase) -> BodyCost:
-        """Return counts, memory and time of the map."""
-
     @property
     def work(self) -> OperationCounts:
         """Operation counts of the flexibility."""
         return OperationCounts()
+
+    def counts(self, conditions: NodalConditions, loads: Sequence[GivenData]) -> OperationCounts:
+        """Return the operation counts of `condense`, which inverts the flexibility on retained and fixed directions."""
+        n_acting = conditions.n_retained + conditions.n_fixed
+        factorisations = (Factorisation(FactorKind.CHOLESKY, n_acting),) if n_acting else ()
+        return self.work + OperationCounts(factorisations=factorisations, right_hand_sides=n_acting)
 
     def with_far_motion(self, far_motion: FarMotion) -> Self:
         """Return the same half-plane under another far motion; nothing is integrated again."""
@@ -133,7 +134,7 @@ class SurfaceElasticity(BoundaryMap, ABC):
         points, flexibility = dof_points(self.displacement_space), self.full_flexibility
         body = CondensedHalfPlane(conditions, self.far_motion, flexibility, points, self.mesh.tangents[0])
         condensed = body.under(force, conditions.displacement)
-        return replace(condensed, work=self.work + inverse_work(body.acting.size))
+        return replace(condensed, work=self.counts(conditions, ()))
 
     def element_tractions(self, displacement: FloatArray, force: FloatArray) -> FloatArray:
         """Return the tractions (n_elements, 1, 2) [Pa]: forces per length."""

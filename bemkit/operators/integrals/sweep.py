@@ -39,17 +39,8 @@ CHUNK_INTEGRALS = 65536
 """Largest number of integrals of one kind in a chunk, over all polynomials."""
 LISTED_COST = 1.5
 """Cost of a listed pair and point relative to the dense sweep (measured)."""
-LISTED_PAIRS = 60
-"""Largest number of listed pairs of an element on meshes of uniform length: those within `DENSE_DISTANCE` and around
-corners (counted)."""
-FEW = 2 * LISTED_PAIRS
+FEW = 120
 """Largest number of straight elements whose pairs are all listed; both orders of two elements then share integrals."""
-LISTED_SHARE_OF_CURVED = 1.0 / 3.0
-"""Share of listed pairs on small curved meshes, which have no `DENSE_DISTANCE` (counted)."""
-BATCH_MEMORY = 1.2e6
-"""Bytes of the temporary arrays of one batch of outer points (measured)."""
-CURVED_BATCH_MEMORY = 0.1e6, 8e6
-"""Bytes of a batch on curved elements: for each element, and at most."""
 
 
 class PairSweep:
@@ -166,28 +157,6 @@ class PairSweep:
     def _scaled(self, sums: PairIntegrals, test: IntArray, trial: IntArray) -> PairIntegrals:
         sums.scale(self.geometry.half[test, None], self.geometry.half[trial], self.geometry.tangent[trial])
         return sums
-
-
-def sweep_memory(degrees: Degrees, n_test: int, n_trial: int, n_threads: int, *, is_curved: bool) -> int:
-    """Predict the largest memory of a sweep over elements of uniform length and of its chunks [bytes]."""
-    (n_log, n_double), level = degrees.n_trial, 3 if n_trial <= FEW else 2  # few elements are all near
-    n_points = GAUSS_LEVELS[level][0] + degrees.extra_points
-    n_inner, n_outer = 3 * n_log + 2 * n_double, max(n_log, n_double)
-    test_log, test_double = (0 if family is None else family[0] + 1 for family in (degrees.log, degrees.double))
-    n_integrals = 3 * test_log * n_log + test_double * n_double
-    is_listed = n_trial <= FEW and not is_curved
-    n_near = (
-        min(LISTED_SHARE_OF_CURVED * n_trial, LISTED_PAIRS) if is_curved else n_trial if is_listed else LISTED_PAIRS
-    )
-    n_listed = int(n_test * n_near)
-    n_chunk = n_trial * min(n_test, n_threads * rows_per_chunk(degrees, n_trial, 1 if is_listed else n_points))
-    # while pairs are listed: their integrals, and four copies of the sums for both orders of two elements
-    listing = 8 * n_listed * (n_integrals + 2 * n_inner * n_outer)
-    listing += int(min(CURVED_BATCH_MEMORY[0] * n_test, CURVED_BATCH_MEMORY[1]) if is_curved else BATCH_MEMORY)
-    # later: listed integrals and, for each pair of a chunk, inner integrals at all points (quotients twice) and sums
-    of_pair = (0 if is_listed else n_points * (n_inner + 2 * n_log)) + n_integrals
-    sweeping = 8 * (n_listed * n_integrals + n_chunk * of_pair)
-    return max(listing, sweeping)
 
 
 def rows_per_chunk(degrees: Degrees, n_trial: int, n_points: int) -> int:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,14 +12,17 @@ from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.spaces import BoundarySpace, ConstantSpace
 from bemkit.operators.collocation.equations import collocation_equations, displacement_rows
 from bemkit.operators.collocation.layers import straight_layer
-from bemkit.operators.counts import Entries, OperationCounts
+from bemkit.operators.counts import Entries, Factorisation, FactorKind, OperationCounts
 from bemkit.operators.linear_solvers import DenseLU, SingularMatrixError, Tag
 from bemkit.operators.material import Material
-from bemkit.operators.steklov_poincare.cost import CHUNK_PAIRS, BodyCase, BodyCost, collocation_cost
-from bemkit.operators.steklov_poincare.nodal_conditions import GivenData, NodalConditions, turn_columns
+from bemkit.operators.rigid_modes import admissible_modes
+from bemkit.operators.steklov_poincare.nodal_conditions import SLIDES, GivenData, NodalConditions, turn_columns
 from bemkit.operators.steklov_poincare.protocol import BoundaryMap, CondensedMap
 from bemkit.operators.threads import for_each_chunk
 from bemkit.stopwatch import assembling
+
+_CHUNK_PAIRS = 32768
+"""Pairs of a midpoint and an element that each thread evaluates at a time."""
 
 
 class CollocationElasticity(BoundaryMap):
@@ -58,9 +62,21 @@ class CollocationElasticity(BoundaryMap):
             return frozenset()
         return frozenset({Tag.KILLS_RIGID_MOTIONS if self.slopes else Tag.KILLS_TRANSLATIONS})
 
-    def cost(self, case: BodyCase) -> BodyCost:
-        """Return counts, memory and time of the map."""
-        return collocation_cost(case, takes_slopes=self.slopes)
+    def counts(self, conditions: NodalConditions, loads: Sequence[GivenData]) -> OperationCounts:
+        """Return the operation counts of `condense` and of all load steps; nothing is integrated."""
+        mesh, u, r, sweeps = self.mesh, conditions.is_fixed.size, conditions.n_retained, _different(loads)
+        n_elements = mesh.n_elements  # the first sweep takes all elements, later ones may take only loaded ones
+        for later in sweeps[1:]:
+            n_elements += mesh.n_elements if later.n_moved else int(np.count_nonzero(later.force.any(axis=1)))
+        n_loaded, n_moved = sum(data.n_loaded for data in sweeps), sum(data.n_moved for data in sweeps)
+        order = u + len(admissible_modes(mesh)) + len(mesh.loops)
+        return OperationCounts(
+            element_pairs=n_elements * mesh.whole.n_elements,
+            single_layer=Entries.full(u, conditions.n_fixed + r) + Entries(u * n_loaded),
+            double_layer=Entries.full(u, conditions.n_free + r) + Entries(u * n_moved),
+            factorisations=(Factorisation(FactorKind.LU, order),),
+            right_hand_sides=r + int(is_enclosed(mesh, self.material, conditions)) + len(sweeps),
+        )
 
     def stiffness(self) -> FloatArray:
         """Return S, (n_dofs, n_dofs) [Pa]: the stiffness with all displacements retained.
@@ -94,6 +110,23 @@ class CollocationElasticity(BoundaryMap):
     def element_tractions(self, displacement: FloatArray, force: FloatArray) -> FloatArray:
         """Return the tractions (n_elements, 1, 2) [Pa]: forces per length."""
         return force[:, None] / self.mesh.lengths[:, None, None]
+
+
+def is_enclosed(mesh: BoundaryMesh, material: Material, conditions: NodalConditions) -> bool:
+    """Whether only contact determines the pressure in a nearly incompressible body; see `Volume.retained_pressure`."""
+    if mesh.is_exterior or not material.is_nearly_incompressible:
+        return False
+    is_changing = np.abs(conditions.in_frames(mesh.normals)) > SLIDES
+    return not bool(np.any(is_changing & conditions.is_free))
+
+
+def _different(loads: Sequence[GivenData]) -> list[GivenData]:
+    """Return the given data of the load steps that are no multiples of the data before."""
+    different: list[GivenData] = []
+    for data in loads:
+        if not different or data.factor_of(different[-1]) is None:
+            different.append(data)
+    return different
 
 
 @dataclass(frozen=True, eq=False)
@@ -254,7 +287,7 @@ class MixedSystem:
                 matrix[rows, unknown] = single[:, index[unknown]]
 
         n_sources = self._mesh.whole.n_elements
-        step = max(1, CHUNK_PAIRS // n_sources)
+        step = max(1, _CHUNK_PAIRS // n_sources)
         chunks = (slice(first, min(first + step, n)) for first in range(0, n, step))
         for_each_chunk(fill, chunks, n_integrals=n * n_sources)
         of_loads, of_motions = Entries(n_rows * loaded.size), Entries(n_rows * moved.size)

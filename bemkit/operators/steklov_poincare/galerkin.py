@@ -16,6 +16,7 @@ from bemkit.geometry.quadrature import gauss_legendre
 from bemkit.geometry.spaces import BoundarySpace, ConstantSpace, LinearSpace, dof_points, element_nodes
 from bemkit.geometry.symmetry.images import antisymmetric_dofs
 from bemkit.geometry.vectors import turned_right
+from bemkit.operators.counts import Entries, Factorisation, FactorKind, OperationCounts
 from bemkit.operators.forms import mass_matrix
 from bemkit.operators.linear_solvers import (
     Automatic,
@@ -28,10 +29,9 @@ from bemkit.operators.linear_solvers import (
     multiply,
 )
 from bemkit.operators.material import Material
-from bemkit.operators.rigid_modes import traction_free_modes
-from bemkit.operators.steklov_poincare.cost import BodyCase, BodyCost, galerkin_cost
+from bemkit.operators.rigid_modes import admissible_modes, traction_free_modes
 from bemkit.operators.steklov_poincare.layer_operators import GalerkinFactors, dilatation_of, galerkin_factors
-from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions, integrate_traction
+from bemkit.operators.steklov_poincare.nodal_conditions import GivenData, NodalConditions, integrate_traction
 from bemkit.operators.steklov_poincare.protocol import BoundaryMap, CondensedMap
 from bemkit.operators.steklov_poincare.schur import SchurCondensation
 from bemkit.operators.steklov_poincare.volume_constraint import Volume
@@ -95,9 +95,19 @@ class GalerkinElasticity(BoundaryMap):
         tags = {Tag.SYMMETRIC, Tag.POSITIVE_SEMIDEFINITE}
         return frozenset(tags if self.mesh.is_exterior else tags | {Tag.KILLS_RIGID_MOTIONS})
 
-    def cost(self, case: BodyCase) -> BodyCost:
-        """Return counts, memory and time of the map."""
-        return galerkin_cost(case, self.traction_space.n_dofs, self.displacement_space.degree)
+    def counts(self, conditions: NodalConditions, loads: Sequence[GivenData]) -> OperationCounts:
+        """Return the operation counts of `condense` and of all load steps; no matrix is formed."""
+        t, u, mesh = self.traction_space.n_dofs, self.displacement_space.n_dofs, self.mesh
+        # right-hand sides with V: displacements, resultants and pressures; with the body: its volume
+        n_columns = u + len(admissible_modes(mesh)) + len(self._pressed) + int(not mesh.is_exterior)
+        return OperationCounts(
+            element_pairs=mesh.n_elements * mesh.whole.n_elements,
+            single_layer=Entries.full(t, t),
+            double_layer=Entries.full(t, u),
+            hypersingular=Entries.full(u, u),
+            factorisations=tuple(Factorisation(FactorKind.CHOLESKY, order) for order in (t, conditions.n_free)),
+            right_hand_sides=n_columns + conditions.n_retained + len(loads),
+        )
 
     @cached_property
     def factors(self) -> GalerkinFactors:

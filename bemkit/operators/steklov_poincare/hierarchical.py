@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -12,13 +13,12 @@ from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.proximity.cluster_tree import ClusterTree
 from bemkit.operators.boundary_equations import LinearConditions
 from bemkit.operators.collocation.equations import collocation_equations
+from bemkit.operators.counts import OperationCounts
 from bemkit.operators.hierarchy.factor import Factor
 from bemkit.operators.hierarchy.system import BodyFactor, HierarchicalSystem, LocalConditions
 from bemkit.operators.linear_solvers import Hierarchical, MatrixFree, SingularMatrixError
 from bemkit.operators.material import Material
 from bemkit.operators.steklov_poincare.collocation import CollocationElasticity
-from bemkit.operators.steklov_poincare.cost import BodyCase, BodyCost
-from bemkit.operators.steklov_poincare.hierarchical_cost import hierarchical_cost
 from bemkit.operators.steklov_poincare.nodal_conditions import GivenData, NodalConditions, free_modes, turning
 from bemkit.operators.steklov_poincare.protocol import CondensedMap
 
@@ -95,13 +95,9 @@ class HierarchicalCollocation(CollocationElasticity):
         """Return a map with the equations of another one."""
         return cls(elastic.mesh, elastic.material, options, slopes=elastic.slopes)
 
-    def cost(self, case: BodyCase) -> BodyCost:
-        """Return memory and time of the map; counts depend on ranks and are not predicted."""
-        if isinstance(self.options, MatrixFree):
-            from bemkit.operators.matrix_free.cost import matrix_free_cost
-
-            return matrix_free_cost(case, self.options, takes_slopes=self.slopes)
-        return hierarchical_cost(case, self.options, takes_slopes=self.slopes)
+    def counts(self, conditions: NodalConditions, loads: Sequence[GivenData]) -> OperationCounts:
+        """Return none, because they depend on ranks and numbers of iterations."""
+        return OperationCounts()
 
     def system(self, conditions: NodalConditions, may_be_loaded: BoolArray, may_move: BoolArray) -> HierarchicalSystem:
         """Return the equations in the frames of the elements, compressed or not stored.

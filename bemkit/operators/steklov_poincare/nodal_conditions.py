@@ -128,6 +128,21 @@ class NodalConditions:
         is_free: BoolArray = ~(self.is_fixed | self.is_retained)
         return is_free
 
+    @property
+    def n_fixed(self) -> int:
+        """Number of fixed directions."""
+        return int(np.count_nonzero(self.is_fixed))
+
+    @property
+    def n_free(self) -> int:
+        """Number of free directions."""
+        return int(np.count_nonzero(self.is_free))
+
+    @property
+    def n_retained(self) -> int:
+        """Number of retained directions."""
+        return int(np.count_nonzero(self.is_retained))
+
     def in_frames(self, vectors: FloatArray) -> FloatArray:
         """Return the components of vectors (n_nodes, 2) along the directions of the nodes."""
         return np.asarray(np.einsum("nkc,nc->nk", self.frame, vectors))

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Protocol
+from typing import Protocol
 
 import numpy as np
 
@@ -13,10 +14,7 @@ from bemkit.geometry.spaces import BoundarySpace
 from bemkit.operators.counts import OperationCounts
 from bemkit.operators.linear_solvers import Tag
 from bemkit.operators.material import Material
-from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions
-
-if TYPE_CHECKING:
-    from bemkit.operators.steklov_poincare.cost import BodyCase, BodyCost
+from bemkit.operators.steklov_poincare.nodal_conditions import GivenData, NodalConditions
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -135,9 +133,9 @@ class WrappedMap(BoundaryMap):
         """Tags of the other map."""
         return self.elastic.tags
 
-    def cost(self, case: BodyCase) -> BodyCost:
-        """Return the costs of the other map."""
-        return self.elastic.cost(case)
+    def counts(self, conditions: NodalConditions, loads: Sequence[GivenData]) -> OperationCounts:
+        """Return the operation counts of the other map."""
+        return self.elastic.counts(conditions, loads)
 
 
 class SteklovPoincare(Protocol):
@@ -162,8 +160,8 @@ class SteklovPoincare(Protocol):
     def tags(self) -> frozenset[Tag]:
         """Properties of the map: symmetric, positive semidefinite, motions without forces."""
 
-    def cost(self, case: BodyCase) -> BodyCost:
-        """Return the predicted counts, memory and time of `condense`; ``BodyCost()`` predicts none."""
+    def counts(self, conditions: NodalConditions, loads: Sequence[GivenData]) -> OperationCounts:
+        """Return the operation counts of `condense` and of all load steps, from which plans predict memory and time."""
 
     def condense(self, conditions: NodalConditions, force: FloatArray) -> CondensedMap:
         """Eliminate all directions that are not retained, under nodal forces (n_nodes, 2) on the free ones."""

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -13,11 +13,8 @@ from bemkit.geometry.spaces import dof_points
 from bemkit.operators.counts import OperationCounts
 from bemkit.operators.linear_solvers import Tag
 from bemkit.operators.rigid_modes import rigid_motions
-from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions
+from bemkit.operators.steklov_poincare.nodal_conditions import GivenData, NodalConditions
 from bemkit.operators.steklov_poincare.protocol import CondensedMap, SteklovPoincare, WrappedMap
-
-if TYPE_CHECKING:
-    from bemkit.operators.steklov_poincare.cost import BodyCase, BodyCost
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,11 +46,10 @@ class RigidlyConnected(WrappedMap):
             )
         return cls(elastic)
 
-    def cost(self, case: BodyCase) -> BodyCost:
-        """Return the cost of the wrapped map and of the responses to motions of connections."""
-        cost = super().cost(case)
-        responses = OperationCounts(right_hand_sides=3 * len(case.conditions.connected))
-        return replace(cost, work=cost.work + responses)
+    def counts(self, conditions: NodalConditions, loads: Sequence[GivenData]) -> OperationCounts:
+        """Return the counts of the wrapped map and of the responses to motions of connections."""
+        responses = OperationCounts(right_hand_sides=3 * len(conditions.connected))
+        return super().counts(conditions, loads) + responses
 
     def condense(self, conditions: NodalConditions, force: FloatArray) -> CondensedMap:
         """Condense the map and eliminate the motions of its connections; see `SteklovPoincare.condense`."""

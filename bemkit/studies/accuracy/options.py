@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Any, TypeVar, cast
 
 from bemkit.formulas import closest
-from bemkit.plan import make_plan
+from bemkit.plan.plan import make_plan
 from bemkit.reference.compare import MEASURES, Reference, over_resolved
 from bemkit.reference.shipped import find_reference
 from bemkit.scene.discretisation import Discretisation, Galerkin, MeshOptions
