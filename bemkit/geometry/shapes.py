@@ -60,7 +60,6 @@ class Rectangle(CheckedShape):
 
     @cached_property
     def _outline(self) -> Outline:
-        """Return one loop of four sides."""
         (x, y), x_end, y_end = self.corner, self.corner[0] + self.width, self.corner[1] + self.height
         names = ("bottom", "right", "top", "left")
         return Outline((_polygon_loop(((x, y), (x_end, y), (x_end, y_end), (x, y_end)), names),))
@@ -107,7 +106,6 @@ class Polygon(CheckedShape):
 
     @cached_property
     def _outline(self) -> Outline:
-        """Return one loop of straight sides."""
         names = self.side_names or tuple(f"side-{k + 1}" for k in range(len(self.vertices)))
         return Outline((_polygon_loop(self.vertices, names),))
 
@@ -133,7 +131,6 @@ class Disk(CheckedShape):
 
     @cached_property
     def _outline(self) -> Outline:
-        """Return one loop of four arcs."""
         return Outline((_circle_loop(self.centre, self.radius, "arc"),))
 
 
@@ -167,7 +164,6 @@ class Sector(CheckedShape):
 
     @cached_property
     def _outline(self) -> Outline:
-        """Return one loop of an arc and two radii."""
         arc = Arc(self.centre, self.radius, float(np.radians(self.start_angle)), float(np.radians(self.end_angle)))
         begin, end = ((float(x), float(y)) for x, y in arc.point(np.array([0.0, 1.0])))
         sides = (Side("arc", arc), Side("end", Segment(end, self.centre)), Side("start", Segment(self.centre, begin)))
@@ -201,7 +197,6 @@ class Ring(CheckedShape):
 
     @cached_property
     def _outline(self) -> Outline:
-        """Return the outer loop and the hole."""
         hole = _hole_loop(self.centre, self.inner_radius, "inner")
         return Outline((_circle_loop(self.centre, self.outer_radius, "outer"), hole))
 
@@ -236,7 +231,6 @@ class PlateWithHole(CheckedShape):
 
     @cached_property
     def _outline(self) -> Outline:
-        """Return the rectangle and the hole."""
         centre = (self.corner[0] + 0.5 * self.width, self.corner[1] + 0.5 * self.height)
         plate = Rectangle(self.width, self.height, self.corner).outline()
         return Outline((*plate.loops, _hole_loop(centre, self.radius, "hole")))
@@ -266,7 +260,6 @@ class ExteriorOf(CheckedShape):
 
     @cached_property
     def _outline(self) -> Outline:
-        """Return the loop of the shape, reversed."""
         outline = self.shape.outline()
         (loop,) = outline.loops
         return Outline((reversed_loop(loop),), is_exterior=True, drawing=outline.drawing)
@@ -299,7 +292,6 @@ class ElasticHalfPlane(CheckedShape):
 
     @cached_property
     def _outline(self) -> Outline:
-        """Return the strip."""
         return _strip(self.left, self.right)
 
 
@@ -328,7 +320,6 @@ class PeriodicHalfPlane(CheckedShape):
 
     @cached_property
     def _outline(self) -> Outline:
-        """Return one period."""
         return _strip(self.left, self.left + self.period, is_periodic=True)
 
 

@@ -156,41 +156,15 @@ class ConstantSpace:
         return np.ones((1, xi.size))
 
 
-@dataclass(frozen=True, eq=False)
 class ElementwiseSpace:
     """The functions of another space with separate dofs on each element, so that they may jump at all nodes."""
 
-    space: BoundarySpace
+    is_continuous: ClassVar[bool] = False
 
-    @property
-    def mesh(self) -> BoundaryMesh:
-        """The mesh of the other space."""
-        return self.space.mesh
-
-    @property
-    def degree(self) -> int:
-        """Polynomial degree of the other space."""
-        return self.space.degree
-
-    @property
-    def is_continuous(self) -> bool:
-        """Functions jump from element to element."""
-        return False
-
-    @property
-    def n_dofs(self) -> int:
-        """Number of vector dofs."""
-        return 2 * self.element_dofs.size
-
-    @cached_property
-    def element_dofs(self) -> IntArray:
-        """(n_elements, n_local) array of scalar dofs, element by element."""
-        return np.arange(self.space.element_dofs.size).reshape(self.space.element_dofs.shape)
-
-    @property
-    def local_nodes(self) -> FloatArray:
-        """(n_local,) array: as of the other space."""
-        return self.space.local_nodes
+    def __init__(self, space: BoundarySpace) -> None:
+        self.space, self.mesh, self.degree, self.local_nodes = space, space.mesh, space.degree, space.local_nodes
+        self.element_dofs = np.arange(space.element_dofs.size).reshape(space.element_dofs.shape)
+        self.n_dofs = 2 * self.element_dofs.size
 
     def basis(self, xi: FloatArray) -> FloatArray:
         """Evaluate the local basis of the other space."""

@@ -268,12 +268,10 @@ def degenerate_diameters(mesh: BoundaryMesh, material: Material) -> FloatArray:
     tractions to forces; by the matrix determinant lemma that is singular if ``1 / (c log d)`` is an eigenvalue of
     ``m^T V^-1 m``. bemkit itself never meets these sizes, because it measures lengths by the diameter.
     """
-    diameter = mesh.diameter
-    unit = mesh.transformed(shift=(float(mesh.centre[0]), float(mesh.centre[1])), factor=1.0 / diameter)
-    space = ConstantSpace(unit)
+    space = ConstantSpace(mesh.unit)
     # the operator measures lengths by the diameter of its mesh, which is one here
     v = single_layer(space, space, material).matrix()
-    to_force = np.kron(unit.lengths[:, None], np.eye(2))
+    to_force = np.kron(mesh.unit.lengths[:, None], np.eye(2))
     nu = material.effective_poisson_ratio
     factor = (3.0 - 4.0 * nu) / (8.0 * np.pi * material.shear_modulus * (1.0 - nu))
     eigenvalues = np.linalg.eigvalsh(to_force.T @ np.linalg.solve(v, to_force))
