@@ -8,10 +8,11 @@ from math import floor, log10
 
 import numpy as np
 
-from bemkit.arrays import BoolArray, FloatArray
+from bemkit.arrays import FloatArray
 from bemkit.contact.obstacle import DirectedObstacle, Gap
-from bemkit.geometry.pieces import overlapping_boxes, point_distances
-from bemkit.pictures.shown import DrawnBody, DrawnScene
+from bemkit.geometry.pieces import overlapping_boxes
+from bemkit.geometry.proximity.location import Locator
+from bemkit.pictures.shown import DrawnScene
 from bemkit.results.contact_table import ContactTable
 from bemkit.scene.conditions import Contact
 
@@ -108,27 +109,14 @@ def drawn_overlap(shown: DrawnScene, factor: float) -> float:
     deepest = 0.0
     for first, second in zip(*overlapping_boxes(low, high), strict=True):
         for one, other in permutations((first, second)):
-            now = _depth(np.concatenate(moved[one]), bodies[other], moved[other])
+            now = _depth(np.concatenate(moved[one]), moved[other])
             if now.max() > deepest:
-                before = _depth(np.concatenate(initial[one]), bodies[other], initial[other])
+                before = _depth(np.concatenate(initial[one]), initial[other])
                 deepest = max(deepest, float((now - before).max()))
     return deepest
 
 
-def _depth(points: FloatArray, body: DrawnBody, loops: list[FloatArray]) -> FloatArray:
-    """Return how deep (n,) [m] points (n, 2) are inside a body with these loops, zero outside."""
-    depth = np.zeros(len(points))
-    inside = np.flatnonzero(_is_inside(points, body, loops))
+def _depth(points: FloatArray, loops: list[FloatArray]) -> FloatArray:
+    """Return how deep (n,) [m] points (n, 2) are inside the body within closed loops, zero outside."""
     starts, ends = (np.concatenate([loop[piece] for loop in loops]) for piece in (slice(-1), slice(1, None)))
-    for k in inside:  # few, if any
-        depth[k] = point_distances(points[k], starts, ends).min()
-    return depth
-
-
-def _is_inside(points: FloatArray, body: DrawnBody, loops: list[FloatArray]) -> BoolArray:
-    from matplotlib.path import Path
-
-    is_inside = np.full(len(points), body.mesh.is_exterior)
-    for loop in loops:
-        is_inside ^= Path(loop).contains_points(points)
-    return is_inside
+    return Locator.of_pieces(starts, ends).depths(points)

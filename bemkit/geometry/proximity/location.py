@@ -8,7 +8,7 @@ import numpy as np
 
 from bemkit.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from bemkit.errors import GeometryError
-from bemkit.geometry.mesh import BoundaryMesh
+from bemkit.geometry.mesh import BoundaryMesh, unchecked_mesh
 from bemkit.geometry.pieces import RESOLUTION
 from bemkit.geometry.proximity.cluster_tree import Clusters, ClusterTree, consecutive
 
@@ -84,6 +84,12 @@ class Locator:
         self._radius = np.abs(ends - self._middle).max(axis=0) + np.maximum.reduceat(self._bulge, self._first)
         self.clusters = Clusters.around(tree, ends[:, tree.order])
 
+    @classmethod
+    def of_pieces(cls, start: FloatArray, end: FloatArray) -> Locator:
+        """Return the locator of a body on the left of straight pieces between points (n, 2) [m]."""
+        pieces = np.arange(2 * len(start)).reshape(2, -1).T
+        return cls(unchecked_mesh(np.concatenate([start, end]), pieces, {}))
+
     def _points(self, elements: IntArray, xi: FloatArray) -> ComplexArray:
         """Return points (n,) of elements (n,) at local coordinates (n,), relative to the centre."""
         return np.asarray(self._mesh.points(elements, xi[:, None])[:, 0] @ _PLANE - self._centre)
@@ -101,6 +107,11 @@ class Locator:
         is_left, distance, element, xi = (np.concatenate([chunk[i] for chunk in chunks]) for i in range(4))
         is_on_boundary = distance <= resolution
         return Location(is_left.astype(bool) & ~is_on_boundary, is_on_boundary, distance, element.astype(np.intp), xi)
+
+    def depths(self, points: FloatArray) -> FloatArray:
+        """Return the distances (n,) [m] of points (n, 2) inside the body from its boundary; zero outside."""
+        location = self.locate(points)
+        return np.where(location.is_inside, location.distance, 0.0)
 
     def _chunk(self, x: ComplexArray, resolution: float) -> tuple[BoolArray, FloatArray, IntArray, FloatArray]:
         """Return whether points are left of the boundary, their distance, nearest element and local coordinate."""

@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray, IntArray
-from bemkit.geometry.mesh import BoundaryMesh, unchecked_mesh
+from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.pieces import overlapping_boxes
 from bemkit.geometry.proximity.location import Locator
 from bemkit.geometry.symmetry.lines import is_reversing
@@ -78,9 +78,7 @@ class Polyline:
 
     @cached_property
     def _locator(self) -> Locator:
-        start, end = self.points[:, :-1].reshape(-1, 2), self.points[:, 1:].reshape(-1, 2)
-        pieces = np.arange(2 * len(start)).reshape(2, -1).T
-        return Locator(unchecked_mesh(np.concatenate([start, end]), pieces, {}))
+        return Locator.of_pieces(self.points[:, :-1].reshape(-1, 2), self.points[:, 1:].reshape(-1, 2))
 
     def deepest(self, points: FloatArray, least: float) -> tuple[float, int]:
         """Return the largest depth [m] of points (n, 2) inside the body, and the index of that point.
@@ -92,8 +90,7 @@ class Polyline:
         if not rows.size:
             return 0.0, -1
         rows = rows[:: 1 + rows.size // _MOST_POINTS]
-        location = self._locator.locate(points[rows])
-        depth = np.where(location.is_inside, location.distance, 0.0)
+        depth = self._locator.depths(points[rows])
         deepest = int(np.argmax(depth))
         return (float(depth[deepest]), int(rows[deepest])) if depth[deepest] > least else (0.0, -1)
 
