@@ -69,9 +69,12 @@ class DensityMeshes:
         return max(self.accuracy, LEAST_LOCAL)
 
     def is_enough(self, solutions: Sequence[Solution]) -> bool:
-        """Return whether the estimated error is small enough, and the elements in which the status changes short."""
+        """Return whether the estimated error is small enough, and the elements in which the status changes short.
+
+        Meshes that miss contact have no error.
+        """
         ends = StepErrors.of(solutions[-1]).worst.places.zone_ends
-        return is_enough([self.error(each) for each in solutions], ends, self.accuracy)
+        return is_enough([self.error(each) for each in solutions if not each.unfound_contacts], ends, self.accuracy)
 
     def following(self, level: Level, solutions: Sequence[Solution]) -> Level:
         """Return meshes whose density follows the estimated errors; copies share one, as fine as the worst needs."""
@@ -116,14 +119,15 @@ class DensityMeshes:
 
 
 def is_enough(errors: Sequence[float], ends: Iterable[ZoneEnd], accuracy: float) -> bool:
-    """Return whether the estimated errors have become small enough, and the elements in which the status changes short.
+    """Return whether the last estimated error is small enough, and the elements in which the status changes short.
 
     Tractions there behave like square roots; an element of length h leaves a relative error of about h / (3 l) in a
     contact zone of length l. The energy hardly notices.
     """
-    n_accurate = sum(error <= accuracy for error in errors)
-    if n_accurate == 0 or n_accurate > MOST_FOR_TRANSITIONS:
-        return n_accurate > 0
+    if not errors or errors[-1] > accuracy:
+        return False
+    if sum(error <= accuracy for error in errors) > MOST_FOR_TRANSITIONS:
+        return True
     longest = TRANSITION * accuracy
     return all(end.mesh.lengths[end.element] <= longest * end.zone_length for end in ends)
 

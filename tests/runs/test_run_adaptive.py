@@ -14,7 +14,7 @@ from bemkit.contact.problem import ContactProblem
 from bemkit.geometry.meshing.partition import STEEPEST, better_partition
 from bemkit.reference import DiscBetweenPlates
 from bemkit.runs.adaptive import _best_last, _Refinement, run_adaptive
-from bemkit.runs.density import DensityMeshes
+from bemkit.runs.density import DensityMeshes, is_enough
 from bemkit.runs.earlier_steps import EarlierSteps
 from bemkit.runs.mesh_sequence import Level
 from tests.failing_solver import Failing
@@ -118,6 +118,34 @@ def test_a_mesh_that_is_accurate_enough_is_the_best_one() -> None:
     refinement = Refinement(DensityMeshes(accuracy=1e-2), None, None, EarlierSteps(), None)
     assert _best_last((coarse, fine), "", 1e-2, refinement)[-1].n_elements == fine.n_elements
     assert _best_last((coarse, fine), "an obstacle", 1e-2, refinement)[-1].n_elements == coarse.n_elements
+
+
+def test_a_mesh_that_misses_contact_has_no_error() -> None:
+    """A block at rest has the error zero on a first mesh that misses a thin roll, and no mesh is accurate for that."""
+    block = bk.Rectangle(1.0, 1.0)
+    roll = bk.RigidCircle((0.5137, -0.02 + 1e-5), 0.02)
+    scene = bk.Scene(
+        title="block above a thin roll",
+        shape=block,
+        material=bk.Material(1.0, 0.3),
+        parts=(
+            bk.Part("floor", bk.Contact(roll), sides=("bottom",)),
+            bk.Part("top", bk.Clamped(), sides=("top",)),
+        ),
+        discretisation=bk.Galerkin(2),
+        mesh=bk.MeshOptions(accuracy=0.02),
+    )
+    first, *_, last = run_adaptive(scene)
+    assert first.status is bk.Status.MISSED_CONTACT
+    assert last.is_converged
+    assert last.estimated_error is not None
+    assert last.estimated_error <= 0.02
+
+
+def test_an_error_that_rises_above_the_accuracy_again_is_not_enough() -> None:
+    assert is_enough([5e-3], [], 1e-2)
+    assert not is_enough([5e-3, 2e-2], [], 1e-2)
+    assert not is_enough([], [], 1e-2)
 
 
 def test_run_takes_the_accuracy_of_the_scene() -> None:
