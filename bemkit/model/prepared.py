@@ -24,11 +24,11 @@ from bemkit.model.fields import TractionRecovery
 from bemkit.model.given import far_motion_of, given_data, held_nodes, nodal_forces, with_far_motion
 from bemkit.model.placed import Meshes, PlacedBody, bodies_under, check_step, find_units, place, with_found_contacts
 from bemkit.model.units import Units
-from bemkit.operators.linear_solvers import ChosenLinearSolver, DenseCholesky, LinearSolver, Tag
+from bemkit.operators.linear_solvers import DenseCholesky, LinearSolver, Tag
 from bemkit.operators.material import Material
 from bemkit.operators.steklov_poincare import SteklovPoincare
 from bemkit.operators.steklov_poincare.nodal_conditions import GivenData, NodalConditions, free_modes, turning
-from bemkit.plan.costs import BodyCase, choose
+from bemkit.plan.costs import BodyCase, ChosenLinearSolver, choose
 from bemkit.scene.discretisation import thinness_warnings
 from bemkit.scene.scene import Scene
 

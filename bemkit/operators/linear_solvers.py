@@ -1,10 +1,10 @@
-"""Linear solvers of bodies: dense factorisations with LAPACK, whose errors name the matrix, and the choice of one."""
+"""Linear solvers of bodies: dense factorisations with LAPACK, whose errors name the matrix, and options of others."""
 
 from __future__ import annotations
 
 import enum
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Protocol, TypeAlias
 
 import numpy as np
@@ -319,39 +319,3 @@ class MatrixFree:
 
 
 LinearSolverChoice: TypeAlias = Automatic | Hierarchical | MatrixFree | LinearSolver
-
-
-@dataclass(frozen=True)
-class ChosenLinearSolver:
-    """A linear solver and the reason for its choice.
-
-    Parameters
-    ----------
-    reason : str
-        Part of a sentence, for the plan.
-    hierarchical : Hierarchical or MatrixFree, optional
-        If given, the equations are compressed over a tree or not stored, and `solver` is not used.
-    solver : LinearSolver
-    """
-
-    reason: str
-    hierarchical: Hierarchical | MatrixFree | None = None
-    solver: LinearSolver = field(default_factory=DenseCholesky)
-
-
-def choose_linear_solver(requested: LinearSolverChoice) -> ChosenLinearSolver:
-    """Choose the linear solver of a body with a symmetric Steklov-Poincare matrix.
-
-    Parameters
-    ----------
-    requested : LinearSolver, Hierarchical, MatrixFree or Automatic
-
-    Returns
-    -------
-    ChosenLinearSolver
-        The requested linear solver if there is one, otherwise Cholesky.
-    """
-    if not isinstance(requested, Automatic | Hierarchical | MatrixFree):
-        return ChosenLinearSolver("asked for", solver=requested)
-    without = {Automatic: "", Hierarchical: "not compressed over a tree, but ", MatrixFree: "not matrix-free, but "}
-    return ChosenLinearSolver(f"{without[type(requested)]}Cholesky, because S is positive definite")

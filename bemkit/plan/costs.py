@@ -20,12 +20,12 @@ from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.operators.counts import OperationCounts
 from bemkit.operators.linear_solvers import (
     Automatic,
-    ChosenLinearSolver,
+    DenseCholesky,
     Hierarchical,
+    LinearSolver,
     LinearSolverChoice,
     MatrixFree,
     Tag,
-    choose_linear_solver,
 )
 from bemkit.operators.steklov_poincare import SteklovPoincare
 from bemkit.operators.steklov_poincare.nodal_conditions import GivenData, NodalConditions
@@ -117,10 +117,28 @@ _SHARE = 0.5
 """Largest predicted time, relative to that of dense equations, of compressed ones that are chosen automatically."""
 _FEWEST_ELEMENTS = 200
 """Smallest number of elements of equations that are compressed or not stored."""
-_MOST_LOOPS_STORED, _MOST_LOOPS_EVALUATED = 41, 20
+_MOST_LOOPS, _MOST_LOOPS_EVALUATED = 41, 20
 """Largest numbers of closed curves: each adds an equation that passes through the whole tree, or each product."""
 _LEAST_COMPRESSIBILITY = 1e-8
 """Smallest 1/2 - nu of a body with holes in compressed equations."""
+
+
+@dataclass(frozen=True)
+class ChosenLinearSolver:
+    """A linear solver and the reason for its choice.
+
+    Parameters
+    ----------
+    reason : str
+        Part of a sentence, for the plan.
+    hierarchical : Hierarchical or MatrixFree, optional
+        If given, the equations are compressed over a tree or not stored, and `solver` is not used.
+    solver : LinearSolver
+    """
+
+    reason: str
+    hierarchical: Hierarchical | MatrixFree | None = None
+    solver: LinearSolver = field(default_factory=DenseCholesky)
 
 
 @dataclass(frozen=True, eq=False)
@@ -233,8 +251,7 @@ def _rates_of_half_plane(case: BodyCase) -> Rates:
 
 def cost_of(case: BodyCase, *, is_compiled: bool | None = None) -> BodyCost:
     """Return the cost of a body; see `rates_of`."""
-    rates, work = rates_of(case, is_compiled=is_compiled), case.work
-    mesh, conditions = case.mesh, case.conditions
+    rates, work, conditions, mesh = rates_of(case, is_compiled=is_compiled), case.work, case.conditions, case.mesh
     n, n_dofs, r = mesh.n_elements, conditions.is_fixed.size, conditions.n_retained
     n_pairs, n_contact = work.element_pairs, int(np.count_nonzero(conditions.is_retained.any(axis=1)))
     stored = sum(operator.stored for operator in (work.single_layer, work.double_layer, work.hypersingular))
@@ -243,11 +260,11 @@ def cost_of(case: BodyCase, *, is_compiled: bool | None = None) -> BodyCost:
         n_pairs = stored = n * n if rates.entry else 0
     elif case.forms_no_matrix:
         r = 0
-    curved = case.n_curved / n
+    # curved elements weigh by their share, compressed equations by the digits of their tolerance
+    curved, threads, options = case.n_curved / n, n_threads(n_pairs), case.chosen.hierarchical
     pair, element, near = (
         (1.0 - curved) * straight + curved * bent for straight, bent in (rates.pair, rates.element, rates.near)
     )
-    threads, options = n_threads(n_pairs), case.chosen.hierarchical
     digits = -math.log10(options.tolerance) / 10.0 if isinstance(options, Hierarchical) else 1.0
     integration = (pair * n_pairs + element * n) / threads
     if n_contact:
@@ -257,8 +274,8 @@ def cost_of(case: BodyCase, *, is_compiled: bool | None = None) -> BodyCost:
     algebra += rates.closed * float(r) ** 3 + rates.response * r**2
     kept = digits * (rates.bytes_fixed + rates.bytes_of_element * n + rates.bytes_of_contact * n_contact)
     kept += rates.entry * stored + rates.retained * r**2
-    share = min(1.0, threads * _CHUNK_PAIRS / (n * mesh.whole.n_elements))
-    of_chunk = near + rates.chunk * stored * share
+    # integrals of a chunk of pairs and copies of a factorisation exist one after the other
+    of_chunk = near + rates.chunk * stored * min(1.0, threads * _CHUNK_PAIRS / (n * mesh.whole.n_elements))
     of_factor = (rates.factored - BYTES) * stored + rates.column * n_dofs * r
     memory = max(kept, BYTES * stored + max(of_chunk, of_factor))
     return BodyCost(work, int(memory), int(kept), digits * integration, algebra)
@@ -280,6 +297,8 @@ def choose(requested: LinearSolverChoice, case: BodyCase, method: str) -> Chosen
     InputError
         If compressed equations of Galerkin's method are requested: there are none.
     """
+    if not isinstance(requested, Automatic | Hierarchical | MatrixFree):
+        return ChosenLinearSolver("asked for", solver=requested)
     if Tag.SYMMETRIC not in case.elastic.tags:
         return _choose_for_collocation(requested, case, method)
     if isinstance(requested, Hierarchical) and case.mesh.surface is None:
@@ -288,19 +307,20 @@ def choose(requested: LinearSolverChoice, case: BodyCase, method: str) -> Chosen
             'take discretisation = "constant", whose equations are compressed, or hp with an accuracy and '
             'linear_solver = "automatic"'
         )
-    return choose_linear_solver(requested)
+    without = {Automatic: "", Hierarchical: "not compressed over a tree, but ", MatrixFree: "not matrix-free, but "}
+    return ChosenLinearSolver(f"{without[type(requested)]}Cholesky, because S is positive definite")
 
 
-def _choose_for_collocation(requested: LinearSolverChoice, case: BodyCase, method: str) -> ChosenLinearSolver:
+def _choose_for_collocation(
+    requested: Automatic | Hierarchical | MatrixFree, case: BodyCase, method: str
+) -> ChosenLinearSolver:
     """Take compressed equations if they are requested, twice as fast, or the only ones that fit into memory."""
     if isinstance(requested, MatrixFree):
-        if not (stored := _why_no_others(case, method) or _why_stored(case)):
+        if not (stored := _hindrance(case, method, is_stored=False)):
             return ChosenLinearSolver("asked for", requested)
         other = _choose_for_collocation(Automatic(), case, method)
         return replace(other, reason=f"not matrix-free, because {stored}; {other.reason}")
-    if not isinstance(requested, Automatic | Hierarchical):
-        return ChosenLinearSolver("asked for", solver=requested)
-    if hindrance := _why_no_others(case, method) or _why_dense(case):
+    if hindrance := _hindrance(case, method, is_stored=True):
         return ChosenLinearSolver(f"the equations are not compressed, because {hindrance}")
     if isinstance(requested, Hierarchical):
         return ChosenLinearSolver("asked for", requested)
@@ -320,43 +340,32 @@ def _compressed_if_cheaper(case: BodyCase) -> ChosenLinearSolver:
     return ChosenLinearSolver(f"compressed over a tree they would take {share:.2g} times as long")
 
 
-def _why_no_others(case: BodyCase, method: str) -> str:
-    """Return why only the map itself has the equations of a body; empty if there are others."""
-    from bemkit.operators.steklov_poincare.collocation import CollocationElasticity
+def _hindrance(case: BodyCase, method: str, *, is_stored: bool) -> str:
+    """Return why equations cannot be compressed, or why they must be stored; empty if they can, or need not."""
+    from bemkit.operators.steklov_poincare.collocation import CollocationElasticity, is_enclosed
 
-    # a map that derives from collocation may change what it condenses
-    return "" if type(case.elastic) is CollocationElasticity else f"{method} has no such equations"
-
-
-def _why_stored(case: BodyCase) -> str:
-    """Return why the equations of a body must be stored; empty if they need not."""
-    mesh = case.mesh
+    mesh, material = case.mesh, case.elastic.material
+    n_loops, is_incompressible = len(mesh.loops), material.effective_poisson_ratio > 0.5 - _LEAST_COMPRESSIBILITY
     reasons = {
+        # a map that derives from collocation may change what it condenses
+        f"{method} has no such equations": type(case.elastic) is not CollocationElasticity,
         f"{mesh.n_elements} elements are few": mesh.n_elements < _FEWEST_ELEMENTS,
-        f"{case.n_curved} elements are curved": case.n_curved > 0,
-        "the body is divided along a line of symmetry": mesh.symmetry is not None,
-        f"the boundary has {len(mesh.loops)} closed curves": len(mesh.loops) > _MOST_LOOPS_EVALUATED,
-        "contact sees the stiffness of the body": case.is_condensed,
+        f"the boundary has {n_loops} closed curves": n_loops > (_MOST_LOOPS if is_stored else _MOST_LOOPS_EVALUATED),
     }
-    return next((reason for reason, holds in reasons.items() if holds), "")
-
-
-def _why_dense(case: BodyCase) -> str:
-    """Return why the equations of a body cannot be compressed; empty if they can."""
-    from bemkit.operators.steklov_poincare.collocation import is_enclosed
-
-    mesh, ratio = case.mesh, case.elastic.material.effective_poisson_ratio
-    reasons = {
-        f"{mesh.n_elements} elements are few": mesh.n_elements < _FEWEST_ELEMENTS,
-        f"the boundary has {len(mesh.loops)} closed curves": len(mesh.loops) > _MOST_LOOPS_STORED,
-        # clusters around holes are nearly singular
-        "the material is incompressible, and the body has holes": len(mesh.loops) > 1
-        and ratio > 0.5 - _LEAST_COMPRESSIBILITY,
-        # clusters do not determine the pressure
-        "contact and supports take all of the boundary of the incompressible body": is_enclosed(
-            mesh, case.elastic.material, case.conditions
-        ),
-    }
+    if is_stored:
+        reasons |= {
+            # clusters around holes are nearly singular, and do not determine the pressure of an enclosed body
+            "the material is incompressible, and the body has holes": is_incompressible and n_loops > 1,
+            "contact and supports take all of the boundary of the incompressible body": is_enclosed(
+                mesh, material, case.conditions
+            ),
+        }
+    else:
+        reasons |= {
+            f"{case.n_curved} elements are curved": case.n_curved > 0,
+            "the body is divided along a line of symmetry": mesh.symmetry is not None,
+            "contact sees the stiffness of the body": case.is_condensed,
+        }
     return next((reason for reason, holds in reasons.items() if holds), "")
 
 

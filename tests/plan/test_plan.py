@@ -16,7 +16,9 @@ from bemkit.cli.main import main
 from bemkit.contact.laws import Frictionless
 from bemkit.contact.obstacle import RigidHalfPlane
 from bemkit.geometry.shapes import Disk, Rectangle
+from bemkit.operators.linear_solvers import LinearSolver
 from bemkit.operators.material import Material
+from bemkit.operators.steklov_poincare.collocation import CollocationElasticity
 from bemkit.plan.costs import physical_memory
 from bemkit.plan.plan import Plan, TooLargeError, check_elements, check_memory, make_plan
 from bemkit.scene.body_scene import BodyScene
@@ -138,6 +140,23 @@ def test_more_load_steps_take_more_time() -> None:
     scene = load_scene("paper-1")
     single, twice = (plan_of(dataclasses.replace(scene, load_factors=factors)) for factors in ((1.0,), (0.5, 1.0)))
     assert single.seconds < twice.seconds < 2.0 * single.seconds
+
+
+class Borrowed(CollocationElasticity):
+    """A map of somebody else, which counts like collocation."""
+
+
+class BorrowedCollocation(bk.ConstantCollocation):
+    def elastic_map(self, mesh: bk.BoundaryMesh, material: Material, linear_solver: LinearSolver) -> Borrowed:
+        return Borrowed(mesh, material)
+
+
+def test_memory_and_time_of_a_map_of_ones_own_follow_from_its_counts() -> None:
+    built_in = dataclasses.replace(load_scene("paper-1"), linear_solver=bk.DenseCholesky())
+    own = dataclasses.replace(built_in, discretisation=BorrowedCollocation())
+    expected, found = plan_of(built_in), plan_of(own)
+    assert found.work.factorisations
+    assert (found.memory, found.seconds, found.work) == (expected.memory, expected.seconds, expected.work)
 
 
 TRACED = {

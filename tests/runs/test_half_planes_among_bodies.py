@@ -49,6 +49,7 @@ def test_wavy_half_planes_touch_on_the_length_of_westergaard(share: float) -> No
     # to half an element
     assert solution.contacts[0].contact_length == pytest.approx(stick_or_contact_length(share), abs=5e-3)
     assert solution.force_normal == pytest.approx(share * np.pi * HERTZ_MODULUS * WAVE, rel=1e-10)
+    assert solution.work == solution.plan.work
 
 
 def test_tractions_of_two_half_planes_have_an_estimate() -> None:

@@ -84,8 +84,7 @@ class GalerkinElasticity(BoundaryMap):
         self.traction_space = ConstantSpace(mesh) if traction_space is None else traction_space
         if isinstance(linear_solver, Automatic | Hierarchical | MatrixFree):
             raise InputError(
-                f"linear_solver is {linear_solver}: give DenseCholesky(), or the result of "
-                "bemkit.operators.linear_solvers.choose_linear_solver"
+                f"linear_solver is {linear_solver}, by which scenes choose one: give DenseCholesky() or your own"
             )
         self.linear_solver: LinearSolver = linear_solver
 

@@ -7,8 +7,8 @@ from dataclasses import replace
 import pytest
 
 import bemkit as bk
-from bemkit.operators.linear_solvers import choose_linear_solver
 from bemkit.plan.plan import make_plan
+from tests.plan.test_hierarchical_choice import chosen
 
 SCENE = replace(bk.load_scene("paper-1"), mesh=bk.MeshOptions(elements=60))
 
@@ -18,10 +18,9 @@ def test_what_was_asked_for_is_taken() -> None:
         """A linear solver of somebody else."""
 
     requested = Own()
-    choice = choose_linear_solver(requested)
-    assert choice.solver is requested
-    assert choice.reason == "asked for"
     scene = replace(SCENE, discretisation=bk.Galerkin(1), linear_solver=requested)
+    assert chosen(scene).solver is requested
+    assert chosen(scene).reason == "asked for"
     assert bk.run(scene).plan.linear_solver is requested
 
 
