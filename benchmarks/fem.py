@@ -28,10 +28,10 @@ from bemkit.arrays import BoolArray, FloatArray, IntArray
 from bemkit.contact.dense_body import DenseBody
 from bemkit.contact.problem import ContactProblem
 from bemkit.geometry.quadrature import gauss_legendre
-from bemkit.operators.threads import blas_threads_for
 from bemkit.results.contact_table import ContactTable
 from bemkit.results.transitions import find_transitions
 from bemkit.solvers.base import solve
+from bemkit.threads import blas_threads_for
 
 _N_CORES = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 HAS_PARDISO = importlib.util.find_spec("pypardiso") is not None

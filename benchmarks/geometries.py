@@ -27,7 +27,7 @@ from bemkit.model.prepared import prepare
 from bemkit.operators.collocation import compiled
 from bemkit.operators.hierarchy.factor import Factor
 from bemkit.operators.steklov_poincare.hierarchical import HierarchicalCollocation
-from bemkit.operators.threads import blas_threads_for
+from bemkit.threads import blas_threads_for
 from tests.scenes import Perforated
 
 FLOOR = bk.RigidHalfPlane((0.0, 0.0), (0.0, 1.0))

@@ -25,13 +25,13 @@ from bemkit.errors import NoResultError
 from bemkit.geometry.meshing.discretise import Algebraic
 from bemkit.model.model import Model, build_model
 from bemkit.model.prepared import prepare
-from bemkit.operators.threads import blas_threads_for
 from bemkit.scene.discretisation import ConstantCollocation, MeshOptions
 from bemkit.scene.toml import load_single_body
 from bemkit.solvers.alm import AugmentedLagrangian
 from bemkit.solvers.base import solve
 from bemkit.solvers.ssn import SemismoothNewton
 from bemkit.studies.engine import Task, compute
+from bemkit.threads import blas_threads_for
 
 _OPTIONS = AugmentedLagrangian()
 RHO = (1e2, 1e3, 1e4, 1e5, 1e6)

@@ -14,7 +14,7 @@ from bemkit.operators.linear_solvers import SingularMatrixError
 from bemkit.operators.steklov_poincare import CondensedMap, SteklovPoincare
 from bemkit.operators.steklov_poincare.forces_inside import ForcesInside
 from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions
-from bemkit.operators.threads import blas_threads_for
+from bemkit.threads import blas_threads_for
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor

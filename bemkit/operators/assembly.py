@@ -24,8 +24,8 @@ from bemkit.geometry.symmetry.images import antisymmetric_dofs
 from bemkit.operators.forms import Functions, PairForm
 from bemkit.operators.integrals.pairs import Degrees, PairIntegrals
 from bemkit.operators.integrals.sweep import FEW, PairSweep
-from bemkit.operators.threads import for_each_chunk
 from bemkit.stopwatch import assembling
+from bemkit.threads import for_each_chunk
 
 if TYPE_CHECKING:
     from scipy.sparse import csc_array, csr_array

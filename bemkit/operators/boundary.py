@@ -1,8 +1,9 @@
 """The boundary operators of plane elasticity as scipy linear operators.
 
 ``operator @ x``, ``operator.T``, sums and multiples are those of `scipy.sparse.linalg.LinearOperator`. The matrix is
-built on first use. ``operator.block(rows, columns)`` computes only the entries of a block. Scenes are solved without
-this module, directly from the forms (`bemkit.operators.forms`).
+built on first use. ``operator.block(rows, columns)`` computes only the entries of a block. Trial and test space of an
+operator are defined on one mesh. Scenes are solved without this module, directly from the forms
+(`bemkit.operators.forms`).
 """
 
 from __future__ import annotations
@@ -204,18 +205,7 @@ class SteklovPoincareOperator(BoundaryOperator):
 
 
 def single_layer(trial: BoundarySpace, test: BoundarySpace, material: Material) -> PairOperator:
-    """Return V, the single layer operator: <V t, q> ([Paper], equation 27).
-
-    Parameters
-    ----------
-    trial, test : BoundarySpace
-        Traction spaces on one mesh.
-    material : Material
-
-    Returns
-    -------
-    PairOperator
-        Matrix entries [m^2/Pa]: traction dofs [Pa] to tested displacements [m^2].
+    """Return V, the single layer operator of two traction spaces: <V t, q> ([Paper], equation 27) [m^2/Pa].
 
     Notes
     -----
@@ -226,20 +216,7 @@ def single_layer(trial: BoundarySpace, test: BoundarySpace, material: Material) 
 
 
 def double_layer(trial: BoundarySpace, test: BoundarySpace, material: Material) -> PairOperator:
-    """Return K, the double layer operator: <K u, q> ([Paper], equation 27).
-
-    Parameters
-    ----------
-    trial : BoundarySpace
-        Space of the displacements u; it must be continuous.
-    test : BoundarySpace
-        Space of the tractions q, on the same mesh.
-    material : Material
-
-    Returns
-    -------
-    PairOperator
-        Matrix entries [m]: displacement dofs [m] to tested displacements [m^2].
+    """Return K, the double layer operator: <K u, q> for displacements u and tractions q ([Paper], equation 27) [m].
 
     Raises
     ------
@@ -254,20 +231,9 @@ def double_layer(trial: BoundarySpace, test: BoundarySpace, material: Material) 
 
 
 def adjoint_double_layer(trial: BoundarySpace, test: BoundarySpace, material: Material) -> Transposed:
-    """Return K', the adjoint double layer operator: <K' t, v> ([Paper], equation 27).
+    """Return K', the adjoint double layer operator: <K' t, v> ([Paper], equation 27) [m].
 
-    Parameters
-    ----------
-    trial : BoundarySpace
-        Space of the tractions t.
-    test : BoundarySpace
-        Space of the displacements v, on the same mesh; it must be continuous.
-    material : Material
-
-    Returns
-    -------
-    Transposed
-        The transpose of ``double_layer(test, trial, material)``.
+    It is the transpose of ``double_layer(test, trial, material)``.
 
     Raises
     ------
@@ -278,35 +244,18 @@ def adjoint_double_layer(trial: BoundarySpace, test: BoundarySpace, material: Ma
 
 
 def hypersingular(trial: BoundarySpace, test: BoundarySpace, material: Material) -> PairOperator:
-    """Return W, the hypersingular operator: <W u, v> ([Paper], equation 27), integrated by parts.
-
-    Parameters
-    ----------
-    trial, test : BoundarySpace
-        Displacement spaces on one mesh; both must be continuous.
-    material : Material
-
-    Returns
-    -------
-    PairOperator
-        Matrix entries [Pa]: displacement dofs [m] to nodal forces [N/m].
+    """Return W, the hypersingular operator of two displacement spaces: <W u, v> ([Paper], equation 27) [Pa].
 
     Raises
     ------
     GeometryError
-        If a space is not continuous.
+        If a space is not continuous, because W is integrated by parts.
     """
     return PairOperator(hypersingular_form(trial, test, material))
 
 
 def mass(trial: BoundarySpace, test: BoundarySpace) -> Mass:
-    """Return M, the identity in weak form: <u, q>, with a sparse matrix [m].
-
-    Parameters
-    ----------
-    trial, test : BoundarySpace
-        Spaces on one mesh.
-    """
+    """Return M, the identity in weak form: <u, q>, with a sparse matrix [m]."""
     return Mass(trial, test)
 
 

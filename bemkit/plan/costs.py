@@ -29,7 +29,7 @@ from bemkit.operators.linear_solvers import (
 )
 from bemkit.operators.steklov_poincare import SteklovPoincare
 from bemkit.operators.steklov_poincare.nodal_conditions import GivenData, NodalConditions
-from bemkit.operators.threads import n_threads
+from bemkit.threads import n_threads
 
 BYTES = 8
 """Memory of a number."""

@@ -14,7 +14,6 @@ from bemkit.contact.critical_friction import critical_coefficient, sliding_respo
 from bemkit.contact.laws import LawError
 from bemkit.contact.problem import ContactProblem
 from bemkit.errors import NoResultError
-from bemkit.operators.threads import blas_threads_for
 from bemkit.results.solution import Solution
 from bemkit.runs.run import LoadHistoryError, on_its_meshes
 from bemkit.runs.solution_of import solution_of, with_missed_contact_named
@@ -23,6 +22,7 @@ from bemkit.scene.load_history import load_steps
 from bemkit.scene.scene import Scene, check_scene
 from bemkit.solvers.active_sets import NodeStatus
 from bemkit.solvers.base import ContactSolution, solve
+from bemkit.threads import blas_threads_for
 
 
 class NoSlidingStateError(NoResultError):

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Any
 
 from bemkit.contact.solvability import find_unsolvable_load
-from bemkit.operators.threads import blas_threads_for
 from bemkit.runs.run import LoadHistoryError, UnsolvableSceneError, on_its_meshes
 from bemkit.runs.solution_of import solution_of, with_missed_contact_named
 from bemkit.runs.steps import NoContactError, built, checked, explained, planned
@@ -13,6 +12,7 @@ from bemkit.scene.load_history import load_steps
 from bemkit.scene.scene import Scene, check_scene
 from bemkit.solvers.multistart import probe
 from bemkit.stopwatch import Stage
+from bemkit.threads import blas_threads_for
 
 
 def distinct_solutions(scene: Scene, *, n_starts: int = 8) -> tuple[Any, ...]:

@@ -10,13 +10,13 @@ from typing import Any
 from bemkit.errors import BemkitError
 from bemkit.model.model import build_model
 from bemkit.model.placed import find_units, with_found_contacts
-from bemkit.operators.threads import blas_threads_for
 from bemkit.runs.run import run
 from bemkit.runs.steps import History, joined, planned, solve_steps
 from bemkit.runs.warm_start import state_on
 from bemkit.scene.load_history import load_steps
 from bemkit.scene.scene import Scene
 from bemkit.stopwatch import Stage, StageClock
+from bemkit.threads import blas_threads_for
 
 
 class SharedBody:

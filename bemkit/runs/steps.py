@@ -17,7 +17,6 @@ from bemkit.model.model import Model, build_model
 from bemkit.model.placed import Meshes
 from bemkit.model.prepared import Prepared, prepare_steps
 from bemkit.model.solved_contact import with_energies_checked, with_sliding_checked
-from bemkit.operators.threads import blas_threads_for
 from bemkit.plan.plan import Plan, announce_plan, check_elements, check_memory, plan_steps
 from bemkit.runs.load_path import Callback, IncrementEnd, Path, ReachedStep, advance
 from bemkit.runs.solution_of import solution_of, with_missed_contact_named
@@ -25,6 +24,7 @@ from bemkit.scene.scene import Scene
 from bemkit.solvers.active_sets import NodeStatus
 from bemkit.solvers.base import ContactSolution, Status
 from bemkit.stopwatch import Stage, StageClock, announce, assembly_time
+from bemkit.threads import blas_threads_for
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor

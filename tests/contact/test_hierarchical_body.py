@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import bemkit as bk
+from bemkit import threads
 from bemkit.contact.body import ContactState, SingularResponse
 from bemkit.contact.conditions import separated, stick
 from bemkit.contact.contact_nodes import NoContactNodesError
@@ -16,7 +17,6 @@ from bemkit.contact.problem import ContactProblem
 from bemkit.errors import InputError
 from bemkit.model.model import Model, build_model
 from bemkit.model.prepared import prepare
-from bemkit.operators import threads
 from bemkit.operators.hierarchy.factor import Factor
 from bemkit.operators.hierarchy.skeletons import Compression
 from bemkit.operators.hierarchy.system import HierarchicalSystem, LocalConditions

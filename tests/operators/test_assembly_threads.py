@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import bemkit as bk
+from bemkit import threads
 from bemkit.geometry.spaces import LagrangeSpace
-from bemkit.operators import threads
 from bemkit.operators.boundary import hypersingular
 
 

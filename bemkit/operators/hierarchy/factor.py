@@ -26,7 +26,7 @@ from bemkit.operators.hierarchy.merge import ClusterResponse, merge_siblings
 from bemkit.operators.hierarchy.skeletons import Compression, LevelView, Skeleton
 from bemkit.operators.hierarchy.system import LocalConditions
 from bemkit.operators.linear_solvers import SingularMatrixError, SmallLU
-from bemkit.operators.threads import for_each_chunk
+from bemkit.threads import for_each_chunk
 
 
 class SingularClusterError(SingularMatrixError):

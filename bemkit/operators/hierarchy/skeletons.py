@@ -22,7 +22,7 @@ from bemkit.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from bemkit.geometry.proximity.cluster_tree import ClusterTree, Discs
 from bemkit.operators.boundary_equations import BoundaryEquations
 from bemkit.operators.hierarchy.interpolative import Block, Interpolation, sketched
-from bemkit.operators.threads import for_each_chunk
+from bemkit.threads import for_each_chunk
 
 PROXY_RATIO = 2.0
 """Radius of the proxy circle relative to that of the cluster: the m-th harmonic on the circle decays like 2^-m."""

@@ -19,7 +19,7 @@ from bemkit.operators.collocation.equations import CollocationEquations, Densiti
 from bemkit.operators.material import Material
 from bemkit.operators.somigliana.expansions import Expansions, Sources, layer_sources
 from bemkit.operators.somigliana.source_series import SEPARATION, SourceSeries, order_for
-from bemkit.operators.threads import for_each_chunk
+from bemkit.threads import for_each_chunk
 
 LEAF_SIZE = 40
 """Elements of a leaf: near integrals and far series then take about the same time."""

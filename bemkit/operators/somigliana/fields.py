@@ -40,7 +40,7 @@ from bemkit.operators.somigliana.moments import (
     straight_gradient_moments,
 )
 from bemkit.operators.somigliana.potentials import Background, PotentialFields, as_points
-from bemkit.operators.threads import for_each_chunk
+from bemkit.threads import for_each_chunk
 
 CHUNK_PAIRS = 8192
 """Pairs of points and near elements that are integrated at a time."""

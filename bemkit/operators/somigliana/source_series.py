@@ -12,7 +12,7 @@ import numpy as np
 from bemkit.arrays import ComplexArray, FloatArray, IntArray
 from bemkit.geometry.proximity.cluster_tree import Clusters
 from bemkit.operators.somigliana.expansions import Expansions, Sources
-from bemkit.operators.threads import for_each_chunk
+from bemkit.threads import for_each_chunk
 
 SourcesOf: TypeAlias = Callable[[IntArray, int], Sources]
 """(n,) positions in the tree and a number of Gauss points -> sources on the elements, arrays (n, n_sources)."""

@@ -18,8 +18,8 @@ from bemkit.operators.material import Material
 from bemkit.operators.rigid_modes import admissible_modes
 from bemkit.operators.steklov_poincare.nodal_conditions import SLIDES, GivenData, NodalConditions, turn_columns
 from bemkit.operators.steklov_poincare.protocol import BoundaryMap, CondensedMap
-from bemkit.operators.threads import for_each_chunk
 from bemkit.stopwatch import assembling
+from bemkit.threads import for_each_chunk
 
 _CHUNK_PAIRS = 32768
 """Pairs of a midpoint and an element that each thread evaluates at a time."""

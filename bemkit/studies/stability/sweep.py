@@ -12,7 +12,6 @@ import numpy as np
 from bemkit.errors import BemkitError, InputError
 from bemkit.model.model import build_model
 from bemkit.model.prepared import prepare
-from bemkit.operators.threads import blas_threads_for
 from bemkit.results.solution import Solution
 from bemkit.runs.run import run
 from bemkit.scene.scene import Scene
@@ -23,6 +22,7 @@ from bemkit.studies.stability.records import StabilityRecord, Verdict
 from bemkit.studies.stability.similarity import Similarity
 from bemkit.testing.independent_check import violations_of
 from bemkit.testing.independent_check.verdict import Violations
+from bemkit.threads import blas_threads_for
 
 TWIN = Similarity(length=3.7e-3, modulus=7.3e5, stress=1.9e-2)
 """Every case is solved a second time in these units. No factor is a power of two, so all round-off differs."""

@@ -11,8 +11,8 @@ import pytest
 from threadpoolctl import threadpool_info, threadpool_limits
 
 import bemkit as bk
-from bemkit.operators import threads
-from bemkit.operators.threads import blas_threads_for
+from bemkit import threads
+from bemkit.threads import blas_threads_for
 
 SMALL, HUGE = 10, threads.LARGE + 1
 
