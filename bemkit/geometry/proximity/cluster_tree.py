@@ -22,6 +22,10 @@ _WIDE, _FEWEST = 0.25, 8
 leaf with a few distant elements would have half of the body in its near field."""
 
 
+Pairs: TypeAlias = tuple[IntArray, IntArray]
+"""Two arrays (n_pairs,): points, and the cluster or element paired with each."""
+
+
 @dataclass(frozen=True, eq=False)
 class ClusterTree:
     """Clusters of consecutive positions; the children of cluster i are the clusters 2 i and 2 i + 1 of the level below.
@@ -80,6 +84,11 @@ class ClusterTree:
         leaves: IntArray = np.unique(np.searchsorted(self.bounds, positions, side="right") - 1)
         return leaves
 
+    def members(self, point: IntArray, leaf: IntArray) -> Pairs:
+        """Return pairs of points and leaves as pairs of the points and all elements of the leaves."""
+        begins, counts = self.bounds[leaf], np.diff(self.bounds)[leaf]
+        return np.repeat(point, counts), self.order[consecutive(begins, counts)]
+
 
 def _gap(across: FloatArray) -> int:
     """Return how many coordinates lie below a wide gap; half of them if there is none."""
@@ -88,10 +97,6 @@ def _gap(across: FloatArray) -> int:
     if not gaps.size or gaps.max() < _WIDE * (ordered[-1] - ordered[0]):
         return across.size // 2
     return _FEWEST + int(np.argmax(gaps))
-
-
-Pairs: TypeAlias = tuple[IntArray, IntArray]
-"""Two arrays (n_pairs,): points, and the cluster or element paired with each."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -162,12 +167,16 @@ class Clusters:
         far: list[Pairs] = []
         for level in range(self.tree.n_levels, -1, -1):
             if far:
-                point, cluster = np.repeat(point, 2), (2 * cluster[:, None] + np.array([0, 1])).ravel()
+                point, cluster = children(point, cluster)
             away = is_far(level, point, cluster)
             far.append((point[away], cluster[away]))
             point, cluster = point[~away], cluster[~away]
-        begins, counts = self.tree.bounds[cluster], np.diff(self.tree.bounds)[cluster]
-        return far[::-1], (np.repeat(point, counts), self.tree.order[consecutive(begins, counts)])
+        return far[::-1], self.tree.members(point, cluster)
+
+
+def children(point: IntArray, cluster: IntArray) -> Pairs:
+    """Return pairs of points and clusters as twice as many pairs with the clusters of the level below."""
+    return np.repeat(point, 2), (2 * cluster[:, None] + np.array([0, 1])).ravel()
 
 
 def consecutive(begins: IntArray, counts: IntArray) -> IntArray:

@@ -10,7 +10,7 @@ from bemkit.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from bemkit.errors import GeometryError
 from bemkit.geometry.mesh import BoundaryMesh, unchecked_mesh
 from bemkit.geometry.pieces import RESOLUTION
-from bemkit.geometry.proximity.cluster_tree import Clusters, ClusterTree, consecutive
+from bemkit.geometry.proximity.cluster_tree import Clusters, ClusterTree, children, consecutive
 
 LEAF_SIZE = 20
 """Elements of a leaf."""
@@ -130,17 +130,19 @@ class Locator:
         the line to the point x. The search descends the tree with an upper bound of the distance of each point.
         """
         tree, bound = self.clusters.tree, np.full(x.size, np.inf)
-
-        def is_far(level: int, point: IntArray, cluster: IntArray) -> BoolArray:
+        point, cluster = np.arange(x.size), np.zeros(x.size, np.intp)
+        for level in range(tree.n_levels, -1, -1):
             # the first node of each cluster improves the bound
             first = self._first[tree.order[tree.bounds[: -1 : 2**level]]]
             to_node = np.abs(x[point] - self._start[first[cluster]]) * (1.0 + 1e-9) + self._largest_bulge
             np.minimum(bound, _smallest(to_node, point, x.size), out=bound)
-            # a cluster is far if its disc is farther than the bound
+            # clusters whose disc is farther than the bound drop out
             discs = self.clusters.levels[level]
-            return np.asarray(np.abs(x[point] - discs.centre[cluster]) - discs.radius[cluster] > bound[point])
-
-        _, (point, element) = self.clusters.divided(x.size, is_far)
+            near = np.flatnonzero(np.abs(x[point] - discs.centre[cluster]) - discs.radius[cluster] <= bound[point])
+            point, cluster = point[near], cluster[near]
+            if level > 0:
+                point, cluster = children(point, cluster)
+        point, element = tree.members(point, cluster)
         # elements whose disc is farther than the start of another one drop out
         farthest = _smallest(np.abs(x[point] - self._start[self._first[element]]), point, x.size)
         to_disc = np.abs(x[point] - self._middle[element]) - self._radius[element]
