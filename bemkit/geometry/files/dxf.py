@@ -6,7 +6,6 @@ import importlib.util
 import math
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from itertools import pairwise
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -21,6 +20,8 @@ from bemkit.geometry.free_form.drawn import ArcTo, LineTo, Point
 _UNITS: Mapping[int, str] = MappingProxyType({1: "in", 2: "ft", 4: "mm", 5: "cm", 6: "m", 13: "um"})
 """Units of length by their number in the header of a DXF file."""
 _PLANE = 1e-9
+_FLAT = 1e-6
+"""Angle [rad] of arcs that are lines: points about a centre that far away have no more digits."""
 _DEEPEST = 8
 """Blocks within blocks."""
 
@@ -91,9 +92,10 @@ def read_dxf(path: Path, only: Sequence[str] = ()) -> tuple[list[Stroke], str, l
 
 
 def _entities(container: Iterable[Any], depth: int) -> Iterator[Any]:
-    """Yield entities, those of blocks and of three-dimensional polylines in place."""
+    """Yield entities, those of blocks and the lines and arcs of polylines in place."""
     for entity in container:
-        if entity.dxftype() == "INSERT" and depth < _DEEPEST:
+        kind = entity.dxftype()
+        if kind in ("LWPOLYLINE", "POLYLINE") or (kind == "INSERT" and depth < _DEEPEST):
             yield from _entities(entity.virtual_entities(), depth + 1)
         else:
             yield entity
@@ -116,21 +118,12 @@ def _strokes(entity: Any, group: str) -> list[Stroke] | None:
     """Return the strokes of an entity, or None if it is none of those that bound bodies."""
     match entity.dxftype():
         case "LINE":
-            return [Stroke(_point(entity.dxf.start), LineTo(_point(entity.dxf.end), group=group))]
+            start, end = _point(entity.dxf.start), _point(entity.dxf.end)
+            return [] if start == end else [Stroke(start, LineTo(end, group=group))]
         case "ARC":
             return [_arc(entity, math.radians(entity.dxf.start_angle), math.radians(entity.dxf.end_angle), group)]
         case "CIRCLE":
             return [_arc(entity, k * math.pi / 2.0, (k + 1) * math.pi / 2.0, group) for k in range(4)]
-        case "LWPOLYLINE":
-            corners = [(x, y, bulge) for x, y, bulge in entity.get_points("xyb")]
-            return _polyline(entity, corners, entity.dxf.elevation, entity.closed, group)
-        case "POLYLINE" if entity.is_2d_polyline or entity.is_3d_polyline:
-            places = [vertex.dxf.location for vertex in entity.vertices]
-            corners = [(p.x, p.y, v.dxf.bulge) for p, v in zip(places, entity.vertices, strict=True)]
-            heights = {p.z for p in places} or {0.0}
-            if max(heights) - min(heights) > 0.0:
-                raise GeometryError("it is three-dimensional: give a plane drawing")
-            return _polyline(entity, corners, max(heights), entity.is_closed, group)
         case "ELLIPSE":
             return _ellipse(entity, group)
         case "SPLINE":
@@ -152,31 +145,16 @@ def _point(place: Any) -> Point:
 
 def _arc(entity: Any, start: float, end: float, group: str) -> Stroke:
     """Return an arc by three of its points, which holds for mirrored ones, too."""
+    from ezdxf.math import Vec3
+
     if end <= start:
         end += 2.0 * math.pi
     centre, radius = entity.dxf.center, entity.dxf.radius
-    places = [
-        (centre.x + radius * math.cos(angle), centre.y + radius * math.sin(angle), centre.z)
-        for angle in (start, 0.5 * (start + end), end)
-    ]
-    begin, middle, finish = (_point(each) for each in entity.ocs().points_to_wcs(_vectors(places)))
-    return Stroke(begin, ArcTo(finish, middle, group=group))
-
-
-def _polyline(
-    entity: Any, corners: Sequence[tuple[float, float, float]], height: float, is_closed: bool, group: str
-) -> list[Stroke]:
-    """Return the lines of a polyline, and arcs where it bulges by the tangent of a quarter of their angle."""
-    strokes = []
-    for (x, y, bulge), (x_end, y_end, _) in pairwise([*corners, *corners[: int(is_closed)]]):
-        if (x, y) == (x_end, y_end):
-            continue
-        middle = (0.5 * (x + x_end) + 0.5 * bulge * (y_end - y), 0.5 * (y + y_end) - 0.5 * bulge * (x_end - x))
-        places = [(x, y, height), (*middle, height), (x_end, y_end, height)]
-        begin, through, end = (_point(each) for each in entity.ocs().points_to_wcs(_vectors(places)))
-        is_arc = abs(bulge) > 1e-9
-        strokes.append(Stroke(begin, ArcTo(end, through, group=group) if is_arc else LineTo(end, group=group)))
-    return strokes
+    angles = (start, 0.5 * (start + end), end)
+    places = [centre + Vec3.from_angle(angle, radius) for angle in angles]
+    begin, middle, finish = (_point(each) for each in entity.ocs().points_to_wcs(places))
+    is_flat = end - start < _FLAT
+    return Stroke(begin, LineTo(finish, group=group) if is_flat else ArcTo(finish, middle, group=group))
 
 
 def _ellipse(entity: Any, group: str) -> list[Stroke]:
@@ -187,9 +165,3 @@ def _ellipse(entity: Any, group: str) -> list[Stroke]:
     if end <= start + 1e-12:
         end += 2.0 * math.pi
     return ellipse_strokes(centre, first, second, start, end, group)
-
-
-def _vectors(places: Sequence[tuple[float, float, float]]) -> list[Any]:
-    from ezdxf.math import Vec3
-
-    return [Vec3(place) for place in places]

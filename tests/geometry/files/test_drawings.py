@@ -109,6 +109,25 @@ def test_polyline_with_bulges_and_ellipse(tmp_path) -> None:
 
 
 @needs_ezdxf
+@pytest.mark.parametrize(("bulge", "kind"), [(0.3, ArcTo), (1e-4, ArcTo), (1e-9, LineTo)])
+def test_polylines_old_and_new_are_lines_and_arcs_and_points_drawn_twice_are_one(bulge, kind, tmp_path) -> None:
+    import ezdxf
+
+    corners = [(100, 100, 0), (105, 100, bulge), (105, 103, 0), (105, 103, 0), (100, 103, 0)]
+    angle = 4.0 * math.atan(bulge)
+    segment = 0.5 * (1.5 / math.sin(0.5 * angle)) ** 2 * (angle - math.sin(angle))
+    for add in ("add_lwpolyline", "add_polyline2d"):
+        document = ezdxf.new(units=0)
+        getattr(document.modelspace(), add)(corners, format="xyb", close=True)
+        document.saveas(tmp_path / "corners.dxf")
+        shape = DrawingFile(str(tmp_path / "corners.dxf")).shape
+        assert [type(side) for side in shape.loops[0].sides] == [LineTo, kind, LineTo, LineTo]
+        assert shape.notes == ()
+        # an arc about a centre 1e4 away loses four digits
+        assert areas(shape) == pytest.approx([15.0 + segment], rel=1e-12)
+
+
+@needs_ezdxf
 def test_closed_spline_without_repeated_knots_is_the_same_curve(tmp_path) -> None:
     from scipy.interpolate import BSpline
 
