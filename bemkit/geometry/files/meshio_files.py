@@ -15,7 +15,7 @@ from bemkit.errors import GeometryError, printable
 from bemkit.geometry.files.plane_mesh import CellBlock, PlaneMesh, boundary_chains, in_plane
 from bemkit.geometry.loops import following_in_loops
 from bemkit.geometry.mesh import BoundaryMesh
-from bemkit.geometry.vectors import enclosed_area
+from bemkit.geometry.vectors import senses_of
 
 _TYPES = {
     **{"line": (2, 1), "line3": (2, 2), "line4": (2, 3)},
@@ -163,12 +163,13 @@ def read_mesh(path: str | Path, *, is_exterior: bool = False) -> BoundaryMesh:
         chains, _ = boundary_chains(PlaneMesh(mesh.points, lines))
     except GeometryError as error:
         raise GeometryError(f"read_mesh: {path}: {error}") from error
-    loops = [(chain.points, chain.names) for chain in chains]
-    largest = int(np.argmax([abs(enclosed_area(points)) for points, _ in loops]))
-    for k, (points, names) in enumerate(loops):
-        is_anticlockwise = enclosed_area(points) > 0.0
-        if is_anticlockwise != (k == largest and not is_exterior):
-            loops[k] = np.roll(points[::-1], 1, axis=0), names[::-1]  # the last chord, turned, is now the first
+    outer, senses = senses_of([chain.points for chain in chains])
+    senses[outer] ^= is_exterior
+    loops = [
+        # the last chord, turned, is now the first
+        (chain.points, chain.names) if is_right else (np.roll(chain.points[::-1], 1, axis=0), chain.names[::-1])
+        for chain, is_right in zip(chains, senses, strict=True)
+    ]
     group = np.array([name for _, names in loops for name in names])
     parts = {name: np.flatnonzero(group == name) for name in np.unique(group[group != ""]).tolist()}
     following = following_in_loops(np.array([len(names) for _, names in loops]))
