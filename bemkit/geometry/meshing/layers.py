@@ -54,7 +54,7 @@ def probing_partition(base: Division, even: Collection[str], n_elements: int) ->
     counts = share_elements(max(n_elements, LEAST * shares.size), shares)
     n_even = np.where([piece.part in even for piece in base.pieces], counts, 2)
     n_layers = FIRST_LAYERS[0] * _singular_ends(base)
-    return _balanced(base, base, [_first_layers(*ends) for ends in np.vstack([n_layers, n_even]).T.tolist()])
+    return _layered_at_joints(base, base, [_first_layers(*ends) for ends in np.vstack([n_layers, n_even]).T.tolist()])
 
 
 def layered_partition(base: Division, cuts: Mapping[int, Sequence[float]], *, n_at_jumps: int = 1) -> Partition:
@@ -72,7 +72,7 @@ def layered_partition(base: Division, cuts: Mapping[int, Sequence[float]], *, n_
     division = base.cut(cuts)
     n_layers = np.where(_inside_sides(division), n_at_jumps, FIRST_LAYERS[0])
     n_layers = np.where(_at_cut(base, division), FIRST_LAYERS[1], n_layers) * _singular_ends(division)
-    return _balanced(base, division, [_first_layers(*ends) for ends in n_layers.T.tolist()])
+    return _layered_at_joints(base, division, [_first_layers(*ends) for ends in n_layers.T.tolist()])
 
 
 def refined_partition(old: Partition, excess: FloatArray, fresh: Partition, resolution: float) -> Partition:
@@ -116,7 +116,7 @@ def refined_partition(old: Partition, excess: FloatArray, fresh: Partition, reso
             ]
         else:
             fractions += [_fractions(fresh.division.pieces[k], fresh.parameters[k]) for k in new]
-    return _balanced(old.base, fresh.division, fractions)
+    return _layered_at_joints(old.base, fresh.division, fractions)
 
 
 def shortest_length(mesh: BoundaryMesh) -> float:
@@ -208,7 +208,7 @@ def _down_to_motion(fractions: FloatArray, before: Piece, now: Piece, resolution
     return fractions
 
 
-def _balanced(base: Division, division: Division, fractions: Sequence[FloatArray]) -> Partition:
+def _layered_at_joints(base: Division, division: Division, fractions: Sequence[FloatArray]) -> Partition:
     """Bisect elements that turn too far, and add layers where a long element meets a short one of another piece."""
     curves = [division.outline.sides[piece.side].curve for piece in division.pieces]
     parameters = [

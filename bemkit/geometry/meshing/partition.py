@@ -101,7 +101,7 @@ def first_partition(
     for piece, count in zip(base.pieces, counts.tolist(), strict=True):
         y = np.linspace(0.0, 1.0, max(LEAST, count) + 1)
         parameters.append(piece.at(y if piece.part in even else _stretched(y)))
-    return _balanced(base, base, parameters)
+    return _bisected_beside_short(base, base, parameters)
 
 
 def better_partition(
@@ -146,7 +146,7 @@ def better_partition(
         wanted += share * y
         count = max(LEAST, round(n_elements * float(wanted[-1])))
         parameters.append(piece.at(_stretched(np.interp(np.linspace(0.0, wanted[-1], count + 1), wanted, y))))
-    return _balanced(old.base, division, parameters)
+    return _bisected_beside_short(old.base, division, parameters)
 
 
 def _covered(piece: Piece, old: Partition, chosen: BoolArray) -> float:
@@ -183,7 +183,7 @@ def _flattened(x: FloatArray) -> FloatArray:
     return np.where(x <= 0.5, y, 1.0 - y)
 
 
-def _balanced(base: Division, division: Division, parameters: Sequence[FloatArray]) -> Partition:
+def _bisected_beside_short(base: Division, division: Division, parameters: Sequence[FloatArray]) -> Partition:
     """Bisect elements until none is more than `STEEPEST` times as long as a neighbour, also around corners.
 
     Where a short contact element meets a long one around a corner, the error of the long one falls on the short one
