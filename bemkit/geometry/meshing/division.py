@@ -130,20 +130,20 @@ class Division:
         counts = [len(points) for points in nodes]
         side = np.repeat([piece.side for piece in self.pieces], counts)
         part = np.repeat([piece.part or "" for piece in self.pieces], counts)
-        # an element ends at the next node, the last one of a piece at the first node of the following piece
-        after = np.cumsum(counts)
-        ends = np.arange(1, after[-1] + 1)
-        following = self.following
-        ends[after - 1] = (after - counts)[following]
-        # pieces without a following one, on a symmetry line or at the end of a half-plane, end at nodes of their own
-        loose = np.flatnonzero(following < 0)
-        ends[after[loose] - 1] = after[-1] + np.arange(len(loose))
-        nodes += [outline.sides[self.pieces[k].side].curve.point(parameters[k][-1:]) for k in loose.tolist()]
+        # an element ends where the next one starts; without a next one, on a symmetry line or at the end of a
+        # half-plane, at a node of its own
+        ends = self.following_elements(counts)
+        ends[ends < 0] = ends.size + np.arange(np.count_nonzero(ends < 0))
+        nodes += [
+            outline.sides[piece.side].curve.point(s[-1:])
+            for (piece, s), k in zip(along, self.following.tolist(), strict=True)
+            if k < 0
+        ]
         # curves are numbered without the straight sides
         is_curved = np.array([not side.curve.is_straight for side in outline.sides])
         return BoundaryMesh(
             np.concatenate(nodes),
-            np.column_stack([np.arange(after[-1]), ends]),
+            np.column_stack([np.arange(ends.size), ends]),
             {name: np.flatnonzero(part == name) for name in self.part_names},
             tuple(side.curve for side in outline.sides if not side.curve.is_straight),
             np.where(is_curved, np.cumsum(is_curved) - 1, -1)[side] if is_curved.any() else None,
@@ -153,6 +153,13 @@ class Division:
             outline.surface,
             follows_outline=True,
         )
+
+    def following_elements(self, counts: Sequence[int]) -> IntArray:
+        """Return the next element (n_elements,) along the loop, -1 where there is none, by numbers for each piece."""
+        after, following = np.cumsum(counts), self.following
+        elements = np.arange(1, after[-1] + 1)
+        elements[after - 1] = np.where(following < 0, -1, (after - counts)[following])
+        return elements
 
     @property
     def following(self) -> IntArray:

@@ -189,27 +189,18 @@ def _bisected_beside_short(base: Division, division: Division, parameters: Seque
     Where a short contact element meets a long one around a corner, the error of the long one falls on the short one
     as a peak of its traction.
     """
-    outline, parameters = division.outline, list(parameters)
-    curves = [outline.sides[piece.side].curve for piece in division.pieces]
-    loop_of_side = np.repeat(np.arange(len(outline.loops)), [len(sides) for sides in outline.loops])
-    loops = loop_of_side[[piece.side for piece in division.pieces]]
+    curves = [division.outline.sides[piece.side].curve for piece in division.pieces]
     while True:
-        lengths = [norms(np.diff(curve.point(s), axis=0)) for curve, s in zip(curves, parameters, strict=True)]
-        is_long = _long_elements(lengths, loops)
-        if not any(chosen.any() for chosen in is_long):
+        chords = [norms(np.diff(curve.point(s), axis=0)) for curve, s in zip(curves, parameters, strict=True)]
+        lengths, after = np.concatenate(chords), division.following_elements([len(each) for each in chords])
+        before, after = np.flatnonzero(after >= 0), after[after >= 0]
+        shortest = np.full(lengths.size, np.inf)
+        shortest[before] = lengths[after]
+        shortest[after] = np.minimum(shortest[after], lengths[before])
+        is_long = lengths > STEEPEST * shortest
+        if not is_long.any():
             return Partition(base, division, tuple(parameters))
+        chosen = np.split(is_long, np.cumsum([len(each) for each in chords])[:-1])
         parameters = [
-            np.sort(np.concatenate([s, 0.5 * (s[:-1] + s[1:])[chosen]]))
-            for s, chosen in zip(parameters, is_long, strict=True)
+            np.sort(np.concatenate([s, 0.5 * (s[:-1] + s[1:])[own]])) for s, own in zip(parameters, chosen, strict=True)
         ]
-
-
-def _long_elements(lengths: Sequence[FloatArray], loops: IntArray) -> list[BoolArray]:
-    """Mark the elements of each piece that are too long beside one of their neighbours along the loop."""
-    result: list[BoolArray] = []
-    for loop in np.unique(loops):
-        pieces = [lengths[k] for k in np.flatnonzero(loops == loop).tolist()]
-        along = np.concatenate(pieces)
-        is_long = along > STEEPEST * np.minimum(np.roll(along, 1), np.roll(along, -1))
-        result += np.split(is_long, np.cumsum([len(piece) for piece in pieces])[:-1])
-    return result
