@@ -59,7 +59,7 @@ def contact_warnings(
     Returns
     -------
     tuple of ResultWarning
-        At most one of either kind for each contact with an obstacle.
+        At most one of either kind for each contact with an obstacle or a rigid body.
     """
     found: list[ResultWarning] = []
     begin = 0
@@ -68,7 +68,7 @@ def contact_warnings(
         of_rows = node_status[begin : begin + rows.n_contact]
         begin += rows.n_contact
         touching[rows.body].append(rows.nodes)
-        if rows.other < 0:
+        if rows.couplings is None:
             found += _oblique(model.prepared.bodies[rows.body], rows, of_rows)
     units = model.prepared.scene.units
     for body, displacement, nodes in zip(model.prepared.bodies, displacements, touching, strict=True):
@@ -77,19 +77,24 @@ def contact_warnings(
 
 
 def _oblique(body: PreparedBody, rows: ContactInterface, node_status: IntArray) -> list[ResultWarning]:
-    candidates = body.candidates
-    is_of_part = np.equal(candidates.parts, rows.part) & np.isin(candidates.nodes.nodes, rows.nodes)
+    candidates, is_fixed = body.candidates, rows.other < 0
+    is_of_part = np.equal(candidates.parts, rows.part if is_fixed else rows.name) & np.isin(
+        candidates.nodes.nodes, rows.nodes
+    )
     angle = np.degrees(np.arccos(np.clip(candidates.facing[is_of_part], -1.0, 1.0)))
     is_oblique = (node_status != NodeStatus.SEPARATED) & (angle > LARGEST_ANGLE)
     if not is_oblique.any():
         return []
     degrees = float(angle[is_oblique].max())
+    touches = (
+        f"Part {rows.name!r} touches its obstacle" if is_fixed else f"Contact {rows.name!r} touches the rigid body"
+    )
     return [
         ResultWarning(
             "oblique contact",
             rows.name,
-            f"Part {rows.name!r} touches its obstacle at up to {degrees:.0f} degrees to its own normal, where small "
-            "displacements no longer describe the contact: model the body nearer to its final position.",
+            f"{touches} at up to {degrees:.0f} degrees to its own normal, where small displacements no "
+            "longer describe the contact: model the body nearer to its final position.",
             degrees,
         )
     ]

@@ -403,6 +403,17 @@ def test_a_body_that_hangs_above_comes_down_and_one_without_force_stays() -> Non
     assert np.abs(still.contact.sigma_n).max() == 0.0
 
 
+def test_a_corner_that_ploughs_aside_is_warned_of() -> None:
+    """More than friction holds: only nodes beside the corner hold the punch, at their nearest points, obliquely."""
+    mesh = bk.MeshOptions(elements=200)
+    above = bk.RigidPolygon(((0.5, 1.001), (1.5, 1.001), (1.5, 1.5), (0.5, 1.5)))
+    punch = replace(PUNCH, obstacle=above, force_x=0.4 * FORCE)
+    solution = bk.run(replace(PRESSED, bodies=(replace(BLOCK, mesh=mesh),), rigid=(punch,), law=SOME))
+    (warning,) = (each for each in solution.warnings if each.kind == "oblique contact")
+    assert "Contact 'block.top / punch' touches the rigid body at up to" in warning.text
+    assert not any(each.kind == "oblique contact" for each in solved(replace(PRESSED, law=SOME)).warnings)
+
+
 def test_what_overlaps_unmeant_is_refused_and_an_interference_presses() -> None:
     deep = replace(PUNCH, obstacle=bk.RigidCircle((1.0, 1.499), 0.5), force_y=None)
     with pytest.raises(OverlapError, match=r"contact 'block.top / punch': the bodies overlap by 0.001 at \(1, 1\)"):
