@@ -17,13 +17,14 @@ from bemkit.contact.mortar.segments import Segments, common_refinement, facing_p
 from bemkit.contact.mortar.sides import ContactSide
 from bemkit.geometry.placement import Placement
 from bemkit.model.body_contacts import reach_of
-from bemkit.results.between_nodes import (
+from bemkit.results.points_between import (
     AddedGap,
     Interpolation,
     MeasuredContact,
+    PointsBetween,
     points_between,
+    with_least_clearances,
 )
-from bemkit.results.least_clearance import PointsBetween, with_least_clearances
 from bemkit.results.solved_body import SolvedBody
 from bemkit.scene.contacts import ContactPair
 

@@ -2,30 +2,35 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
-from typing import NamedTuple, TypeAlias
+from collections.abc import Collection, Iterable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bemkit.arrays import FloatArray, IntArray
+from bemkit.arrays import FloatArray
 from bemkit.contact.body import SlipHistory
-from bemkit.contact.contact_nodes import contact_frame
 from bemkit.contact.laws import FrictionLaw
-from bemkit.contact.obstacle import Obstacle, measure_contact
-from bemkit.geometry.local_values import from_own_nodes
-from bemkit.geometry.neighbours import along_boundary
-from bemkit.geometry.spaces import BoundarySpace
-from bemkit.geometry.vectors import norms
 from bemkit.results.contact_table import ContactTable, free_contacts
-from bemkit.results.least_clearance import PointsBetween, Sample, deepest
-from bemkit.results.solved_body import SolvedBody
+from bemkit.results.part_forces import RigidResult
+from bemkit.results.points_between import (
+    MeasuredContact,
+    PointsBetween,
+    Sample,
+    deepest,
+    nearest_only,
+    points_between,
+    sample_at_obstacle,
+    with_least_clearances,
+)
+from bemkit.scene.conditions import name_at_obstacle
 
-AddedGap: TypeAlias = Callable[[FloatArray], FloatArray]
-"""Points (n, 2) [m] -> what is added to the distance there (n,) [m]."""
-_POINTS_PER_NODE = 4
-"""Sample points for each node of an element. Between them a polynomial exceeds its largest sample by a few per cent at
-most."""
+if TYPE_CHECKING:
+    from bemkit.results.solved_scene import SolvedScene
+    from bemkit.scene.contacts import ContactPair
+    from bemkit.scene.plane_motion import RigidBody
+
 _NOWHERE = (float("nan"), float("nan"))
 _NUMBERS = ("penetration", "tension", "complementarity", "cone_excess", "penetration_depth")
 _ROUND_OFF = 64.0 * float(np.finfo(float).eps)
@@ -39,6 +44,8 @@ constant elements beside the lowest point of a coarse ring overlap by 1.2 times 
 right to 4 %."""
 _FREE_ROUND_OFF = 1e-12
 """Overlap that may be round-off, for bodies without any contact force, relative to their displacement."""
+_LIGHTEST = 1e-3
+"""Smallest force that a body is measured by, relative to the forces on the others."""
 
 
 @dataclass(frozen=True)
@@ -106,111 +113,6 @@ class BetweenNodes:
         return cls(*np.max(rows, axis=0).tolist()) if rows else None
 
 
-class MeasuredContact(NamedTuple):
-    """A contact, the elastic bodies that it joins, its law, and what measures points of it."""
-
-    name: str
-    bodies: tuple[str, ...]
-    law: FrictionLaw
-    measure: Callable[[], PointsBetween]
-
-
-def sample_at_obstacle(
-    body: SolvedBody,
-    obstacle: Obstacle,
-    elements: IntArray,
-    gap: AddedGap | None = None,
-    shift: Callable[[FloatArray], FloatArray] | None = None,
-) -> Sample:
-    """Return the function that measures clearance and tractions on elements (m,) that face a rigid obstacle.
-
-    Parameters
-    ----------
-    body : SolvedBody
-    obstacle : Obstacle
-    elements : (m,) int array
-    gap : callable, optional
-        Points (n, 2) -> what is added to the distance (n,) [m]; nothing by default.
-    shift : callable, optional
-        Points (n, 2) -> displacements (n, 2) [m] of the obstacle there; none by default.
-    """
-    mesh = body.mesh
-    elements = along_boundary(mesh, elements)
-    xi, lengths = points_between(_degree(body)), mesh.lengths[elements]
-    starts = np.cumsum(lengths) - lengths
-
-    def sample(pieces: IntArray, low: FloatArray, high: FloatArray) -> PointsBetween:
-        chosen, at = elements[pieces], 0.5 * (low + high)[:, None] + 0.5 * (high - low)[:, None] * xi
-        points = mesh.points(chosen, at).reshape(-1, 2)
-        distance, directions = measure_contact(obstacle, points, mesh.normals_at(chosen, at).reshape(-1, 2))
-        fields, frame = Interpolation.at(body, chosen, at), contact_frame(directions)
-        moved = fields.displacement(body).reshape(-1, 2) - (0.0 if shift is None else shift(points))
-        u_n, _ = np.einsum("nkc,nc->kn", frame, moved)
-        sigma_n, sigma_t = np.einsum("nkc,nc->kn", frame, fields.traction(body).reshape(-1, 2))
-        s = starts[pieces, None] + 0.5 * lengths[pieces, None] * (at + 1.0)
-        added = 0.0 if gap is None else gap(points)
-        clearance, step = added + distance - u_n, fields.step(body).ravel()
-        return PointsBetween(points, s.ravel(), directions, clearance, sigma_n, sigma_t, step)
-
-    return sample
-
-
-def _degree(body: SolvedBody) -> int:
-    return body.scene.discretisation.displacement_space(body.mesh).degree
-
-
-@dataclass(frozen=True, eq=False)
-class Interpolation:
-    """Interpolation of the fields of a body, and of its copies, at points (m, q) of elements (m,).
-
-    Parameters
-    ----------
-    elements : (m,) int array
-    dofs : (m, n_local) int array
-        Of the displacements.
-    of_displacement, of_traction : (m, q, n_local) arrays
-    """
-
-    elements: IntArray
-    dofs: IntArray
-    of_displacement: FloatArray
-    of_traction: FloatArray
-
-    @classmethod
-    def at(cls, body: SolvedBody, elements: IntArray, xi: FloatArray) -> Interpolation:
-        """Return the interpolation at local coordinates xi (m, q) of elements (m,) of a body."""
-        discretisation, mesh = body.scene.discretisation, body.mesh
-        displacements, tractions = discretisation.displacement_space(mesh), discretisation.traction_space(mesh)
-        dofs = displacements.element_dofs[elements]
-        unit = np.broadcast_to(np.eye(dofs.shape[1]), (*dofs.shape, dofs.shape[1]))
-        of_displacement = _basis(displacements, xi) @ from_own_nodes(displacements, unit, elements)
-        return cls(elements, dofs, of_displacement, _basis(tractions, xi))
-
-    def displacement(self, body: SolvedBody) -> FloatArray:
-        """Return displacements (m, q, 2) [m]."""
-        return np.asarray(self.of_displacement @ body.boundary.displacement[self.dofs])
-
-    def step(self, body: SolvedBody) -> FloatArray:
-        """Return half of the largest jump (m, q) [m] of constant elements to a neighbour; zero of other elements."""
-        mesh, steps = body.mesh, np.zeros(body.mesh.n_elements)
-        if self.dofs.shape[1] == 1:
-            before, after = mesh.node_elements[(mesh.node_elements >= 0).all(axis=1)].T
-            jumps = 0.5 * norms(body.boundary.displacement[after] - body.boundary.displacement[before])
-            for elements in (before, after):
-                np.maximum.at(steps, elements, jumps)
-        return np.broadcast_to(steps[self.elements, None], self.of_traction.shape[:2])
-
-    def traction(self, body: SolvedBody) -> FloatArray:
-        """Return tractions (m, q, 2) [Pa]."""
-        at_nodes = body.boundary.traction_dofs.reshape(body.mesh.n_elements, -1, 2)
-        return np.asarray(self.of_traction @ at_nodes[self.elements])
-
-
-def _basis(space: BoundarySpace, xi: FloatArray) -> FloatArray:
-    """Return the local basis (m, q, n_local) at xi (m, q)."""
-    return space.basis(xi.ravel()).reshape(-1, *xi.shape).transpose(1, 2, 0)
-
-
 def law_between(
     law: FrictionLaw, values: PointsBetween, contact: ContactTable, name: str, motion: SlipHistory | None
 ) -> FrictionLaw:
@@ -248,6 +150,99 @@ def violations_at(values: PointsBetween, law: FrictionLaw, stress: float, length
     )
 
 
+def violations_between_nodes(solution: SolvedScene, names: Collection[str] | None = None) -> dict[str, BetweenNodes]:
+    """Measure the displacements and tractions of a solution along its contacts.
+
+    Parameters
+    ----------
+    solution : SolvedScene
+    names : collection of str, optional
+        The contacts to measure; by default all. The stress and the length to which violations are relative are those of
+        all contacts.
+
+    Returns
+    -------
+    dict of str to BetweenNodes
+        By contact of the table.
+
+    Notes
+    -----
+    The gap is measured at each point, so that the shape of both sides between nodes counts too. Fields of constant
+    elements are steps. Between elastic bodies points lie on the pieces on which the functions of both sides are smooth,
+    and face each other along the mean of both normals; tractions of both sides are measured, with one clearance.
+    Tractions are relative to those on the body of the contact that carries less, and lengths to the displacement of the
+    softer one: the heaviest block does not hide the violations of a light one. Without any contact force lengths are
+    relative to the larger displacement of the two.
+    """
+    bodies, contact = solution.bodies, solution.contact
+    stated = [*_at_obstacles(solution)]
+    if solution.scene.elastic_contacts:
+        from bemkit.results.between_bodies import contacts_between_bodies  # mortars, which other scenes lack
+
+        stated += contacts_between_bodies(solution)
+    forces = {name: 0.0 for name in bodies}
+    stresses = dict(forces)
+    size = np.hypot(contact.sigma_n, contact.sigma_t)
+    for name, partners, _, _ in stated:
+        rows = contact.rows(name)
+        for body in partners:
+            forces[body] += float(contact.weight[rows] @ size[rows])
+            stresses[body] = max(stresses[body], float(size[rows].max(initial=0.0)))
+    violations: dict[str, BetweenNodes] = {}
+    moved = {name: float(np.abs(body.boundary.displacement).max()) for name, body in bodies.items()}
+    for name, partners, law, measure in stated:
+        if names is not None and name not in names:
+            continue
+        modulus = min(bodies[body].scene.material.plane_modulus for body in partners)
+        force, stress = (
+            max(min(of[body] for body in partners), _LIGHTEST * max(of.values())) for of in (forces, stresses)
+        )
+        with np.errstate(all="ignore"):  # results that are not finite are measured by nan
+            values = measure()
+            found = violations_at(
+                values,
+                law_between(law, values, contact, name, solution.motion),
+                stress or 1.0,
+                force / modulus or max(moved[body] for body in partners) or max(moved.values()) or 1.0,
+            )
+        violations[name] = replace(found, has_forces=force > 0.0)
+    return violations
+
+
+def _at_obstacles(solution: SolvedScene) -> Iterator[MeasuredContact]:
+    """Yield the contacts with rigid obstacles, fixed and moving; each point belongs to the one that is nearest."""
+    stated = solution.scene
+    moving: dict[str, list[ContactPair]] = {}
+    for pair in stated.contacts:
+        if pair.rigid_body is not None:
+            moving.setdefault(pair.elastic_parts[0][0], []).append(pair)
+    for owner, body in solution.bodies.items():
+        scene, mesh = body.scene, body.mesh
+        facing: dict[str, list[tuple[str, FrictionLaw, Sample]]] = {}
+        for part_name, obstacle in scene.obstacles.items():
+            elements = mesh.part(part_name)
+            if elements.size:  # none beyond a symmetry line
+                sample = sample_at_obstacle(body, obstacle, elements)
+                facing[part_name] = [(name_at_obstacle(body.name, part_name), scene.laws[part_name], sample)]
+        for pair in moving.get(owner, ()):
+            part_name = pair.elastic_parts[0][1]
+            rigid = stated.rigid_body_of(pair)
+            shift = partial(_moved, rigid, solution.rigid[str(pair.rigid_body)])
+            sample = sample_at_obstacle(body, rigid.obstacle, mesh.part(part_name), pair.gap_at, shift)
+            facing.setdefault(part_name, []).append((pair.name, stated.law_of(pair), sample))
+        xi = points_between(scene.discretisation.displacement_space(mesh).degree)
+        for part_name, rivals in facing.items():
+            samples = [sample for _, _, sample in rivals]
+            for k, (name, law, _) in enumerate(rivals):
+                sample, n_elements = nearest_only(samples, k), mesh.part(part_name).size
+                yield MeasuredContact(name, (owner,), law, partial(with_least_clearances, sample, n_elements, xi))
+
+
+def _moved(stated: RigidBody, motion: RigidResult, points: FloatArray) -> FloatArray:
+    """Return the displacements (n, 2) [m] of a rigid body at points (n, 2)."""
+    return np.asarray(stated.motions_at(points) @ np.array([motion.x, motion.y, motion.turn]))
+
+
 def missed_contacts(table: ContactTable, measured: Mapping[str, BetweenNodes]) -> dict[str, tuple[float, float]]:
     """Return the points where the nodes do not find the contact, by contact.
 
@@ -273,12 +268,6 @@ def unfound_contacts(table: ContactTable, measured: Mapping[str, BetweenNodes]) 
         for name, place in missed_contacts(table, measured).items()
         if name in free or measured[name].penetration > LARGEST_OVERLAP
     }
-
-
-def points_between(degree: int) -> FloatArray:
-    """Return Chebyshev points of [-1, 1], dense at the ends like the nodes; ends and middle are among them."""
-    n = _POINTS_PER_NODE * (degree + 1) + 1
-    return -np.cos(np.pi * np.arange(n) / (n - 1))
 
 
 def _largest(values: FloatArray) -> float:

@@ -9,7 +9,7 @@ from bemkit.contact.obstacle import Obstacle
 from bemkit.geometry.neighbours import along_boundary
 from bemkit.geometry.vectors import norms
 from bemkit.model.finite_sliding import is_in_the_plane
-from bemkit.results.between_nodes import Interpolation, points_between, sample_at_obstacle
+from bemkit.results.points_between import Interpolation, points_between, sample_at_obstacle
 from bemkit.results.solved_body import SolvedBody
 
 _PRESSED = 0.01

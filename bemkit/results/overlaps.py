@@ -12,7 +12,7 @@ from bemkit.contact.obstacle import Obstacle
 from bemkit.errors import ResultWarning
 from bemkit.geometry.proximity.overlap import ROUND_OFF, Polyline, deepest_overlap, near_pairs
 from bemkit.model.overlaps import finite_obstacles, is_finite
-from bemkit.results.between_nodes import Interpolation
+from bemkit.results.points_between import Interpolation
 from bemkit.results.solved_body import SolvedBody
 from bemkit.scene.unit_names import amount
 

@@ -19,10 +19,14 @@ from bemkit.errors import InputError, ResultWarning
 from bemkit.notebook import Explorable
 from bemkit.operators.counts import OperationCounts
 from bemkit.plan.plan import Plan
-from bemkit.results.between_nodes import BetweenNodes, missed_contacts, unfound_contacts
+from bemkit.results.between_nodes import (
+    BetweenNodes,
+    missed_contacts,
+    unfound_contacts,
+    violations_between_nodes,
+)
 from bemkit.results.contact_table import ContactTable as ContactTable
 from bemkit.results.contact_table import narrow_contacts
-from bemkit.results.contact_violations import violations_between_nodes
 from bemkit.results.solved_body import BoundaryFields as BoundaryFields
 from bemkit.results.solved_scene import SolvedScene, contact_facts, part_facts
 from bemkit.results.transitions import Transition as Transition

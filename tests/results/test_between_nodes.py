@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 
 import bemkit as bk
-from bemkit.results.between_nodes import BetweenNodes, PointsBetween, points_between, violations_at
+from bemkit.results.between_nodes import BetweenNodes, violations_at
+from bemkit.results.points_between import PointsBetween, points_between
 from bemkit.results.result_file import write_result
 from bemkit.results.solution import Solution
 from tests.slow import slow_only

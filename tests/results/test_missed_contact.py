@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 import bemkit as bk
 from bemkit.results.between_nodes import BetweenNodes, missed_contacts
-from bemkit.results.least_clearance import PointsBetween, deepest, with_least_clearances
+from bemkit.results.points_between import PointsBetween, deepest, with_least_clearances
 from bemkit.runs.adaptive import run_adaptive
 from tests.slow import slow_except
 

@@ -3,12 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray, IntArray
+from bemkit.contact.contact_nodes import contact_frame
+from bemkit.contact.laws import FrictionLaw
+from bemkit.contact.obstacle import Obstacle, measure_contact
+from bemkit.geometry.local_values import from_own_nodes
+from bemkit.geometry.neighbours import along_boundary
+from bemkit.geometry.spaces import BoundarySpace
+from bemkit.geometry.vectors import norms
+from bemkit.results.solved_body import SolvedBody
 
+AddedGap: TypeAlias = Callable[[FloatArray], FloatArray]
+"""Points (n, 2) [m] -> what is added to the distance there (n,) [m]."""
+_POINTS_PER_NODE = 4
+"""Sample points for each node of an element. Between them a polynomial exceeds its largest sample by a few per cent at
+most."""
 _SHORTEST = 4.0**-4
 """Length of the last interval about a least clearance, relative to its element. A parabola through the points there
 finds the least clearance of a smooth gap to round-off."""
@@ -70,6 +84,117 @@ class PointsBetween(NamedTuple):
 Sample: TypeAlias = Callable[[IntArray, FloatArray, FloatArray], PointsBetween]
 """Pieces (m,) of a side and an interval of each, from low (m,) to high (m,) within [-1, 1] -> points of each interval,
 piece by piece."""
+
+
+class MeasuredContact(NamedTuple):
+    """A contact, the elastic bodies that it joins, its law, and what measures points of it."""
+
+    name: str
+    bodies: tuple[str, ...]
+    law: FrictionLaw
+    measure: Callable[[], PointsBetween]
+
+
+def sample_at_obstacle(
+    body: SolvedBody,
+    obstacle: Obstacle,
+    elements: IntArray,
+    gap: AddedGap | None = None,
+    shift: Callable[[FloatArray], FloatArray] | None = None,
+) -> Sample:
+    """Return the function that measures clearance and tractions on elements (m,) that face a rigid obstacle.
+
+    Parameters
+    ----------
+    body : SolvedBody
+    obstacle : Obstacle
+    elements : (m,) int array
+    gap : callable, optional
+        Points (n, 2) -> what is added to the distance (n,) [m]; nothing by default.
+    shift : callable, optional
+        Points (n, 2) -> displacements (n, 2) [m] of the obstacle there; none by default.
+    """
+    mesh = body.mesh
+    elements = along_boundary(mesh, elements)
+    xi, lengths = points_between(_degree(body)), mesh.lengths[elements]
+    starts = np.cumsum(lengths) - lengths
+
+    def sample(pieces: IntArray, low: FloatArray, high: FloatArray) -> PointsBetween:
+        chosen, at = elements[pieces], 0.5 * (low + high)[:, None] + 0.5 * (high - low)[:, None] * xi
+        points = mesh.points(chosen, at).reshape(-1, 2)
+        distance, directions = measure_contact(obstacle, points, mesh.normals_at(chosen, at).reshape(-1, 2))
+        fields, frame = Interpolation.at(body, chosen, at), contact_frame(directions)
+        moved = fields.displacement(body).reshape(-1, 2) - (0.0 if shift is None else shift(points))
+        u_n, _ = np.einsum("nkc,nc->kn", frame, moved)
+        sigma_n, sigma_t = np.einsum("nkc,nc->kn", frame, fields.traction(body).reshape(-1, 2))
+        s = starts[pieces, None] + 0.5 * lengths[pieces, None] * (at + 1.0)
+        added = 0.0 if gap is None else gap(points)
+        clearance, step = added + distance - u_n, fields.step(body).ravel()
+        return PointsBetween(points, s.ravel(), directions, clearance, sigma_n, sigma_t, step)
+
+    return sample
+
+
+def _degree(body: SolvedBody) -> int:
+    return body.scene.discretisation.displacement_space(body.mesh).degree
+
+
+@dataclass(frozen=True, eq=False)
+class Interpolation:
+    """Interpolation of the fields of a body, and of its copies, at points (m, q) of elements (m,).
+
+    Parameters
+    ----------
+    elements : (m,) int array
+    dofs : (m, n_local) int array
+        Of the displacements.
+    of_displacement, of_traction : (m, q, n_local) arrays
+    """
+
+    elements: IntArray
+    dofs: IntArray
+    of_displacement: FloatArray
+    of_traction: FloatArray
+
+    @classmethod
+    def at(cls, body: SolvedBody, elements: IntArray, xi: FloatArray) -> Interpolation:
+        """Return the interpolation at local coordinates xi (m, q) of elements (m,) of a body."""
+        discretisation, mesh = body.scene.discretisation, body.mesh
+        displacements, tractions = discretisation.displacement_space(mesh), discretisation.traction_space(mesh)
+        dofs = displacements.element_dofs[elements]
+        unit = np.broadcast_to(np.eye(dofs.shape[1]), (*dofs.shape, dofs.shape[1]))
+        of_displacement = _basis(displacements, xi) @ from_own_nodes(displacements, unit, elements)
+        return cls(elements, dofs, of_displacement, _basis(tractions, xi))
+
+    def displacement(self, body: SolvedBody) -> FloatArray:
+        """Return displacements (m, q, 2) [m]."""
+        return np.asarray(self.of_displacement @ body.boundary.displacement[self.dofs])
+
+    def step(self, body: SolvedBody) -> FloatArray:
+        """Return half of the largest jump (m, q) [m] of constant elements to a neighbour; zero of other elements."""
+        mesh, steps = body.mesh, np.zeros(body.mesh.n_elements)
+        if self.dofs.shape[1] == 1:
+            before, after = mesh.node_elements[(mesh.node_elements >= 0).all(axis=1)].T
+            jumps = 0.5 * norms(body.boundary.displacement[after] - body.boundary.displacement[before])
+            for elements in (before, after):
+                np.maximum.at(steps, elements, jumps)
+        return np.broadcast_to(steps[self.elements, None], self.of_traction.shape[:2])
+
+    def traction(self, body: SolvedBody) -> FloatArray:
+        """Return tractions (m, q, 2) [Pa]."""
+        at_nodes = body.boundary.traction_dofs.reshape(body.mesh.n_elements, -1, 2)
+        return np.asarray(self.of_traction @ at_nodes[self.elements])
+
+
+def _basis(space: BoundarySpace, xi: FloatArray) -> FloatArray:
+    """Return the local basis (m, q, n_local) at xi (m, q)."""
+    return space.basis(xi.ravel()).reshape(-1, *xi.shape).transpose(1, 2, 0)
+
+
+def points_between(degree: int) -> FloatArray:
+    """Return Chebyshev points of [-1, 1], dense at the ends like the nodes; ends and middle are among them."""
+    n = _POINTS_PER_NODE * (degree + 1) + 1
+    return -np.cos(np.pi * np.arange(n) / (n - 1))
 
 
 def nearest_only(samples: Sequence[Sample], index: int) -> Sample:
