@@ -19,7 +19,7 @@ from rich.console import Console
 from rich.table import Table
 
 import bemkit as bk
-from bemkit.contact.conditions import stick
+from bemkit.contact.body import stick
 from bemkit.contact.contact_nodes import opened
 from bemkit.contact.hierarchical_body import hierarchical_body
 from bemkit.geometry.outline import Outline

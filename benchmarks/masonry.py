@@ -15,7 +15,7 @@ from dataclasses import replace
 import numpy as np
 
 import bemkit as bk
-from bemkit.contact.conditions import stick
+from bemkit.contact.body import stick
 from bemkit.contact.laws import Coulomb
 from bemkit.contact.problem import ContactProblem
 from bemkit.contact.solvability import find_unsolvable_load

@@ -38,7 +38,7 @@ NOT_NEEDED = (
     *("model.finite_sliding", "results.moved_contacts", "results.solved_steps"),
 )
 """Of a scene with one body of straight sides on one obstacle, solved by collocation from a number of elements."""
-MOST_MODULES = 109
+MOST_MODULES = 105
 """Modules of the package that may be loaded to solve a simple scene, packages and command line counted."""
 HEAVY = ("scipy.sparse.linalg", "h5py", "pyamg", "matplotlib", "meshio", "rich", "click")
 

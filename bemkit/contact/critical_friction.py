@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray
-from bemkit.contact.body import LinearBody, SingularResponse
-from bemkit.contact.conditions import of_statuses, separated, stick
+from bemkit.contact.body import LinearBody, SingularResponse, of_statuses, separated, stick
 from bemkit.operators.boundary_equations import LinearConditions
 
 LARGEST_COEFFICIENT = 1e3

@@ -71,7 +71,7 @@ class DenseBody(LinearBody):
         stiffnesses, of those that are more than round-off.
     n_pressures : int
         Number of further unknowns, which no contact condition concerns and on which no force acts: uniform pressures of
-        incompressible bodies; see `bemkit.operators.steklov_poincare.protocol.CondensedMap`.
+        incompressible bodies; see `bemkit.operators.steklov_poincare.CondensedMap`.
     largest_modulus : float, optional [Pa]
         The largest modulus, of shape or volume, of the bodies that make room for others; by default `modulus`.
 

@@ -8,8 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray, IntArray, spread_fractions
-from bemkit.contact.body import ContactState, FreeMotion, LinearBody, SingularResponse
-from bemkit.contact.conditions import stick
+from bemkit.contact.body import ContactState, FreeMotion, LinearBody, SingularResponse, stick
 from bemkit.contact.contact_nodes import ContactNodes, NoContactNodesError, free_motions, held_nodes
 from bemkit.contact.equilibrium import NOISE_FACTOR, Imbalance, resultant_imbalance
 from bemkit.contact.held_friction import HeldFriction

@@ -9,8 +9,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray, read_only
-from bemkit.contact.body import ClosedVolume, ContactState, LinearBody, SingularResponse
-from bemkit.contact.conditions import separated, stick
+from bemkit.contact.body import ClosedVolume, ContactState, LinearBody, SingularResponse, separated, stick
 from bemkit.contact.laws import FrictionLaw, LawError
 from bemkit.errors import InputError
 from bemkit.operators.boundary_equations import LinearConditions

@@ -14,12 +14,13 @@ from bemkit.errors import InputError
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.spaces import BoundarySpace, element_nodes
 from bemkit.model.units import Units
-from bemkit.operators.steklov_poincare import SteklovPoincare, TractionField
+from bemkit.operators.steklov_poincare import SteklovPoincare
 from bemkit.operators.steklov_poincare.nodal_conditions import (
     ConflictingSupportsError,
     GivenData,
     NodalConditions,
     Support,
+    TractionField,
     integrate_traction,
     supported,
 )

@@ -6,8 +6,7 @@ from enum import IntEnum
 import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray, IntArray
-from bemkit.contact.body import ContactState
-from bemkit.contact.conditions import augmented, of_statuses, slip, stick
+from bemkit.contact.body import ContactState, augmented, of_statuses, slip, stick
 from bemkit.contact.problem import ContactProblem
 from bemkit.errors import InputError
 from bemkit.operators.boundary_equations import LinearConditions

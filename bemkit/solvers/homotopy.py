@@ -19,8 +19,7 @@ from typing import NamedTuple
 import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray, IntArray, spread_fractions
-from bemkit.contact.body import ContactState, SingularResponse
-from bemkit.contact.conditions import of_statuses, slip, stick
+from bemkit.contact.body import ContactState, SingularResponse, of_statuses, slip, stick
 from bemkit.contact.problem import ContactProblem
 from bemkit.operators.boundary_equations import LinearConditions
 from bemkit.solvers.active_sets import ActiveSets

@@ -9,8 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bemkit.arrays import FloatArray, IntArray, spread_fractions
-from bemkit.contact.body import ClosedVolume, ContactState
-from bemkit.contact.conditions import stick
+from bemkit.contact.body import ClosedVolume, ContactState, stick
 from bemkit.contact.further_laws import law_name
 from bemkit.contact.laws import LawError
 from bemkit.contact.problem import ContactProblem

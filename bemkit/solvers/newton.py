@@ -9,9 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray
-from bemkit.contact.body import ClosedVolume, ContactState, LinearBody, SingularResponse
+from bemkit.contact.body import ClosedVolume, ContactState, LinearBody, SingularResponse, of_statuses, separated, stick
 from bemkit.contact.certificate import DEFORMED, Scales
-from bemkit.contact.conditions import of_statuses, separated, stick
 from bemkit.contact.problem import ContactProblem
 from bemkit.errors import InputError
 from bemkit.operators.boundary_equations import LinearConditions

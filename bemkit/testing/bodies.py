@@ -7,8 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bemkit.contact.body import ContactState, LinearBody, SingularResponse
-from bemkit.contact.conditions import augmented, separated, slip, stick
+from bemkit.contact.body import ContactState, LinearBody, SingularResponse, augmented, separated, slip, stick
 from bemkit.contact.laws import Frictionless
 from bemkit.contact.problem import ContactProblem
 from bemkit.errors import InputError

@@ -3,8 +3,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bemkit.contact.body import ContactState, SingularResponse
-from bemkit.contact.conditions import augmented, separated, slip, stick
+from bemkit.contact.body import ContactState, SingularResponse, augmented, separated, slip, stick
 from bemkit.contact.dense_body import DenseBody
 from bemkit.contact.equilibrium import Imbalance
 from bemkit.contact.laws import Coulomb

@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 
 import bemkit as bk
-from bemkit.contact.body import ClosedVolume
-from bemkit.contact.conditions import separated, stick
+from bemkit.contact.body import ClosedVolume, separated, stick
 from bemkit.contact.dense_body import DenseBody
 from bemkit.errors import InputError
 from bemkit.model.model import build_model

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from bemkit.arrays import FloatArray, IntArray
-from bemkit.contact.body import ContactState
-from bemkit.contact.conditions import separated, stick
+from bemkit.contact.body import ContactState, separated, stick
 from bemkit.contact.contact_nodes import ContactNodes
 from bemkit.contact.direct_body import DirectBody
 from bemkit.contact.equilibrium import resultant_imbalance

@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 import bemkit as bk
-from bemkit.contact.body import ContactState, SingularResponse
-from bemkit.contact.conditions import slip, stick
+from bemkit.contact.body import ContactState, SingularResponse, slip, stick
 from bemkit.contact.held_friction import HeldFriction
 from bemkit.model.model import build_model
 from bemkit.model.prepared import prepare

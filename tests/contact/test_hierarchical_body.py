@@ -9,8 +9,7 @@ import pytest
 
 import bemkit as bk
 from bemkit import threads
-from bemkit.contact.body import ContactState, SingularResponse
-from bemkit.contact.conditions import separated, stick
+from bemkit.contact.body import ContactState, SingularResponse, separated, stick
 from bemkit.contact.contact_nodes import NoContactNodesError
 from bemkit.contact.hierarchical_body import HierarchicalBody, hierarchical_body
 from bemkit.contact.problem import ContactProblem

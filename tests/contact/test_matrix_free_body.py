@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import bemkit as bk
-from bemkit.contact.conditions import stick
+from bemkit.contact.body import stick
 from bemkit.contact.hierarchical_body import HierarchicalBody
 from bemkit.model.model import build_model
 from bemkit.model.prepared import prepare

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import sparse
 
-from bemkit.contact.conditions import separated, slip, stick
+from bemkit.contact.body import separated, slip, stick
 from bemkit.contact.joined.member import diagonal_blocks
 from bemkit.operators.null_space import null_space
 from bemkit.operators.rigid_modes import orthonormal

@@ -6,8 +6,8 @@ import numpy as np
 
 from bemkit.arrays import ComplexArray, FloatArray
 from bemkit.geometry.mesh import BoundaryMesh
+from bemkit.operators.collocation.corrections import GradientReconstruction
 from bemkit.operators.collocation.curved_elements import exact_factors
-from bemkit.operators.collocation.gradient_reconstruction import GradientReconstruction
 from bemkit.operators.collocation.layers import Constants
 from bemkit.operators.element_geometry import ElementGeometry
 from bemkit.operators.material import Material

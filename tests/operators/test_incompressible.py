@@ -7,7 +7,7 @@ import pytest
 
 import bemkit as bk
 from bemkit.arrays import FloatArray
-from bemkit.contact.conditions import separated, stick
+from bemkit.contact.body import separated, stick
 from bemkit.contact.contact_nodes import ContactNodes
 from bemkit.geometry import BoundaryMesh, Selection
 from bemkit.geometry.neighbours import corner_nodes

@@ -11,7 +11,7 @@ from bemkit.arrays import FloatArray
 from bemkit.geometry import BoundaryMesh, Disk, PlateWithHole, Rectangle, Ring, discretise
 from bemkit.geometry.neighbours import corner_nodes
 from bemkit.operators.boundary import SteklovPoincareOperator
-from bemkit.operators.collocation.reciprocity import Reciprocity
+from bemkit.operators.collocation.corrections import Reciprocity
 from bemkit.operators.counts import Entries
 from bemkit.operators.material import Material
 from bemkit.operators.rigid_modes import traction_free_modes

@@ -8,7 +8,7 @@ import pytest
 import bemkit as bk
 from bemkit.arrays import ComplexArray, FloatArray
 from bemkit.geometry import BoundaryMesh, Disk, ExteriorOf, PlateWithHole, Rectangle, Ring, discretise
-from bemkit.operators.collocation.reciprocity import Reciprocity
+from bemkit.operators.collocation.corrections import Reciprocity
 from bemkit.operators.material import Material
 
 POISSON_RATIOS = [0.0, 0.3, 0.4999999999, 0.5]

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from scipy.optimize import nnls
 
-from bemkit.contact.body import ContactState
-from bemkit.contact.conditions import separated, slip, stick
+from bemkit.contact.body import ContactState, separated, slip, stick
 from bemkit.contact.laws import Coulomb, Frictionless
 from bemkit.contact.problem import ContactProblem
 from bemkit.solvers.alm import AugmentedLagrangian

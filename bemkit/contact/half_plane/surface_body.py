@@ -16,8 +16,7 @@ from functools import cached_property
 import numpy as np
 
 from bemkit.arrays import ComplexArray, FloatArray, IntArray
-from bemkit.contact.body import ContactState, FreeMotion, LinearBody
-from bemkit.contact.conditions import separated
+from bemkit.contact.body import ContactState, FreeMotion, LinearBody, separated
 from bemkit.contact.contact_nodes import ContactNodes
 from bemkit.contact.equilibrium import Imbalance
 from bemkit.contact.reduced_conditions import ReducedConditions, as_complex, as_pairs

@@ -38,7 +38,7 @@ class Member:
         For messages.
     n_pressures : int
         Number of pressures, the last components, that belong to the volume of an incompressible body; see
-        `bemkit.operators.steklov_poincare.protocol.CondensedMap`. No contact concerns them.
+        `bemkit.operators.steklov_poincare.CondensedMap`. No contact concerns them.
     bulk_modulus : float [Pa]
         Pressure by unit of dilatation; zero if the body keeps its volume.
 

@@ -1,13 +1,11 @@
 """The boundary equations of collocation, (1/2 + T) u = U t at the midpoints of elements, in the order of a tree.
 
 Column 4 * element + 2 * kind + component belongs to the traction (kind 0) or displacement (kind 1) of an element; its
-entries are the displacements that a unit of it causes. Displacements may have slopes
-(`bemkit.operators.collocation.gradient_reconstruction`); the displacement of an element then also acts on its two
-neighbours.
+entries are the displacements that a unit of it causes. Displacements may have slopes; the displacement of an element
+then also acts on its two neighbours.
 
-The border sets the resultants of the tractions to zero and adds a reciprocity for each closed curve
-(`bemkit.operators.collocation.reciprocity`). Each of these equations adds an unknown error of the displacement
-equations.
+The border sets the resultants of the tractions to zero and adds a reciprocity for each closed curve. Each of these
+equations adds an unknown error of the displacement equations. See `bemkit.operators.collocation.corrections`.
 """
 
 from __future__ import annotations
@@ -19,9 +17,8 @@ import numpy as np
 from bemkit.arrays import ComplexArray, FloatArray, IntArray
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.operators.boundary_equations import Border
-from bemkit.operators.collocation.gradient_reconstruction import GradientReconstruction
+from bemkit.operators.collocation.corrections import GradientReconstruction, Reciprocity
 from bemkit.operators.collocation.layers import Constants, Layer, Unknowns, combined
-from bemkit.operators.collocation.reciprocity import Reciprocity
 from bemkit.operators.element_geometry import ElementGeometry
 from bemkit.operators.material import Material
 from bemkit.operators.rigid_modes import traction_free_modes

@@ -15,8 +15,8 @@ import numpy as np
 from bemkit.arrays import FloatArray, IntArray
 from bemkit.operators.half_plane.far_motion import FarMotion
 from bemkit.operators.linear_solvers import Cholesky
+from bemkit.operators.steklov_poincare import CondensedMap
 from bemkit.operators.steklov_poincare.nodal_conditions import GivenData, NodalConditions, rotated
-from bemkit.operators.steklov_poincare.protocol import CondensedMap
 
 
 @dataclass(eq=False)

@@ -21,8 +21,8 @@ from bemkit.operators.counts import Factorisation, FactorKind, OperationCounts
 from bemkit.operators.half_plane.far_motion import FarMotion
 from bemkit.operators.linear_solvers import Tag
 from bemkit.operators.material import Material
+from bemkit.operators.steklov_poincare import BoundaryMap, CondensedMap
 from bemkit.operators.steklov_poincare.nodal_conditions import GivenData, NodalConditions
-from bemkit.operators.steklov_poincare.protocol import BoundaryMap, CondensedMap
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,8 +16,8 @@ from bemkit.operators.counts import Entries, Factorisation, FactorKind, Operatio
 from bemkit.operators.linear_solvers import DenseLU, SingularMatrixError, Tag
 from bemkit.operators.material import Material
 from bemkit.operators.rigid_modes import admissible_modes
+from bemkit.operators.steklov_poincare import BoundaryMap, CondensedMap
 from bemkit.operators.steklov_poincare.nodal_conditions import SLIDES, GivenData, NodalConditions, turn_columns
-from bemkit.operators.steklov_poincare.protocol import BoundaryMap, CondensedMap
 from bemkit.stopwatch import assembling
 from bemkit.threads import for_each_chunk
 
@@ -35,8 +35,7 @@ class CollocationElasticity(BoundaryMap):
     mesh : BoundaryMesh
     material : Material
     slopes : bool
-        Whether the displacements of the double layer vary linearly on each element, with slopes from its neighbours
-        (`bemkit.operators.collocation.gradient_reconstruction`).
+        Whether the displacements of the double layer vary linearly on each element, with slopes from its neighbours.
 
     Notes
     -----
@@ -44,8 +43,8 @@ class CollocationElasticity(BoundaryMap):
     represent only translations exactly. Plain collocation fulfils the equilibrium of forces and moments up to the
     discretisation error. Here the resultants of the tractions are set to zero, and a rigid motion c, which vanishes
     with the mesh size, is added to the equations; an exterior has neither. One reciprocity for each loop determines the
-    uniform pressure there, which the displacement equation loses as Poisson's ratio approaches 1/2
-    (`bemkit.operators.collocation.reciprocity`).
+    uniform pressure there, which the displacement equation loses as Poisson's ratio approaches 1/2. See
+    `bemkit.operators.collocation.corrections` for slopes and reciprocities.
     """
 
     def __init__(self, mesh: BoundaryMesh, material: Material, *, slopes: bool = True) -> None:

@@ -18,8 +18,8 @@ from bemkit.geometry.local_values import values_on_elements
 from bemkit.geometry.quadrature import gauss_legendre
 from bemkit.geometry.spaces import BoundarySpace, dof_points
 from bemkit.operators.rigid_modes import without_motion
+from bemkit.operators.steklov_poincare import CondensedMap, WrappedMap
 from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions, integrate_traction
-from bemkit.operators.steklov_poincare.protocol import CondensedMap, WrappedMap
 
 if TYPE_CHECKING:
     from bemkit.operators.particular_solutions import ParticularSolution

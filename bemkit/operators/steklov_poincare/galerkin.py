@@ -30,9 +30,9 @@ from bemkit.operators.linear_solvers import (
 )
 from bemkit.operators.material import Material
 from bemkit.operators.rigid_modes import admissible_modes, traction_free_modes
+from bemkit.operators.steklov_poincare import BoundaryMap, CondensedMap
 from bemkit.operators.steklov_poincare.layer_operators import GalerkinFactors, dilatation_of, galerkin_factors
 from bemkit.operators.steklov_poincare.nodal_conditions import GivenData, NodalConditions, integrate_traction
-from bemkit.operators.steklov_poincare.protocol import BoundaryMap, CondensedMap
 from bemkit.operators.steklov_poincare.schur import SchurCondensation
 from bemkit.operators.steklov_poincare.volume_constraint import Volume
 

@@ -18,9 +18,9 @@ from bemkit.operators.hierarchy.factor import Factor
 from bemkit.operators.hierarchy.system import BodyFactor, HierarchicalSystem, LocalConditions
 from bemkit.operators.linear_solvers import Hierarchical, MatrixFree, SingularMatrixError
 from bemkit.operators.material import Material
+from bemkit.operators.steklov_poincare import CondensedMap
 from bemkit.operators.steklov_poincare.collocation import CollocationElasticity
 from bemkit.operators.steklov_poincare.nodal_conditions import GivenData, NodalConditions, free_modes, turning
-from bemkit.operators.steklov_poincare.protocol import CondensedMap
 
 LEAF_SIZE = 88
 """Elements of a leaf: larger leaves cost more to factor, smaller ones have skeletons nearly as large as themselves."""

@@ -13,8 +13,8 @@ from bemkit.geometry.spaces import dof_points
 from bemkit.operators.counts import OperationCounts
 from bemkit.operators.linear_solvers import Tag
 from bemkit.operators.rigid_modes import rigid_motions
+from bemkit.operators.steklov_poincare import CondensedMap, SteklovPoincare, WrappedMap
 from bemkit.operators.steklov_poincare.nodal_conditions import GivenData, NodalConditions
-from bemkit.operators.steklov_poincare.protocol import CondensedMap, SteklovPoincare, WrappedMap
 
 
 @dataclass(frozen=True, eq=False)

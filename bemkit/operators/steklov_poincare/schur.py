@@ -9,8 +9,8 @@ import numpy as np
 from bemkit.arrays import FloatArray, IntArray, block_of
 from bemkit.operators.counts import OperationCounts
 from bemkit.operators.linear_solvers import Factor, LinearSolver, multiply
+from bemkit.operators.steklov_poincare import CondensedMap
 from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions, rotated
-from bemkit.operators.steklov_poincare.protocol import CondensedMap
 from bemkit.operators.steklov_poincare.volume_constraint import Volume, without_round_off
 
 _ROWS = 128

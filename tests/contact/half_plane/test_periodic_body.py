@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 import bemkit as bk
-from bemkit.contact.body import ContactState, SingularResponse
-from bemkit.contact.conditions import separated
+from bemkit.contact.body import ContactState, SingularResponse, separated
 from bemkit.contact.half_plane.periodic_body import PeriodicBody
 from bemkit.model.model import build_model
 from bemkit.model.prepared import prepare

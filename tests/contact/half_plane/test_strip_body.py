@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 import bemkit as bk
-from bemkit.contact.body import ContactState, SingularResponse
-from bemkit.contact.conditions import separated, slip, stick
+from bemkit.contact.body import ContactState, SingularResponse, separated, slip, stick
 from bemkit.contact.half_plane.strip_body import StripBody
 from bemkit.model.model import build_model
 from bemkit.model.prepared import prepare

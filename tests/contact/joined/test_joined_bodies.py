@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 from scipy import sparse
 
-from bemkit.contact.body import ContactState, SingularResponse
+from bemkit.contact.body import ContactState, SingularResponse, separated, slip, stick
 from bemkit.contact.certificate import certify
-from bemkit.contact.conditions import separated, slip, stick
 from bemkit.contact.joined.joined_bodies import JoinedBodies
 from bemkit.contact.joined.member import Member
 from bemkit.contact.laws import Coulomb

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bemkit.contact.conditions import augmented, separated, slip, stick
+from bemkit.contact.body import augmented, separated, slip, stick
 from bemkit.operators.boundary_equations import LinearConditions
 from bemkit.operators.hierarchy.system import UndeterminedError, solved
 

@@ -1,10 +1,19 @@
-"""Reciprocity with one exact elastic field for each closed curve, which determines the uniform pressure there.
+"""Corrections of constant elements: slopes of displacements, and reciprocities that determine uniform pressures.
+
+Slopes give the double layer second order. In complex notation the displacement on element j is u_j + g_j (y - x_j),
+with a slope g_j from the midpoint values of the element and its neighbours. In the local coordinate t this is
+u_j + s_j p(t) with s_j = g_j l tau, and p(t) = t on straight elements. Each element still has one unknown displacement.
+Rotations have the slope i on all elements, so they are represented exactly.
+
+The mean of the parabola through the three midpoint values differs from u_j by b_j (l tau)^2 / 3, with its leading
+coefficient b_j. This difference is added to the constant part. Without it the displacement of a bent body would be off
+by h^2 / 24 times its curvature except at the midpoint, which makes results of thin bodies wrong.
 
 The displacement equation hardly determines a uniform pressure on a closed curve, which displaces the boundary only by
 its compressibility: an error of the equation along the normals causes an error of the pressure 1 / (1 - 2 nu) times
 larger, and at nu = 1/2 the pressure in a hole does not appear in the equation. Betti's theorem [Betti1872] for a field
-w that transports volume through the curve determines the pressure at every Poisson's ratio. In complex notation, with
-the tractions t(w) of w on the boundary,
+w that transports volume through the curve determines the pressure at every Poisson's ratio. With the tractions t(w) of
+w on the boundary,
 
     around a hole     w = a / conj(z - c),        t(w) ds = 2 mu i dw,     c in the hole, a its distance from the curve
     the outer curve   w = (1 - 2 nu) (z - c),     t(w) ds = -2 mu i dz
@@ -19,19 +28,79 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bemkit.arrays import ComplexArray, FloatArray, IntArray
+from bemkit.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from bemkit.geometry.mesh import BoundaryMesh
+from bemkit.geometry.neighbours import corner_nodes
 from bemkit.geometry.quadrature import gauss_legendre
-from bemkit.operators.collocation.gradient_reconstruction import GradientReconstruction
 from bemkit.operators.element_geometry import ElementGeometry
 from bemkit.operators.material import Material
 
+CORNER_ANGLE = 0.3
+"""Smallest angle [rad] of a corner, across which no slope is taken; polygons of smooth curves have smaller angles."""
 _POINTS = 16
 """Gauss points of an element; exact to round-off if the element is not longer than the width of the hole."""
 _POINTS_OF_LINES = 2
 """Gauss points for a dilatation on straight elements, for which two are exact."""
 _CANDIDATES = 64
 """Elements of a hole from which its largest circle is sought."""
+
+
+class GradientReconstruction:
+    """The linear displacements on elements that the midpoint value of each element causes, by least squares.
+
+    Parameters
+    ----------
+    mesh : BoundaryMesh
+        Closed.
+    geometry : ElementGeometry
+
+    Attributes
+    ----------
+    acted_on : (n_elements, 3) array
+        Elements on which the value acts: the preceding one, the element itself, and the next one along the boundary.
+    weights : (n_elements, 3, 2) complex array
+        Constant part and slope of a unit value on these. On every element the constant parts add up to one, the slopes
+        to zero.
+
+    Notes
+    -----
+    Let x_k be the midpoints of an element and its neighbours and m their mean. The slope is sum c_k u_k with
+    c_k = conj(x_k - m) / sum |x_j - m|^2: the derivative of the complex-linear least-squares fit, or of the regression
+    line along a straight side. Neighbours across a corner are excluded, unless the element has corners at both ends.
+    Elements at corners have no correction of the mean.
+    """
+
+    def __init__(self, mesh: BoundaryMesh, geometry: ElementGeometry) -> None:
+        neighbours = np.empty((3, mesh.n_elements), dtype=np.intp)
+        for loop in mesh.loops:
+            neighbours[:, loop] = np.roll(loop, 1), loop, np.roll(loop, -1)
+        is_corner = corner_nodes(mesh, CORNER_ANGLE)[mesh.elements].T
+        centre, half = geometry.centre[neighbours], geometry.half * geometry.tangent
+        is_used = np.ones(neighbours.shape, bool)
+        is_used[0], is_used[2] = ~is_corner
+        is_smooth = is_used.all(axis=0) & (neighbours[0] != neighbours[2])
+        is_used[:, is_used.sum(axis=0) == 1] = True
+        arm = np.where(is_used, centre - np.mean(centre, axis=0, where=is_used), 0.0)
+        weights = arm.conj() / np.sum(np.square(arm.real) + np.square(arm.imag), axis=0)
+        # of an element and its neighbours: their weights in its constant part and slope
+        of_values = np.stack([_means(centre, half, is_smooth), weights * half], axis=2)
+        of_values[1, :, 0] += 1.0
+        # an element is neighbour 2 of the preceding one, 1 of itself and 0 of the next one
+        self.acted_on = neighbours.T
+        self.weights: ComplexArray = of_values[np.array([2, 1, 0]), self.acted_on]
+
+    def gathered(self, on_constant: ComplexArray, on_slope: ComplexArray) -> ComplexArray:
+        """Return the coefficients (..., n_elements) of values from those of constant parts and slopes."""
+        of_values = np.stack([on_constant[..., self.acted_on], on_slope[..., self.acted_on]], axis=-1)
+        return np.asarray((of_values * self.weights).sum(axis=(-2, -1)))
+
+
+def _means(centre: ComplexArray, half: ComplexArray, is_smooth: BoolArray) -> ComplexArray:
+    """Return the weights (3, n_elements) of the mean of b (y - x)^2, with the second divided difference b."""
+    before, middle, after = centre
+    back, ahead = np.where(is_smooth, before - middle, -1.0), np.where(is_smooth, after - middle, 1.0)
+    of_mean = np.where(is_smooth, half**2 / 3.0, 0.0) / (ahead - back)
+    return np.array([-of_mean / back, of_mean / back - of_mean / ahead, of_mean / ahead])
 
 
 class Reciprocity:
@@ -43,7 +112,7 @@ class Reciprocity:
         Loops that are images of each other share one equation.
     material : Material
     takes_slopes : bool
-        Whether displacements have slopes; see `bemkit.operators.collocation.gradient_reconstruction`.
+        Whether displacements have slopes; see `GradientReconstruction`.
 
     Attributes
     ----------
