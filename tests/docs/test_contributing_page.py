@@ -46,7 +46,7 @@ def test_a_response_of_a_compressed_body_passes_through_seven_files() -> None:
 
 def test_every_kind_of_addition_has_its_row() -> None:
     names = (
-        "law, solver, space, discretisation, obstacle, shape, file of a body, operator, body, body force, "
+        "law, solver, space, discretisation, elastic map, obstacle, shape, file of a body, operator, body, body force, "
         "rule for copies, sequence of meshes, kind, picture, known solution, study"
     )
     assert [row[0] for row in PLACES] == names.split(", ")
