@@ -11,7 +11,7 @@ from bemkit.geometry import BoundaryMesh, Rectangle, discretise
 from bemkit.geometry.spaces import ConstantSpace, LinearSpace, QuadraticSpace, dof_points
 from bemkit.operators.material import Material
 from bemkit.operators.somigliana.fields import InteriorFields
-from tests.geometry.test_location import SHAPES
+from tests.geometry.proximity.test_location import SHAPES
 
 SPACES = (ConstantSpace, LinearSpace, QuadraticSpace)
 

@@ -15,8 +15,7 @@ from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.meshing.discretise import discretise
 from bemkit.geometry.outline import Selection
 from bemkit.geometry.shapes import ExteriorOf, Polygon, Rectangle
-
-from .strategies import closed
+from tests.geometry.strategies import closed
 
 OUTER = np.array([[0, 0], [3, 0], [3, 2], [0, 2]]) / 3.0
 INNER = np.array([[0.25, 0.25], [0.25, 0.5], [0.5, 0.5], [0.5, 0.25]])

@@ -10,8 +10,7 @@ from bemkit.geometry.curves import ParametricCurve, Segment
 from bemkit.geometry.meshing.discretise import Algebraic, Geometric, discretise, share_elements
 from bemkit.geometry.outline import Outline, Selection, Side
 from bemkit.geometry.shapes import Disk, PlateWithHole, Polygon, Rectangle, Ring
-
-from .strategies import sizes, star_polygons
+from tests.geometry.strategies import sizes, star_polygons
 
 UNIT = Rectangle(1.0, 1.0).outline()
 
