@@ -30,7 +30,7 @@ NOT_NEEDED = (
     *("model.obstacle_travel", "model.overlaps", "model.shapes", "results.load_history", "scene.written_tables"),
     *("operators.half_plane", "operators.kernels", "operators.collocation.curved_elements"),
     *("operators.steklov_poincare.forces_inside", "operators.steklov_poincare.rigid_connection"),
-    *("operators.hierarchy", "model.matched_sides", "results.law_jumps"),
+    *("operators.hierarchy", "model.matched_sides", "results.jumps"),
     *("geometry.symmetry", "scene.body_forces", "scene.contacts", "scene.copies"),
     *("scene.load_history", "scene.plane_motion", "scene.profiles", "scene.steps"),
     *("operators.integrals", "operators.collocation.images"),

@@ -23,7 +23,7 @@ from bemkit.results.between_nodes import BetweenNodes
 from bemkit.results.contact_table import ContactTable, free_contacts
 from bemkit.results.solution import Solution
 from bemkit.results.solved_body import SolvedBody
-from bemkit.scene.conditions import Clamped, PrescribedDisplacement, Roller
+from bemkit.scene.conditions import Clamped, Contact, PrescribedDisplacement, Roller
 from bemkit.scene.unit_names import UnitNames, amount
 
 LARGEST_ERROR = 0.05
@@ -87,6 +87,7 @@ def _of_body(solution: Solution, body: SolvedBody) -> tuple[Iterator[ResultWarni
         _coarse_curves(body.mesh),
         _large_strains(body),
         _moved_contacts(body, solution.units),
+        _load_jumps(body),
     )
 
 
@@ -366,9 +367,18 @@ def _law_jumps(contact: ContactTable, laws: Mapping[str, FrictionLaw]) -> Iterat
     """Warn of jumps of friction bounds that vary in space; with a history or numbers at nodes they are not examined."""
     if not (varying := {name: law for name, law in laws.items() if _varies(law)}):
         return
-    from bemkit.results.law_jumps import law_jumps
+    from bemkit.results.jumps import law_jumps
 
     yield from law_jumps(contact, varying)
+
+
+def _load_jumps(body: SolvedBody) -> Iterator[ResultWarning]:
+    """Warn of jumps of loads and given displacements that are formulas or functions."""
+    conditions = (part.condition for part in body.scene.parts)
+    if any(callable(value) for each in conditions if not isinstance(each, Contact) for value in vars(each).values()):
+        from bemkit.results.jumps import load_jumps
+
+        yield from load_jumps(body)
 
 
 def _varies(law: FrictionLaw) -> bool:

@@ -1,4 +1,4 @@
-"""Friction coefficients that jump inside an element."""
+"""Friction coefficients, loads and given displacements that jump inside an element."""
 
 from __future__ import annotations
 
@@ -61,3 +61,61 @@ def test_a_jump_between_two_pieces_of_a_part_is_none() -> None:
     )
     assert not warned(bk.Expression("where(x < 2, 0.2, 0.9)"), scene)
     assert warned(bk.Expression("where(x < 0.7, 0.2, 0.9)"), scene)
+
+
+def pushed(
+    condition: bk.Traction | bk.Pressure | bk.PrescribedDisplacement, mesh: bk.MeshOptions | None = None
+) -> bk.Scene:
+    """A block of 2 by 1 on a smooth floor, its nodes at multiples of 1/6."""
+    return bk.Scene(
+        title="Block",
+        shape=bk.Rectangle(2.0, 1.0),
+        material=bk.Material(1.0, 0.3),
+        parts=(
+            bk.Part("floor", bk.Contact(bk.RigidHalfPlane()), ("bottom",)),
+            bk.Part("wall", bk.Roller(), ("left",)),
+            bk.Part("top", condition, ("top",)),
+        ),
+        discretisation=bk.Galerkin(1),
+        mesh=bk.MeshOptions(elements=36) if mesh is None else mesh,
+    )
+
+
+def jumps_of(scene: bk.Scene) -> list[str]:
+    return [str(each) for each in bk.run(scene).warnings if each.kind.startswith("jump of")]
+
+
+@pytest.mark.parametrize(
+    ("condition", "kind"),
+    [
+        (bk.Traction(y=bk.Expression("where(x < 1.237, -0.01, 0)")), "load"),
+        (bk.Pressure(bk.Expression("0.01 + 0.002 * sign(1.237 - x)")), "load"),
+        (bk.PrescribedDisplacement(y=bk.Expression("where(x < 1.237, -0.01, -0.02)")), "displacement"),
+    ],
+)
+def test_a_load_that_jumps_inside_an_element_is_named_with_its_place(
+    condition: bk.Traction | bk.Pressure | bk.PrescribedDisplacement, kind: str
+) -> None:
+    (text,) = jumps_of(pushed(condition))
+    assert text.startswith(f"Part 'top': the {kind} jumps at (1.237, 1), inside an element: divide the part"), text
+
+
+def test_a_narrow_load_that_quadrature_misses_is_named() -> None:
+    """Half of the load lies on a tenth of an element, between the points of quadrature: its force is lost."""
+    scene = pushed(bk.Traction(y=bk.Expression("-0.01 - where(1.03 < x < 1.05, 1, 0)")))
+    assert bk.run(scene).force_normal == pytest.approx(0.02, rel=1e-9)  # a sum of 36 numbers; 0.04 is right
+    assert len(jumps_of(scene)) == 2
+
+
+@pytest.mark.parametrize(
+    "formula", ["-0.01 * (1 + x)", "-0.01 * (1 + tanh(20 * (x - 1.2)))", "where(x < 1, -0.01, 0)", "0.01 * sin(pi * x)"]
+)
+def test_a_load_that_jumps_at_a_node_or_nowhere_is_not(formula: str) -> None:
+    assert not jumps_of(pushed(bk.Traction(y=bk.Expression(f"{formula} - 0.02"))))
+
+
+def test_a_jump_that_matters_little_is_not() -> None:
+    """A tenth of the load on an element of a hundredth of the side: at most 1e-3 of the load is wrong."""
+    load = bk.Traction(y=bk.Expression("where(x < 1.237, -0.01, -0.0112)"))
+    assert jumps_of(pushed(load))
+    assert not jumps_of(pushed(load, bk.MeshOptions(elements=150, density={"top": 30.0})))
