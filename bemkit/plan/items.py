@@ -11,6 +11,7 @@ import numpy as np
 from bemkit.contact.laws import FrictionLaw
 from bemkit.model.placed import PlacedBody, groups
 from bemkit.model.prepared import Prepared
+from bemkit.operators.counts import Entries
 from bemkit.operators.linear_solvers import MatrixFree, Tag
 from bemkit.operators.rigid_modes import admissible_modes
 from bemkit.plan.costs import HALF_PLANE_OVER_TREE, BodyCase, cost_of, rates_of
@@ -156,20 +157,13 @@ def _galerkin_items(case: BodyCase) -> Iterator[PlanItem]:
 
 
 def _collocation_items(case: BodyCase) -> Iterator[PlanItem]:
-    work, conditions = case.work, case.conditions
-    u, n_retained, single, double = (
-        conditions.is_fixed.size,
-        conditions.n_retained,
-        work.single_layer,
-        work.double_layer,
-    )
+    work, conditions, u = case.work, case.conditions, case.conditions.is_fixed.size
+    single, double, n_retained = work.single_layer, work.double_layer, conditions.n_retained
     n_single, n_double = conditions.n_fixed + n_retained, conditions.n_free + n_retained
     yield PlanItem("single layer V", True, f"unknown tractions: held and retained directions; {u} x {n_single}")
-    zero = u - single.computed // u
-    yield _zero_columns("columns of V on the free surface", "the traction is zero there", zero, u)
+    yield _zero_columns("columns of V on the free surface", "the traction is zero there", single, u)
     yield PlanItem("double layer K", True, f"unknown displacements: free and retained directions; {u} x {n_double}")
-    zero = u - double.computed // u
-    yield _zero_columns("columns of K where supports hold", "the displacement is zero there", zero, u)
+    yield _zero_columns("columns of K where supports hold", "the displacement is zero there", double, u)
     n_given = (single.computed - single.stored + double.computed - double.stored) // u
     given = f"{n_given} columns are multiplied by given data at once" if n_given else "all given data are zero"
     yield PlanItem("storage of columns under given data", False, given)
@@ -185,10 +179,11 @@ def _collocation_items(case: BodyCase) -> Iterator[PlanItem]:
     yield PlanItem("pressure that keeps the volume", False, volume)
 
 
-def _zero_columns(name: str, reason: str, n_columns: int, n_all: int) -> PlanItem:
-    if n_columns <= 0:
+def _zero_columns(name: str, reason: str, operator: Entries, n_dofs: int) -> PlanItem:
+    n_zero = n_dofs - operator.computed // n_dofs
+    if n_zero <= 0:
         return PlanItem(name, True, "no column can be skipped")
-    return PlanItem(name, False, f"{reason}; {n_columns} of {n_all} columns")
+    return PlanItem(name, False, f"{reason}; {n_zero} of {n_dofs} columns")
 
 
 def _slopes_items(case: BodyCase) -> Iterator[PlanItem]:
@@ -207,15 +202,13 @@ def _compressed_items(case: BodyCase) -> Iterator[PlanItem]:
     options, (is_compiled, why) = case.chosen.hierarchical, compiled.expected(case.mesh.n_elements)
     assert options is not None
     is_free = isinstance(options, MatrixFree)
-    form = "products by the fast multipole method"
-    if not is_free:
-        form = f"single and double layer, compressed over a tree to {options.tolerance:g}"
+    compressed = f"single and double layer, compressed over a tree to {options.tolerance:g}"
+    form = "products by the fast multipole method" if is_free else compressed
     yield PlanItem("boundary equations", True, f"{form}: {case.chosen.reason}")
     yield from _slopes_items(case)
     yield _NO_HYPERSINGULAR
-    solver = "LU of the clusters of the tree; no matrix of the whole body"
-    if is_free:
-        solver = f"GMRES to {options.tolerance:g}, about 17 steps from cold"
+    iteration = f"GMRES to {options.tolerance:g}, about 17 steps from cold"
+    solver = iteration if is_free else "LU of the clusters of the tree; no matrix of the whole body"
     yield PlanItem("linear solver of the body", True, solver)
     chosen, other = (cost_of(case, is_compiled=choice).seconds for choice in (is_compiled, not is_compiled))
     others = "numpy" if is_compiled else "compiled ones"
