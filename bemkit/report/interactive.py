@@ -49,9 +49,9 @@ new Response(unpacked).text().then((text) => {
 
 
 def check_interactive() -> None:
-    """Raise InputError if plotly, or matplotlib, which finds overlaps of bodies as they are drawn, is not installed."""
-    if find_spec("plotly") is None or find_spec("matplotlib") is None:
-        raise InputError('interactive pages need plotly and matplotlib: pip install "bemkit[interactive]"')
+    """Raise InputError if plotly is not installed."""
+    if find_spec("plotly") is None:
+        raise InputError('interactive pages need plotly: pip install "bemkit[interactive]"')
 
 
 def interactive_elements(result: Result) -> list[Element]:
@@ -65,7 +65,7 @@ def interactive_elements(result: Result) -> list[Element]:
     Raises
     ------
     InputError
-        If plotly or matplotlib is not installed.
+        If plotly is not installed.
     """
     check_interactive()
     from plotly.offline import get_plotlyjs

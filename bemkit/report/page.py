@@ -32,7 +32,7 @@ def report(result: Result, *, interactive: bool = False) -> str:
     ----------
     result : Solution
     interactive : bool
-        Whether a drawing to explore takes the place of the pictures; needs plotly and matplotlib.
+        Whether a drawing to explore takes the place of the pictures; needs plotly.
 
     Returns
     -------
@@ -42,7 +42,7 @@ def report(result: Result, *, interactive: bool = False) -> str:
     Raises
     ------
     InputError
-        If an interactive page is asked for and plotly or matplotlib is not installed.
+        If an interactive page is asked for and plotly is not installed.
     """
     sections: dict[str, list[Element]] = {
         "Summary": [facts(summary_rows(result), "The result in numbers")],
@@ -97,7 +97,7 @@ def check_report(path: str | Path, *, interactive: bool = False) -> Path:
     ------
     OutputFileError
     InputError
-        If an interactive page is asked for and plotly or matplotlib is not installed.
+        If an interactive page is asked for and plotly is not installed.
     """
     if interactive:
         from bemkit.report.interactive import check_interactive

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -31,7 +32,11 @@ def moved(shapes: tuple[bk.Shape, bk.Shape], placement: bk.Placement, motion: tu
 
 
 @pytest.mark.parametrize(("motion", "overlap"), [((0.0, -0.1), 0.1), ((0.3, 0.0), 0.0), ((0.0, 0.1), 0.0)])
-def test_a_block_that_is_moved_into_another_overlaps_by_that(motion: tuple[float, float], overlap: float) -> None:
+def test_a_block_that_is_moved_into_another_overlaps_by_that(
+    motion: tuple[float, float], overlap: float, without: Callable[..., None]
+) -> None:
+    """Interactive pages, which need no matplotlib, ask this too."""
+    without("matplotlib")
     pair = moved((bk.Rectangle(1.0, 1.0), bk.Rectangle(1.0, 1.0)), bk.Placement((0.0, 1.0)), motion)
     assert drawn_overlap(pair, 0.0) == 0.0
     assert drawn_overlap(pair, 1.0) == pytest.approx(overlap, abs=1e-12)

@@ -175,12 +175,17 @@ def test_the_page_loads_nothing(text: str) -> None:
     assert len(text) < 3_000_000
 
 
+def test_the_page_needs_no_matplotlib(solution: bk.Solution, without: Callable[..., None]) -> None:
+    without("matplotlib")
+    assert interactive_figure(solution).data
+
+
 @pytest.mark.usefixtures("here")
 def test_without_plotly_a_sentence_says_what_to_install(
     solution: bk.Solution, without: Callable[..., None], capsys: pytest.CaptureFixture[str]
 ) -> None:
     without("plotly")
-    with pytest.raises(InputError, match=r"need plotly and matplotlib: pip install \"bemkit\[interactive\]\""):
+    with pytest.raises(InputError, match=r"need plotly: pip install \"bemkit\[interactive\]\""):
         save_report("r.html", solution, interactive=True)
     with pytest.raises(SystemExit, match="2"):
         main(["report", "paper-1", "--interactive"])
