@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 import math
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -13,8 +12,7 @@ from typing import Any
 import numpy as np
 
 from bemkit.errors import GeometryError, printable
-from bemkit.formulas import closest
-from bemkit.geometry.files.strokes import Stroke, ellipse_strokes, nurbs_strokes
+from bemkit.geometry.files.strokes import Stroke, check_only, ellipse_strokes, nurbs_strokes, require_package
 from bemkit.geometry.free_form.drawn import ArcTo, LineTo, Point
 
 _UNITS: Mapping[int, str] = MappingProxyType({1: "in", 2: "ft", 4: "mm", 5: "cm", 6: "m", 13: "um"})
@@ -49,8 +47,7 @@ def read_dxf(path: Path, only: Sequence[str] = ()) -> tuple[list[Stroke], str, l
     GeometryError
         If ezdxf is missing, cannot read the file, a layer is unknown, or the drawing is not plane.
     """
-    if importlib.util.find_spec("ezdxf") is None:
-        raise GeometryError('ezdxf is not installed: pip install "bemkit[cad]"')
+    require_package("ezdxf", "cad")
     from ezdxf import recover
     from ezdxf.lldxf.const import DXFError
 
@@ -60,10 +57,7 @@ def read_dxf(path: Path, only: Sequence[str] = ()) -> tuple[list[Stroke], str, l
         raise GeometryError(f"it cannot be read ({printable(str(error))}): save it as DXF anew") from error
     entities = list(_entities(document.modelspace(), 0))
     layers = sorted({_layer(entity) for entity in entities})
-    for name in only:
-        if name not in layers:
-            listed = ", ".join(layers) or "none"
-            raise GeometryError(f"only names {name!r}: the layers with lines are {listed}{closest(name, layers)}")
+    check_only(only, layers, "the layers with lines")
     strokes: list[Stroke] = []
     left_out: Counter[str] = Counter()
     for entity in entities:

@@ -16,7 +16,7 @@ import numpy as np
 from bemkit.errors import GeometryError, printable
 from bemkit.geometry.files.chords import ChordLoop, fitted_strokes, strokes_of
 from bemkit.geometry.files.plane_mesh import CellBlock, PlaneMesh, in_plane
-from bemkit.geometry.files.strokes import Stroke
+from bemkit.geometry.files.strokes import Stroke, check_only
 
 _N_SAMPLES = 129
 """Number of points of a curve of a geometry, with its ends: a cubic spline through them is as accurate as most
@@ -111,10 +111,7 @@ def read_geometry(path: Path, only: Sequence[str], corner_angle: float) -> tuple
             )
         surfaces = [tag for _, tag in gmsh.model.getEntities(2)]
         names = {tag: _name(gmsh, 2, tag) for tag in surfaces}
-        for name in only:
-            if name not in names.values():
-                listed = ", ".join(sorted({*names.values()} - {""})) or "without names"
-                raise GeometryError(f"only names {name!r}: its surfaces are {listed}")
+        check_only(only, sorted({*names.values()} - {""}), "the names of its surfaces")
         chosen = [(2, tag) for tag in surfaces if not only or names[tag] in only]
         curves = gmsh.model.getBoundary(chosen, oriented=False) if chosen else gmsh.model.getEntities(1)
         if not curves:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import importlib.util
 import io
 from pathlib import Path
 from typing import Any
@@ -13,6 +12,7 @@ import numpy as np
 from bemkit.arrays import FloatArray, IntArray
 from bemkit.errors import GeometryError, printable
 from bemkit.geometry.files.plane_mesh import CellBlock, PlaneMesh, boundary_chains, in_plane
+from bemkit.geometry.files.strokes import require_package
 from bemkit.geometry.loops import following_in_loops
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.vectors import senses_of
@@ -34,7 +34,7 @@ def read_with_meshio(path: Path) -> PlaneMesh:
     GeometryError
         If meshio is missing, cannot read the file, or the file holds no plane mesh.
     """
-    require_meshio()
+    require_package("meshio", "mesh")
     return plane_mesh_of(_read_quietly(path))
 
 
@@ -61,12 +61,6 @@ def plane_mesh_of(mesh: Any) -> PlaneMesh:
             raise GeometryError(f"it is damaged: its cells do not join its {len(points)} points: export it again")
         blocks.append(CellBlock(n_corners, order, nodes.astype(np.intp), _names(mesh, k), _curves(mesh, k)))
     return PlaneMesh(points, tuple(blocks), tuple(mesh.field_data))
-
-
-def require_meshio() -> None:
-    """Refuse with the remedy where meshio is missing."""
-    if importlib.util.find_spec("meshio") is None:
-        raise GeometryError('meshio is not installed: pip install "bemkit[mesh]"')
 
 
 def _read_quietly(path: Path) -> Any:
@@ -193,7 +187,7 @@ def write_mesh(path: str | Path, mesh: BoundaryMesh) -> None:
     GeometryError
         If meshio is missing, or the file name has another ending.
     """
-    require_meshio()
+    require_package("meshio", "mesh")
     import meshio
 
     path = Path(path)

@@ -11,6 +11,7 @@ import numpy as np
 from bemkit.arrays import FloatArray, IntArray
 from bemkit.errors import GeometryError, format_point
 from bemkit.geometry.files.chords import ChordLoop
+from bemkit.geometry.files.strokes import check_only
 from bemkit.geometry.loops import closed_chains
 from bemkit.geometry.vectors import cross
 
@@ -68,10 +69,6 @@ class PlaneMesh:
     points: FloatArray
     blocks: tuple[CellBlock, ...]
     names: tuple[str, ...] = ()
-
-    def surfaces(self) -> tuple[str, ...]:
-        """Return the names of surfaces."""
-        return tuple(dict.fromkeys(name for block in self.blocks if block.n_corners > 2 for name in block.names))
 
 
 @dataclass(frozen=True)
@@ -154,11 +151,8 @@ def _edges(block: CellBlock) -> list[_Edge]:
 
 def _outer_edges(mesh: PlaneMesh, only: Sequence[str]) -> tuple[list[_Edge], bool]:
     """Return the sides that belong to only one cell, anticlockwise around it, and whether most cells run clockwise."""
-    known = [name for name in mesh.surfaces() if name]
-    for name in only:
-        if name not in known:
-            listed = f"its surfaces are {', '.join(known)}" if known else "its surfaces have no names"
-            raise GeometryError(f"only names {name!r}: {listed}")
+    known = dict.fromkeys(name for block in mesh.blocks if block.n_corners > 2 for name in block.names if name)
+    check_only(only, [*known], "the names of its surfaces")
     sides: dict[frozenset[int], list[tuple[int, ...]]] = {}
     n_clockwise = n_cells = 0
     for block in mesh.blocks:

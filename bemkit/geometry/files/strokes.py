@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 import math
 import shlex
 from collections.abc import Callable, Iterable, Sequence
@@ -14,6 +15,7 @@ import numpy as np
 
 from bemkit.arrays import FloatArray, IntArray
 from bemkit.errors import GeometryError, format_point
+from bemkit.formulas import closest
 from bemkit.geometry.free_form.drawn import ArcTo, LineTo, Loop, NurbsTo, Point, SplineTo
 from bemkit.geometry.free_form.nurbs import conic_arc
 from bemkit.geometry.loops import closed_chains
@@ -82,6 +84,20 @@ class Stroke:
     def points(self) -> FloatArray:
         """(n, 2) array [m]: points along the stroke, which define its size and its sense."""
         return self.side.curve(self.start).point(_SEEN)
+
+
+def require_package(name: str, extra: str) -> None:
+    """Raise GeometryError with the remedy where a package is missing."""
+    if importlib.util.find_spec(name) is None:
+        raise GeometryError(f'{name} is not installed: pip install "bemkit[{extra}]"')
+
+
+def check_only(only: Sequence[str], known: Sequence[str], what: str) -> None:
+    """Raise GeometryError unless a file has all that the option `only` names."""
+    for name in only:
+        if name not in known:
+            listed = ", ".join(known) or "none"
+            raise GeometryError(f"only names {name!r}: {what} are {listed}{closest(name, known)}")
 
 
 def extent(strokes: Sequence[Stroke]) -> float:

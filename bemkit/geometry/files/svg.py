@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 import math
 import re
 import warnings
@@ -14,8 +13,7 @@ from xml.etree.ElementTree import Element, ParseError
 import numpy as np
 
 from bemkit.errors import GeometryError, printable
-from bemkit.formulas import closest
-from bemkit.geometry.files.strokes import Stroke, bezier_stroke, ellipse_strokes
+from bemkit.geometry.files.strokes import Stroke, bezier_stroke, check_only, ellipse_strokes, require_package
 from bemkit.geometry.free_form.drawn import ArcTo, LineTo, Point
 
 _LENGTH = re.compile(r"\s*([-+.\deE]+?)\s*(mm|cm|in|pt|pc)\s*$")
@@ -44,8 +42,7 @@ def read_svg(path: Path, only: Sequence[str] = ()) -> tuple[list[Stroke], str]:
     GeometryError
         If svgpathtools is missing, cannot read the file, or a name is unknown.
     """
-    if importlib.util.find_spec("svgpathtools") is None:
-        raise GeometryError('svgpathtools is not installed: pip install "bemkit[cad]"')
+    require_package("svgpathtools", "cad")
     from svgpathtools import Document
 
     try:
@@ -59,10 +56,7 @@ def read_svg(path: Path, only: Sequence[str] = ()) -> tuple[list[Stroke], str]:
     factor, height, unit = _frame(root)
     parents = {child: parent for parent in root.iter() for child in parent}
     names = {id(each): list(_names(each.element, parents)) for each in paths}
-    known = sorted({name for listed in names.values() for name in listed})
-    for name in only:
-        if name not in known:
-            raise GeometryError(f"only names {name!r}: the ids and labels are {', '.join(known)}{closest(name, known)}")
+    check_only(only, sorted({name for listed in names.values() for name in listed}), "the ids and labels")
 
     def place(z: complex) -> Point:
         return factor * z.real, factor * (height - z.imag)

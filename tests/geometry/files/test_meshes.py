@@ -136,7 +136,7 @@ def test_only_chooses_surfaces(tmp_path) -> None:
     for only, width in ((), 2.0), (("left",), 1.0), (("left", "right"), 2.0):
         shape = MeshFile(name, only=only).shape
         assert discretise(shape.outline(), n_elements=8).area == pytest.approx(width, rel=1e-15)
-    with pytest.raises(GeometryError, match=r"two.inp: only names 'middle': its surfaces are left, right"):
+    with pytest.raises(GeometryError, match=r"two.inp: only names 'middle': the names of its surfaces are left, right"):
         _ = MeshFile(name, only=("middle",)).shape
 
 
@@ -280,7 +280,7 @@ def test_geometries_that_are_no_plane_body(tmp_path) -> None:
         (tmp_path / "part.geo").write_text(text)
         if not message:
             assert MeshFile(str(tmp_path / "part.geo")).shape.unit == ""
-            with pytest.raises(GeometryError, match=r"only names 'steel': its surfaces are without names"):
+            with pytest.raises(GeometryError, match=r"only names 'steel': the names of its surfaces are none"):
                 _ = MeshFile(str(tmp_path / "part.geo"), only=("steel",)).shape
             continue
         with pytest.raises(GeometryError, match=message):
