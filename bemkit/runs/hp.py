@@ -57,6 +57,8 @@ have moved away from their nodes (0.01 to 0.1 on the scenes with a reference).""
 LAST_TIPS = 10.0
 """Length of the elements beside places that have moved, relative to a piece and in units of the accuracy, from which
 the last mesh asks for no shorter ones. Shorter ones only locate the points of the next mesh."""
+UNMOVED = 0.01
+"""Motion of the ends of zones, in units of the accuracy, that changes no error: it is off by about that motion."""
 SPREADING = 0.6
 """Least factor per degree of an error of contact tractions that comes from a singular corner nearby. For a power of the
 distance in layers it is 0.36."""
@@ -151,8 +153,10 @@ class LayeredMeshes:
         more = int(self._may_stop_at_once(solution))
         return replace(level, partitions=_in_layers(members, n_at_jumps=1 + more), degree=FIRST_DEGREE + more)
 
-    def _next_degree(self, level: Level, members: Sequence[Member], solution: Solution, errors: _Errors) -> Level:
-        """Return meshes of a higher degree, with elements divided where that is not enough."""
+    def _next_degree(
+        self, level: Level, members: Sequence[Member], solution: Solution, errors: _Errors
+    ) -> Level | None:
+        """Return meshes of a higher degree, with elements divided where that is not enough; None if nothing changes."""
         fresh = _in_layers(members)
         # the same pieces: the places where the status changes have only moved
         is_settled = all(has_same_pieces(old, new) for old, new in zip(level.partitions, fresh, strict=True))
@@ -171,7 +175,11 @@ class LayeredMeshes:
         degrees: tuple[int, ...] = ()
         if is_settled and level.asked.mesh.rising_degrees and len(level.keys) == 1:
             degrees = self._degrees(errors, level.partition, refined[0], int(higher[0].max()))
-        return replace(level, partitions=refined, degree=level.degree + rise.degrees, degrees=degrees)
+        following = replace(level, partitions=refined, degree=level.degree + rise.degrees, degrees=degrees)
+        if not _is_alike(level, following, max(UNMOVED * self.accuracy, FLICKER)):
+            return following
+        # the error is that beside a singular corner, which the errors of elements do not show
+        return replace(following, degree=level.degree + 1, degrees=()) if level.asked.mesh.rising_degrees else None
 
     def _rise(self, level: Level, solution: Solution, errors: _Errors, *, is_settled: bool) -> _Rise:
         """Return by how many degrees the next mesh rises, and the error to which its elements are divided."""
@@ -323,6 +331,14 @@ def _moved_to_corners(
     traction[tips], traction[others], decay[tips] = traction[others], 0.0, 1.0
     is_contact[tips] = True
     return replace(errors, traction=traction, traction_decay=decay)
+
+
+def _is_alike(level: Level, other: Level, resolution: float) -> bool:
+    """Whether two levels have the same degrees, and elements whose ends differ by no more than a resolution."""
+    if (level.degree, level.degrees) != (other.degree, other.degrees):
+        return False
+    spans = ((old.spans, new.spans) for old, new in zip(level.partitions, other.partitions, strict=True))
+    return all(old.shape == new.shape and bool(np.all(np.abs(old - new) <= resolution)) for old, new in spans)
 
 
 def _degrees_of(member: Member, discretisation: Discretisation) -> IntArray:

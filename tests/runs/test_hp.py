@@ -626,3 +626,31 @@ def test_errors_that_spread_from_a_corner_lead_to_layers_there() -> None:
     assert last.mesh.lengths[tip] <= 2e-4 * last.part_length("foot")
     assert last.body.coefficient_errors is not None
     assert last.body.coefficient_errors.traction_decay[following] < 0.6
+
+
+def test_an_error_beside_a_corner_raises_the_degree_where_no_element_asks_for_it() -> None:
+    """A quarter of a block between two others: that error alone was above the accuracy, on one mesh after the other."""
+    below = bk.Body(
+        name="below",
+        shape=bk.Rectangle(1.0, 1.0, (-0.5, -1.5)),
+        material=bk.Material(1.0, 0.3),
+        parts=(bk.Part("base", bk.PrescribedDisplacement(0.0, 0.01), ("bottom",)),),
+    )
+    squeezed = bk.Scene(
+        title="Squeezed block",
+        law=bk.Coulomb(0.2),
+        discretisation=bk.Galerkin(2),
+        symmetry=bk.Symmetry(x=0.0, y=0.0),
+        mesh=bk.MeshOptions(accuracy=1e-3, rising_degrees=True),
+        bodies=(
+            bk.Body(name="middle", shape=bk.Rectangle(2.0, 1.0, (-1.0, -0.5)), material=bk.Material(1.0, 0.2)),
+            below,
+        ),
+        contacts=(bk.ContactPair(("below.top", "middle.bottom")),),
+    )
+    *_, before, last = run_adaptive(squeezed)
+    assert last.is_converged, last.message
+    assert last.estimated_traction_error is not None
+    assert last.estimated_traction_error <= 1e-3
+    assert last.n_elements == before.n_elements
+    assert last.places.lowest_degree == before.places.lowest_degree + 1
