@@ -48,9 +48,9 @@ def outline(
     """
     with shown_progress(quiet=False):
         from bemkit.cli.sides import print_sides, shape_file
+        from bemkit.cli.starting_scene import starting_scene
         from bemkit.geometry.files.shape_file import DrawingFile, MeshFile
         from bemkit.pictures.outline import draw_outline
-        from bemkit.scene.starting_scene import starting_scene
         from bemkit.scene.toml import load_single_body, shipped_files
 
         shape: Shape

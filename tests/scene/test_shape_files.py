@@ -7,10 +7,10 @@ from pathlib import Path
 import pytest
 
 import bemkit as bk
+from bemkit.cli.starting_scene import starting_scene
 from bemkit.errors import InputError
 from bemkit.geometry.free_form.drawn import OutlineShape
 from bemkit.results.result_file import read_result, write_result
-from bemkit.scene.starting_scene import starting_scene
 from bemkit.scene.toml import SceneError, load_scene, scene_from_toml, scene_to_toml
 
 MESH = Path(__file__).parent.parent / "geometry" / "files" / "data" / "version-4.msh"
