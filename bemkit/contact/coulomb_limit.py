@@ -7,12 +7,11 @@ from typing import Any
 
 import numpy as np
 from scipy import sparse
-from scipy.optimize import linprog
 from scipy.sparse import csc_array
 
 from bemkit.arrays import FloatArray
 from bemkit.contact.limit_load import WITHOUT_BOUND, largest_factor
-from bemkit.contact.solvability import with_violated_nodes
+from bemkit.contact.solvability import linear_programme, with_violated_nodes
 from bemkit.errors import InputError
 from bemkit.operators.rigid_modes import RigidMotions, of_unit_size
 
@@ -181,26 +180,13 @@ def _limit(blocks: _Blocks, most_programmes: int) -> tuple[CoulombLimit, FloatAr
     return CoulombLimit(held, factor, smallest, np.nan), velocities
 
 
-def _least(
-    cost: FloatArray,
-    balance: csc_array,
-    right: FloatArray,
-    limits: FloatArray,
-    below: tuple[csc_array | None, FloatArray | None] = (None, None),
-) -> Any:
-    """Return the result of a linear programme with equations, limits (n, 2) and optional inequalities."""
-    return linprog(  # type: ignore[call-overload]  # the stubs know no sparse arrays
-        cost, A_ub=below[0], b_ub=below[1], A_eq=balance, b_eq=right, bounds=limits, method="highs"
-    )
-
-
 def _pressing_forces_at_the_limit(blocks: _Blocks) -> FloatArray | None:
     """Return the pressing forces (n,) at the largest factor of associative friction; None if there is none."""
     n, wedged = blocks.slope.size, blocks.tangential @ sparse.diags_array(blocks.slope)
     edges = [wedged - blocks.normal, -wedged - blocks.normal]
     balance = sparse.hstack([*edges, blocks.tangential, blocks.load_column], format="csc")
     limits = np.vstack([np.tile([0.0, np.inf], (2 * n, 1)), blocks.cohesion[:, None] * [-1.0, 1.0], _ANY_FACTOR])
-    result = _least(np.append(np.zeros(3 * n), -1.0), balance, -blocks.constant, limits)
+    result = linear_programme(np.append(np.zeros(3 * n), -1.0), balance, -blocks.constant, limits)
     return None if result.x is None else np.asarray(result.x[:n] + result.x[n : 2 * n])
 
 
@@ -208,7 +194,7 @@ def _largest_with_bound(blocks: _Blocks, bound: FloatArray) -> tuple[float, Floa
     """Return the largest factor with given friction bounds (n,), its pressing forces (n,) and motion (m,)."""
     balance = sparse.hstack([-blocks.normal, blocks.tangential, blocks.load_column], format="csc")
     limits = np.vstack([np.tile([0.0, np.inf], (bound.size, 1)), bound[:, None] * [-1.0, 1.0], _ANY_FACTOR])
-    result = _least(np.append(np.zeros(2 * bound.size), -1.0), balance, -blocks.constant, limits)
+    result = linear_programme(np.append(np.zeros(2 * bound.size), -1.0), balance, -blocks.constant, limits)
     if result.x is None:
         return None
     return float(result.x[-1]), result.x[: bound.size], -np.asarray(result.eqlin.marginals, dtype=float)
@@ -233,7 +219,9 @@ def _factors_of_collapse(blocks: _Blocks, motion: FloatArray) -> tuple[float, fl
     cohesion = blocks.cohesion[at_rest, None] * [-1.0, 1.0]
     limits = np.vstack([np.tile([0.0, np.inf], (chosen.size + 2 * at_rest.size, 1)), cohesion, _ANY_FACTOR])
     right = -blocks.constant - blocks.tangential @ (sense * blocks.cohesion)
-    results = [_least(np.append(np.zeros(len(limits) - 1), sign), balance, right, limits) for sign in (1.0, -1.0)]
+    results = [
+        linear_programme(np.append(np.zeros(len(limits) - 1), sign), balance, right, limits) for sign in (1.0, -1.0)
+    ]
     if any(result.x is None for result in results):
         return np.inf, -np.inf
     first, last = (float(result.x[-1]) for result in results)
@@ -248,7 +236,7 @@ def _pressing_forces_near(blocks: _Blocks, factor: float, wanted: FloatArray) ->
     rows: list[Any] = [sparse.hstack([-wedge, wedge, sign * unit]) for sign in (1.0, -1.0)]
     limits = np.zeros((3 * n, 2))
     limits[:n, 1], limits[n : 2 * n, 1], limits[2 * n :] = np.inf, wanted, (-np.inf, np.inf)
-    result = _least(
+    result = linear_programme(
         np.append(np.ones(2 * n), np.zeros(n)),
         balance,
         blocks.normal @ wanted - blocks.constant - factor * blocks.growing,

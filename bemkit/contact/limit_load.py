@@ -8,7 +8,7 @@ from functools import partial
 import numpy as np
 
 from bemkit.arrays import FloatArray
-from bemkit.contact.solvability import contact_forces, with_violated_nodes
+from bemkit.contact.solvability import contact_forces, linear_programme, with_violated_nodes
 from bemkit.errors import InputError
 from bemkit.operators.rigid_modes import RigidMotions, of_unit_size
 
@@ -69,15 +69,12 @@ def _programme(
 ) -> tuple[float | None, FloatArray | None]:
     """Return the factor with forces at the points whose slope is a number, and the velocities of the collapse."""
     from scipy import sparse
-    from scipy.optimize import linprog
 
     works, bounds = contact_forces(motions, resistance, slope)
     balance = sparse.hstack([works, sparse.csc_array(growing[:, None])], format="csc")
     cost = np.append(np.zeros(works.shape[1]), -1.0)
     bounds = np.vstack([bounds, [-WITHOUT_BOUND, WITHOUT_BOUND]])
-    result = linprog(  # type: ignore[call-overload]  # the stubs know no sparse arrays
-        cost, A_eq=balance, b_eq=-constant, bounds=bounds, method="highs"
-    )
+    result = linear_programme(cost, balance, -constant, bounds)
     if result.x is None:
         return None, None
     if result.x[-1] > 0.5 * WITHOUT_BOUND:
@@ -119,18 +116,11 @@ def least_force(
         If the combination has no minimum.
     """
     from scipy import sparse
-    from scipy.optimize import linprog
 
     motions, unit = of_unit_size(motions)
     scale = float(np.abs(load / unit).max()) or 1.0
     simple, bounds = contact_forces(sparse.eye_array(2 * slope.size, format="csr"), cohesion / scale, slope)
-    result = linprog(  # type: ignore[call-overload]  # the stubs know no sparse arrays
-        direction @ simple,
-        A_eq=motions @ simple,
-        b_eq=-load / unit / scale,
-        bounds=bounds,
-        method="highs",
-    )
+    result = linear_programme(direction @ simple, motions @ simple, -load / unit / scale, bounds)
     if result.status == _UNBOUNDED:
         raise InputError(
             "friction wedges the bodies, so that the force is unbounded: choose another contact or direction"

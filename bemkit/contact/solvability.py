@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar
 
 import numpy as np
 
@@ -17,6 +17,8 @@ if TYPE_CHECKING:
     from scipy.sparse import csc_array, csr_array
 
 Result = TypeVar("Result")
+Inequalities: TypeAlias = "tuple[csc_array | csr_array | None, FloatArray | None]"
+"""Matrix and largest values of the inequalities of a linear programme."""
 
 
 _RELATIVE_WORK = 1e-6
@@ -118,8 +120,6 @@ def find_unsolvable_load(problem: ContactProblem, state: ContactState | None = N
     else:
         pressure = state.traction[:, 0]
         touches, pairs = pressure < 0.0, [(problem.friction_bound(pressure), np.zeros(problem.n_contact))]
-    if motions.shape[0] == 1 and isinstance(motions, np.ndarray) and _presses(motions, load, touches):
-        return None
     best = None
     for cohesion, slope in pairs:
         resistance = np.where(touches, problem.body.weights * cohesion, 0.0) / force_scale
@@ -135,11 +135,6 @@ def find_unsolvable_load(problem: ContactProblem, state: ContactState | None = N
                 who, where = problem.body.moving_bodies(moved), problem.body.partners_of(moved)
                 best = UnsolvableLoad(motion, lift, work, who, where)
     return best
-
-
-def _presses(motion: FloatArray, load: FloatArray, touches: BoolArray) -> bool:
-    """Whether the only motion (1, 2 n_contact), in the direction of the load (1,), presses into the obstacle."""
-    return bool(np.any(np.sign(load) * motion[0, 0::2][touches] > _PRESSES))
 
 
 def needs_contact(problem: ContactProblem) -> bool:
@@ -305,32 +300,34 @@ def extreme_nodes(motions: csr_array, touches: BoolArray) -> BoolArray:
 def _mechanism_of(motions: RigidMotions, load: FloatArray, resistance: FloatArray, slope: FloatArray) -> FloatArray:
     """Return the coefficients of `_largest_mechanism` with forces at nodes whose slope is a number."""
     from scipy import sparse
-    from scipy.optimize import linprog
 
     n_motions, (works, bounds) = motions.shape[0], contact_forces(motions, resistance, slope)
     n_forces, unit = works.shape[1], sparse.eye_array(n_motions)
     balance = sparse.hstack([works, unit, -unit], format="csc")
     limits = np.vstack([bounds, np.tile([0.0, np.inf], (2 * n_motions, 1))])
     cost = np.append(np.zeros(n_forces), np.ones(2 * n_motions))
-    below_largest, none = sparse.csr_array((0, balance.shape[1])), np.zeros(0)
+    below: Inequalities = (None, None)
     if n_motions <= _MANY_MOTIONS:
         balance = sparse.hstack([balance, sparse.csc_array((n_motions, 1))])
         largest = sparse.csr_array(np.full((n_motions, 1), -1.0))
-        below_largest = sparse.hstack([sparse.csr_array((n_motions, n_forces)), unit, unit, largest], format="csr")
-        none = np.zeros(n_motions)
+        parts = [sparse.csr_array((n_motions, n_forces)), unit, unit, largest]
+        below = sparse.hstack(parts, format="csr"), np.zeros(n_motions)
         limits, cost = np.vstack([limits, [0.0, np.inf]]), np.append(np.zeros_like(cost), 1.0)
-    result = linprog(  # type: ignore[call-overload]  # the stubs know no sparse arrays
-        cost,
-        A_ub=below_largest,
-        b_ub=none,
-        A_eq=balance,
-        b_eq=-load,
-        bounds=limits,
-        method="highs",
-    )
+    result = linear_programme(cost, balance, -load, limits, below)
     if result.x is None:  # p = 0 is feasible, so the solver has failed: do not refuse the load
         return np.zeros(n_motions)
     return -np.asarray(result.eqlin.marginals, dtype=float)
+
+
+def linear_programme(
+    cost: FloatArray, balance: Any, right: FloatArray, limits: FloatArray, below: Inequalities = (None, None)
+) -> Any:
+    """Return the result of a linear programme with equations, limits (n, 2) and optional inequalities."""
+    from scipy.optimize import linprog
+
+    return linprog(  # type: ignore[call-overload]  # the stubs know no sparse arrays
+        cost, A_ub=below[0], b_ub=below[1], A_eq=balance, b_eq=right, bounds=limits, method="highs"
+    )
 
 
 def contact_forces(motions: RigidMotions, resistance: FloatArray, slope: FloatArray) -> tuple[csc_array, FloatArray]:
