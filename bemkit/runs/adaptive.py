@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, cast
 
+import numpy as np
+
 from bemkit.errors import BemkitError, InputError
+from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.plan.plan import make_plan
 from bemkit.results.solution import Solution
 from bemkit.results.solved_steps import with_totals
 from bemkit.runs.density import DensityMeshes
-from bemkit.runs.earlier_steps import EarlierSteps
 from bemkit.runs.hp import LayeredMeshes
 from bemkit.runs.mesh_sequence import Level, MeshSequence
 from bemkit.runs.step_errors import in_which_step
@@ -26,6 +28,8 @@ if TYPE_CHECKING:
 
 _MOST_MISSED = 12
 """Largest number of meshes that miss contact; each has nodes where the one before missed it."""
+_SAME = 1e-9
+"""Relative difference of the lengths of equal elements, in the coordinates of the shape and in those of its place."""
 
 
 def run_adaptive(
@@ -89,6 +93,36 @@ def _rule(level: Level) -> MeshSequence:
             "choose 'quadratic', or another fixed degree"
         )
     return LayeredMeshes(accuracy) if level.is_layered else DensityMeshes(accuracy)
+
+
+@dataclass(frozen=True)
+class EarlierSteps:
+    """Solutions of earlier steps, and the callback for new ones.
+
+    Parameters
+    ----------
+    done : Solution, optional
+        Some steps on one of the meshes; meshes before that one are solved again, unheard.
+    finished : callable, optional
+        Receives the solution of each step on a mesh but the last; see `bemkit.runs.steps.History`.
+    """
+
+    done: Solution | None = None
+    finished: Callable[[Solution], None] | None = None
+
+    def on(self, level: Level) -> tuple[Solution | None, Callable[[Solution], None] | None]:
+        """Return the finished steps on the meshes of a level, and the callback for further ones."""
+        if self.done is None:
+            return None, self.finished
+        if _has_meshes(self.done, level.meshes):
+            return self.done, self.finished
+        return None, None if level.n_elements < self.done.n_elements else self.finished
+
+
+def _has_meshes(solution: Solution, meshes: Mapping[str, BoundaryMesh]) -> bool:
+    """Return whether a solution is one on these meshes, wherever its bodies lie."""
+    pairs = [(solution.bodies[name].mesh.lengths, mesh.lengths) for name, mesh in meshes.items()]
+    return all(one.shape == two.shape and np.allclose(one, two, rtol=_SAME, atol=0.0) for one, two in pairs)
 
 
 @dataclass(frozen=True)

@@ -13,9 +13,8 @@ from bemkit.contact.body import ContactState
 from bemkit.contact.problem import ContactProblem
 from bemkit.geometry.meshing.partition import STEEPEST, better_partition
 from bemkit.reference import DiscBetweenPlates
-from bemkit.runs.adaptive import _best_last, _Refinement, run_adaptive
+from bemkit.runs.adaptive import EarlierSteps, _best_last, _Refinement, run_adaptive
 from bemkit.runs.density import DensityMeshes, is_enough
-from bemkit.runs.earlier_steps import EarlierSteps
 from bemkit.runs.mesh_sequence import Level
 from tests.failing_solver import Failing
 from tests.scenes import contact_error, disc, paper, reference_values, square, wavy
