@@ -10,8 +10,8 @@ from scipy import sparse
 from bemkit.arrays import FloatArray
 from bemkit.contact.joined.member import diagonal_blocks
 from bemkit.model.prepared import Prepared, PreparedBody
-from bemkit.model.rigid import rigid_motions
-from bemkit.model.units import motion_units
+from bemkit.model.units import Units, motion_units
+from bemkit.scene.plane_motion import RigidBody
 
 
 def _nodal(body: PreparedBody, n_pressures: int) -> sparse.csr_array:
@@ -66,13 +66,24 @@ def coupling(prepared: Prepared) -> sparse.csr_array:
 def _rigid_coupling(prepared: Prepared) -> sparse.csr_array:
     """Return how the motions of all rigid bodies move the contact nodes, (2 n_contact, 3 n_rigid)."""
     n_elastic, n_rigid = len(prepared.bodies), len(prepared.scene.rigid)
-    by_motions, begin = np.zeros((prepared.n_contact, 2, n_rigid, 3)), 0
-    for rows in prepared.rows:
+    by_motions = np.zeros((prepared.n_contact, 2, n_rigid, 3))
+    for rows, motions in prepared.by_contact(by_motions):
         if rows.motions is not None:
-            dimensionless = rows.motions / motion_units(prepared.units)
-            by_motions[begin : begin + rows.n_contact, :, rows.other - n_elastic] = -dimensionless
-        begin += rows.n_contact
-    return sparse.csr_array(_frames(prepared) @ sparse.csr_array(by_motions.reshape(2 * begin, 3 * n_rigid)))
+            motions[:, :, rows.other - n_elastic] = -rows.motions / motion_units(prepared.units)
+    shape = 2 * prepared.n_contact, 3 * n_rigid
+    return sparse.csr_array(_frames(prepared) @ sparse.csr_array(by_motions.reshape(shape)))
+
+
+def rigid_motions(body: RigidBody, units: Units) -> tuple[sparse.csr_array, FloatArray]:
+    """Return how the unknown motions (n_driven,) move a rigid body.
+
+    Returns
+    -------
+    sparse (3, n_driven) array, (3,) array
+        Dimensionless motions x, y, turn are the product, and the array what is given.
+    """
+    chosen = sparse.csr_array(np.eye(3)[:, body.is_load_controlled])
+    return chosen, body.motion * motion_units(units) / units.displacement
 
 
 def gap_operator(prepared: Prepared, n_pressures: Sequence[int]) -> sparse.csr_array:

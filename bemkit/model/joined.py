@@ -13,7 +13,7 @@ from bemkit.contact.joined.member import Member
 from bemkit.model.coupling import gap_operator, prescribed
 from bemkit.model.placed import groups, shape_numbers
 from bemkit.model.prepared import Prepared, PreparedBody
-from bemkit.model.rigid import rigid_members
+from bemkit.model.units import motion_units
 from bemkit.operators.counts import OperationCounts
 from bemkit.operators.steklov_poincare import CondensedMap, SteklovPoincare
 from bemkit.operators.steklov_poincare.forces_inside import condensed_under
@@ -109,3 +109,20 @@ def _motions(body: PreparedBody, n_pressures: int) -> FloatArray:
     conditions = body.conditions
     along = np.einsum("nkc,mnc->mnk", conditions.frame, body.free_modes)
     return np.pad(along[:, conditions.is_retained], ((0, 0), (0, n_pressures)))
+
+
+def rigid_members(prepared: Prepared) -> tuple[Member, ...]:
+    """Return a member for each rigid body that loads drive.
+
+    A rigid body takes the largest modulus of all bodies, so that its partners decide.
+    """
+    units = prepared.units
+    modulus = max(body.material.plane_modulus for body in prepared.bodies) / units.modulus
+    members = []
+    for body in prepared.scene.rigid:
+        is_load_controlled = body.is_load_controlled
+        n_driven = int(np.count_nonzero(is_load_controlled))
+        if n_driven:
+            load = (prepared.scene.load_on(body) / motion_units(units) / prepared.force_unit)[is_load_controlled]
+            members.append(Member(np.zeros((n_driven, n_driven)), load, np.eye(n_driven), modulus, body.name))
+    return tuple(members)

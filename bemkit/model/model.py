@@ -198,13 +198,12 @@ class Model:
 
     def _contact_forces(self, state: ContactState) -> list[FloatArray]:
         """Return the nodal forces (n_nodes, 2) of contact on each body, in its own axes, dimensionless."""
-        prepared, begin = self.prepared, 0
-        traction = state.traction * np.stack([np.ones(self.prepared.n_contact), ~prepared.is_on_line], axis=1)
+        prepared = self.prepared
+        traction = state.traction * np.stack([np.ones(prepared.n_contact), ~prepared.is_on_line], axis=1)
         in_place = self.body.weights[:, None] * np.einsum("nk,nkc->nc", traction, prepared.frame)
         forces = [np.zeros((body.space.n_dofs // 2, 2)) for body in prepared.bodies]
-        for rows in prepared.rows:
-            rows.add_forces(in_place[begin : begin + rows.n_contact], forces)
-            begin += rows.n_contact
+        for rows, forces_of_rows in prepared.by_contact(in_place):
+            rows.add_forces(forces_of_rows, forces)
         return [body.turn.turned_back(force) for body, force in zip(prepared.bodies, forces, strict=True)]
 
     def _forces_of_nodes(self, state: ContactState) -> FloatArray:
@@ -262,14 +261,11 @@ class Model:
         if not prepared.scene.rigid or not self.condensed:
             return []
         unknowns = iter(self._joined_bodies.member_displacements(state)[len(prepared.bodies) :])
-        traction, begin = state.traction * units.stress, 0
         reactions = np.zeros((len(prepared.scene.rigid), 3))
-        for rows in prepared.rows:
+        for rows, tractions in prepared.by_contact(state.traction * units.stress):
             if rows.motions is not None:
-                tractions = traction[begin : begin + rows.n_contact]
                 forces = rows.weights[:, None] * np.einsum("nk,nkc->nc", tractions, rows.frame)
                 reactions[rows.other - len(prepared.bodies)] += np.einsum("nc,ncm->m", forces, rows.motions)
-            begin += rows.n_contact
         bodies = []
         for body, reaction in zip(prepared.scene.rigid, reactions, strict=True):
             motion, is_load_controlled = body.motion, body.is_load_controlled

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bemkit.arrays import BoolArray, FloatArray
+from bemkit.arrays import AnyArray, BoolArray, FloatArray
 from bemkit.contact.contact_nodes import ContactNodes
 from bemkit.contact.laws import FrictionLaw
 from bemkit.errors import ResultWarning
@@ -180,6 +180,11 @@ class Prepared:
         """Return a column of `ContactInterface` for all contact nodes."""
         shape = (0, 2) if name == "points" else (0,)
         return np.concatenate([np.zeros(shape), *(getattr(rows, name) for rows in self.rows)])
+
+    def by_contact(self, values: AnyArray) -> list[tuple[ContactInterface, AnyArray]]:
+        """Return each contact with the values (n, ...) of its nodes, of values (n_contact, ...) at all."""
+        begins = np.cumsum([0, *(rows.n_contact for rows in self.rows)]).tolist()
+        return [(rows, values[begin : begin + rows.n_contact]) for rows, begin in zip(self.rows, begins, strict=False)]
 
     @cached_property
     def frame(self) -> FloatArray:

@@ -62,11 +62,8 @@ def contact_warnings(
         At most one of either kind for each contact with an obstacle or a rigid body.
     """
     found: list[ResultWarning] = []
-    begin = 0
     touching: list[list[IntArray]] = [[] for _ in model.prepared.bodies]
-    for rows in model.prepared.rows:
-        of_rows = node_status[begin : begin + rows.n_contact]
-        begin += rows.n_contact
+    for rows, of_rows in model.prepared.by_contact(node_status):
         touching[rows.body].append(rows.nodes)
         if rows.couplings is None:
             found += _oblique(model.prepared.bodies[rows.body], rows, of_rows)
@@ -260,15 +257,15 @@ def with_sliding_checked(model: Model, result: ContactSolution) -> ContactSoluti
     prepared = model.prepared
     if not result.is_converged or not prepared.n_contact:
         return result
-    ends = np.cumsum([rows.n_contact for rows in prepared.rows])[:-1]
-    displacements = np.split(result.state.displacement * prepared.units.displacement, ends)
-    tractions = np.split(result.state.traction * prepared.units.stress, ends)
-    forces = [rows.weights @ norms(traction) for rows, traction in zip(prepared.rows, tractions, strict=True)]
+    displacements = result.state.displacement * prepared.units.displacement
+    tractions = result.state.traction * prepared.units.stress
+    forces = [rows.weights @ norms(traction) for rows, traction in prepared.by_contact(tractions)]
     softest = min(body.material.plane_modulus for body in prepared.bodies)
     deformation = float(max(forces)) / softest
-    if deformation <= _NO_FORCE * max(float(np.abs(displacement).max()) for displacement in displacements):
+    if deformation <= _NO_FORCE * float(np.abs(displacements).max()):
         return result
-    for rows, displacement, traction in zip(prepared.rows, displacements, tractions, strict=True):
+    moved = zip(prepared.by_contact(displacements), prepared.by_contact(tractions), strict=True)
+    for (rows, displacement), (_, traction) in moved:
         is_pressed = traction[:, 0] != 0.0  # not by their friction, which some laws exert across a gap
         if not is_pressed.any():
             continue

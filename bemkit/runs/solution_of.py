@@ -114,9 +114,8 @@ def _resultants(prepared: Prepared, table: ContactTable, held: HeldForces) -> li
     traction = np.stack([table.sigma_n, table.sigma_t], axis=1)
     areas = prepared.scene.depth * table.weight
     forces = np.einsum("nk,nkc->nc", areas[:, None] * traction, prepared.frame)
-    resultants, begin = [], 0
-    for rows in prepared.rows:
-        own, begin = forces[begin : begin + rows.n_contact], begin + rows.n_contact
+    resultants = []
+    for rows, own in prepared.by_contact(forces):
         signed = zip((own, -own), rows.acting_at(prepared.bodies), strict=False)  # a rigid partner has no points
         resultants.append([nodal_resultant(rows.name, each, points) for each, points in signed])
     for number, node, name, force in zip(*held[:2], _contacts_of(prepared, held), held.forces, strict=True):
