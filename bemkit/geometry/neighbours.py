@@ -1,8 +1,9 @@
-"""Elements along a boundary: in order, with arc lengths, corners, ends of parts, and the centre of all their arcs."""
+"""Elements along a boundary, in order, with arc lengths, corners and ends of parts; and across a body."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import itertools
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -15,6 +16,11 @@ _POINTS_OF_CURVE = 9
 _POINTS_OF_ARC = 12
 _ROUND_OFF = 1e-9
 """Distance by which normals of arcs may miss their centre, relative to the diameter."""
+_FACING = -0.5
+"""Cosine of the angle between normals of elements that face each other."""
+_ROWS, _FEW = 4096, 1024
+"""Number of elements whose neighbours are searched at a time. For few elements all distances take less time than
+loading a tree (measured)."""
 
 
 def along_boundary(mesh: BoundaryMesh, elements: IntArray) -> IntArray:
@@ -119,3 +125,37 @@ def common_centre(sides: Sequence[tuple[BoundaryMesh, IntArray]]) -> FloatArray 
     centre = np.linalg.lstsq(arms, cross(normals, points), rcond=None)[0]
     missed = np.abs(cross(normals, points - centre)).max()
     return first.centre + centre if missed <= _ROUND_OFF * first.diameter else None
+
+
+def thicknesses(mesh: BoundaryMesh, reach: FloatArray | float = np.inf) -> FloatArray:
+    """Return the distance (n_elements,) [m] across the body to the nearest element that faces the other way.
+
+    Elements face each other if their normals are opposite to within 60 degrees and the line between their middles is
+    within 45 degrees of the normal; infinite where no element within `reach` [m] does.
+    """
+    whole, result = mesh.whole, np.full(mesh.n_elements, np.inf)
+    farthest = np.minimum(reach, 4.0 * whole.diameter) + np.zeros(mesh.n_elements)
+    for first, second in _near_pairs(mesh, farthest):
+        arm = whole.centres[second] - whole.centres[first]
+        across, distance = -np.sum(arm * whole.normals[first], axis=1), np.hypot(arm[:, 0], arm[:, 1])
+        cosine = np.sum(whole.normals[first] * whole.normals[second], axis=1)
+        faces = (distance <= farthest[first]) & (cosine < _FACING) & (across > np.sqrt(0.5) * distance)
+        np.minimum.at(result, first[faces], distance[faces])
+    return result
+
+
+def _near_pairs(mesh: BoundaryMesh, farthest: FloatArray) -> Iterator[tuple[IntArray, IntArray]]:
+    """Yield pairs of an element and an element of the whole body within the distance `farthest` of the first."""
+    whole, elements = mesh.whole, np.arange(mesh.n_elements)
+    if whole.n_elements <= _FEW:
+        arms = whole.centres - mesh.centres[:, None]
+        first, second = np.nonzero(np.hypot(arms[:, :, 0], arms[:, :, 1]) <= farthest[:, None])
+        yield first, second
+        return
+    from scipy.spatial import KDTree
+
+    tree = KDTree(whole.centres)
+    for rows in np.split(elements, range(_ROWS, mesh.n_elements, _ROWS)):
+        near = tree.query_ball_point(mesh.centres[rows], farthest[rows], return_sorted=False)
+        counts = np.fromiter(map(len, near), np.intp, len(near))
+        yield np.repeat(rows, counts), np.fromiter(itertools.chain.from_iterable(near), np.intp, counts.sum())

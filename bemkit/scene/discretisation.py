@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-import itertools
 from abc import abstractmethod
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import Protocol
 
 import numpy as np
 
-from bemkit.arrays import FloatArray, IntArray
+from bemkit.arrays import IntArray
 from bemkit.errors import GeometryError, InputError, ResultWarning
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.meshing.discretise import Grading, Uniform
-from bemkit.geometry.neighbours import break_nodes
+from bemkit.geometry.neighbours import break_nodes, thicknesses
 from bemkit.geometry.spaces import BoundarySpace, ConstantSpace, LagrangeSpace, check_degree
 from bemkit.operators.linear_solvers import LinearSolver
 from bemkit.operators.material import Material
@@ -34,10 +33,6 @@ _LONGEST = 0.75
 with the third power of the length."""
 _SHARE = 0.25
 """Share of the boundary that must be thin for a warning: more than the tip of a wedge or the strip beside a hole."""
-_FACING = -0.5
-_ROWS, _FEW = 4096, 1024
-"""Number of elements whose neighbours are searched at a time. For few elements all distances take less time than
-loading a tree (measured)."""
 
 
 class Discretisation(Protocol):
@@ -322,37 +317,3 @@ def thinness_warnings(mesh: BoundaryMesh, method: str) -> tuple[ResultWarning, .
         f"elements are long, and bends too stiffly: take {factor:.1f} times as many elements, or quadratic Galerkin"
     )
     return (ResultWarning("thin body", "", text, factor),)
-
-
-def thicknesses(mesh: BoundaryMesh, reach: FloatArray | float = np.inf) -> FloatArray:
-    """Return the distance (n_elements,) [m] across the body to the nearest element that faces the other way.
-
-    Elements face each other if their normals are opposite to within 60 degrees and the line between their middles is
-    within 45 degrees of the normal; infinite where no element within `reach` [m] does.
-    """
-    whole, result = mesh.whole, np.full(mesh.n_elements, np.inf)
-    farthest = np.minimum(reach, 4.0 * whole.diameter) + np.zeros(mesh.n_elements)
-    for first, second in _near_pairs(mesh, farthest):
-        arm = whole.centres[second] - whole.centres[first]
-        across, distance = -np.sum(arm * whole.normals[first], axis=1), np.hypot(arm[:, 0], arm[:, 1])
-        cosine = np.sum(whole.normals[first] * whole.normals[second], axis=1)
-        faces = (distance <= farthest[first]) & (cosine < _FACING) & (across > np.sqrt(0.5) * distance)
-        np.minimum.at(result, first[faces], distance[faces])
-    return result
-
-
-def _near_pairs(mesh: BoundaryMesh, farthest: FloatArray) -> Iterator[tuple[IntArray, IntArray]]:
-    """Yield pairs of an element and an element of the whole body within the distance `farthest` of the first."""
-    whole, elements = mesh.whole, np.arange(mesh.n_elements)
-    if whole.n_elements <= _FEW:
-        arms = whole.centres - mesh.centres[:, None]
-        first, second = np.nonzero(np.hypot(arms[:, :, 0], arms[:, :, 1]) <= farthest[:, None])
-        yield first, second
-        return
-    from scipy.spatial import KDTree
-
-    tree = KDTree(whole.centres)
-    for rows in np.split(elements, range(_ROWS, mesh.n_elements, _ROWS)):
-        near = tree.query_ball_point(mesh.centres[rows], farthest[rows], return_sorted=False)
-        counts = np.fromiter(map(len, near), np.intp, len(near))
-        yield np.repeat(rows, counts), np.fromiter(itertools.chain.from_iterable(near), np.intp, counts.sum())

@@ -7,8 +7,8 @@ import pytest
 
 import bemkit as bk
 from bemkit.geometry import discretise
+from bemkit.geometry.neighbours import thicknesses
 from bemkit.plan.plan import make_plan
-from bemkit.scene.discretisation import thicknesses
 
 
 def warned(shape: object, n: int, discretisation: object) -> tuple[str, ...]:
