@@ -7,6 +7,7 @@ import numpy as np
 from bemkit.arrays import BoolArray, FloatArray
 from bemkit.contact.body import LinearBody, SingularResponse, of_statuses, separated, stick
 from bemkit.operators.boundary_equations import LinearConditions
+from bemkit.operators.rigid_modes import as_dense
 
 LARGEST_COEFFICIENT = 1e3
 """Largest coefficient; larger ones are round-off of a vanishing coupling, as between bodies of equal material."""
@@ -34,14 +35,17 @@ def sliding_response(body: LinearBody, is_closed: BoolArray, slides: BoolArray) 
     Raises
     ------
     SingularResponse
-        If the body is free to slide without friction.
+        If a body is free to slide without friction; the message names it.
     """
     n_contact = len(is_closed)
     zero = np.zeros(n_contact)
     rows = np.flatnonzero(slides)
     smooth = of_statuses(is_closed, np.ones(n_contact, bool), stick(zero, zero), separated(n_contact))
-    if smooth.free_motions(body.rigid_motions()).shape[0]:
-        raise SingularResponse("only friction keeps the body from sliding")
+    motions = body.rigid_motions()
+    if (free := smooth.free_motions(motions)).shape[0]:
+        basis, slides_freely = (as_dense(each, n_contact).reshape(-1, 2 * n_contact) for each in (motions, free))
+        amounts = np.abs(np.linalg.lstsq(basis.T, slides_freely.T, rcond=None)[0]).sum(axis=1)
+        raise SingularResponse(f"only friction keeps {body.moving_bodies(amounts)} from sliding")
 
     def response(moved: FloatArray) -> FloatArray:
         held: LinearConditions = of_statuses(is_closed, ~slides, stick(zero, moved), separated(n_contact))

@@ -245,7 +245,8 @@ def _best_last(
         # without estimates the finest mesh is the best
         converged = [solution for solution in reversed(solutions) if solution.is_converged]
         best = min(converged, key=refinement.error, default=best)
-    message = f"{len(solutions)} meshes, the last with {best.n_elements} elements. {best.message}"
+    made = "One mesh" if len(solutions) == 1 else f"{len(solutions)} meshes, the last"
+    message = f"{made} with {best.n_elements} elements. {best.message}"
     status = best.status
     if obstacle:
         message = (

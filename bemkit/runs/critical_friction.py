@@ -109,7 +109,7 @@ def critical_friction(scene: Scene) -> CriticalFriction:
     if not has_friction.any():
         raise LawError("friction does not grow with the pressure: choose Coulomb's law, or one like it")
     if not (is_closed & has_friction).any():
-        raise NoSlidingStateError("no node with friction is in contact under this load: press the body on")
+        raise NoSlidingStateError("no node with friction is in contact under this load: press the sides together")
     return _coefficients(problem, statuses, is_closed, is_closed & has_friction)
 
 
@@ -122,7 +122,7 @@ def _coefficients(
     try:
         normal, tangential = sliding_response(problem.body, is_closed, slides)
     except SingularResponse as error:
-        raise UnsolvableSceneError(f"{error}: it slides at any coefficient; hold it by a support") from error
+        raise UnsolvableSceneError(f"{error}, at any coefficient: add a support") from error
     own = statuses[slides]
     signs = (own == NodeStatus.SLIP_FORWARD) * 1.0 - (own == NodeStatus.SLIP_BACKWARD)
     slipping = np.flatnonzero(signs)

@@ -116,6 +116,23 @@ def floating(law: bk.FrictionLaw) -> bk.Scene:
     )
 
 
+def stacked(law: bk.FrictionLaw) -> bk.Scene:
+    """A block on a block that is held."""
+    shape, material = bk.Rectangle(1.0, 1.0), bk.Material(1.0, 0.3)
+    foot, load = bk.Part("foot", bk.Clamped(), ("bottom",)), bk.Part("load", bk.Pressure(1e-3), ("top",))
+    lower = bk.Body(name="lower", shape=shape, material=material, parts=(foot,))
+    upper = bk.Body(
+        name="upper", shape=shape, material=material, parts=(load,), placement=bk.Placement(shift=(0.0, 1.0))
+    )
+    return bk.Scene(
+        title="stack",
+        bodies=(lower, upper),
+        contacts=(bk.ContactPair(("lower.top", "upper.bottom")),),
+        law=law,
+        mesh=bk.MeshOptions(elements=16),
+    )
+
+
 @pytest.mark.parametrize(
     ("scene", "error", "message"),
     [
@@ -128,7 +145,16 @@ def floating(law: bk.FrictionLaw) -> bk.Scene:
         (replace(LEG, law=bk.Tresca(0.1)), bk.InputError, "friction does not grow with the pressure: choose Coulomb"),
         (replace(LEG, load_factors=(0.5, 1.0)), LoadHistoryError, "a load history of 2 steps has no single state"),
         (with_friction(0.3, 10.0), NoSlidingStateError, "no node with friction is in contact under this load"),
-        (floating(bk.Coulomb(0.3)), UnsolvableSceneError, "from sliding: it slides at any coefficient; hold it by a"),
+        (
+            floating(bk.Coulomb(0.3)),
+            UnsolvableSceneError,
+            "friction keeps the body from sliding, at any coefficient: add a support",
+        ),
+        (
+            stacked(bk.Coulomb(0.3)),
+            UnsolvableSceneError,
+            "only friction keeps body 'upper' from sliding, at any coefficient: add a support",
+        ),
         (
             replace(LEG, solver=bk.SemismoothNewton(max_steps=1)),
             NoSlidingStateError,

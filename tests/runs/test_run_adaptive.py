@@ -117,6 +117,7 @@ def test_a_mesh_that_is_accurate_enough_is_the_best_one() -> None:
     refinement = Refinement(DensityMeshes(accuracy=1e-2), None, None, EarlierSteps(), None)
     assert _best_last((coarse, fine), "", 1e-2, refinement)[-1].n_elements == fine.n_elements
     assert _best_last((coarse, fine), "an obstacle", 1e-2, refinement)[-1].n_elements == coarse.n_elements
+    assert _best_last((fine,), "", 1e-2, refinement)[-1].message.startswith(f"One mesh with {fine.n_elements} elements")
 
 
 def test_a_mesh_that_misses_contact_has_no_error() -> None:
