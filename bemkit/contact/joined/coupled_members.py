@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TypeVar
 
 import numpy as np
 from scipy import sparse
@@ -16,10 +17,16 @@ from bemkit.contact.joined.member import Member, Shape, blocks_of_members, defor
 from bemkit.errors import InputError
 from bemkit.operators.null_space import null_space
 
+Value = TypeVar("Value")
+
 _ROUNDS = 2
 """Number of fits of rigid motions: normal equations hold half of the digits, too few for stiff bodies."""
 _DEPENDENT = 1e-12
 """Squared sine of the angle between the two rows of a node below which one displacement gives both components."""
+
+
+class for_all_loads(cached_property[Value]):  # noqa: N801 - a decorator
+    """A cached value that does not depend on loads, which the same bodies under other loads keep."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,7 +77,7 @@ class CoupledMembers:
         """Number of contact nodes."""
         return len(self.weights)
 
-    @cached_property
+    @for_all_loads
     def stiffness_scale(self) -> float:
         """E' by the median weight [Pa/m]; see `modulus`."""
         return self.modulus / float(np.median(self.weights))
@@ -106,29 +113,29 @@ class CoupledMembers:
         """(n,) array [N/m]: the loads of all members, one after the other."""
         return np.concatenate([member.load for member in self.members])
 
-    @cached_property
+    @for_all_loads
     def pressures(self) -> IntArray:
         """(n_pressures,) array: the components that are pressures."""
         ends = np.cumsum([member.n_components for member in self.members])
         counts = [member.n_pressures for member in self.members]
         return np.concatenate([np.arange(end - count, end) for end, count in zip(ends, counts, strict=True)])
 
-    @cached_property
+    @for_all_loads
     def shapes(self) -> tuple[Shape, ...]:
-        """The members by shape."""
+        """Members by shape."""
         return shapes_of(self.members)
 
-    @cached_property
+    @for_all_loads
     def is_symmetric(self) -> bool:
         """Whether all stiffnesses are symmetric."""
         return all(np.array_equal(shape.member.stiffness, shape.member.stiffness.T) for shape in self.shapes)
 
-    @cached_property
+    @for_all_loads
     def motions(self) -> sparse.csr_array:
         """(n, n_motions) sparse array: the rigid motions, orthonormal, member by member."""
         return blocks_of_members(self.shapes, lambda shape: shape.motions)
 
-    @cached_property
+    @for_all_loads
     def relative_motions(self) -> sparse.csr_array:
         """(n_motions, 2 n_contact) sparse array: relative displacements of the rigid motions."""
         return sparse.csr_array((self.gap_operator @ self.motions).T)
@@ -138,7 +145,7 @@ class CoupledMembers:
         """(n_motions,) array: the member that each of the motions moves."""
         return np.repeat(np.arange(len(self.members)), [len(member.motions) for member in self.members])
 
-    @cached_property
+    @for_all_loads
     def owners(self) -> sparse.csr_array:
         """(2 n_contact, n_members) sparse array: the members that take part in each component of contact."""
         of_component = np.repeat(np.arange(len(self.members)), [member.n_components for member in self.members])
@@ -153,19 +160,19 @@ class CoupledMembers:
         np.minimum.at(least, np.repeat(np.arange(owners.shape[0]), np.diff(owners.indptr)), values[owners.indices])
         return least
 
-    @cached_property
+    @for_all_loads
     def moduli(self) -> FloatArray:
         """(2 n_contact,) array: the E' of the more compliant partner, in each component of contact [Pa]."""
         return self.least_of_partners(np.array([member.modulus for member in self.members]))
 
-    @cached_property
+    @for_all_loads
     def modulus(self) -> float:
         """Median of `moduli` over the contact nodes [Pa]."""
         return float(np.median(self.moduli[::2]))
 
-    @cached_property
+    @for_all_loads
     def _motion_fit(self) -> Callable[[FloatArray], FloatArray]:
-        """The function that fits motions (n_motions,) to relative displacements (2 n_contact,) by least squares."""
+        """Least-squares fit of motions (n_motions,) to relative displacements (2 n_contact,)."""
         columns = sparse.csc_array(self.relative_motions.T)
         if not columns.shape[1]:
             return lambda missed: np.zeros(0)

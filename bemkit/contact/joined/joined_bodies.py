@@ -12,7 +12,7 @@ from bemkit.arrays import FloatArray
 from bemkit.contact.body import ContactState, FreeMotion, LinearBody, SingularResponse
 from bemkit.contact.dense_body import DenseBody
 from bemkit.contact.equilibrium import NOISE_FACTOR, Imbalance
-from bemkit.contact.joined.coupled_members import CoupledMembers
+from bemkit.contact.joined.coupled_members import CoupledMembers, for_all_loads
 from bemkit.contact.joined.dense_form import RelativeStiffness
 from bemkit.contact.joined.sparse_form import Compliance, sparse_response
 from bemkit.operators.boundary_equations import LinearConditions
@@ -30,21 +30,6 @@ _ROUND_OFF = 1e-11
 """Imbalance of forces, a hundredth of the tolerance of solves, from which a response is refined."""
 _MISSED = 1e-12
 """Round-off that displacements miss without any force, relative to the largest displacement."""
-
-_WITHOUT_LOAD = (
-    *(
-        "shapes",
-        "pressures",
-        "motions",
-        "relative_motions",
-        "is_symmetric",
-        "_compliance",
-        "_relative_stiffness",
-        "_motion_fit",
-    ),
-    *("owners", "moduli", "modulus", "stiffness_scale", "responses_are_expensive"),
-)
-"""Cached values that do not depend on the load."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,7 +78,8 @@ class JoinedBodies(CoupledMembers, LinearBody):
         """
         members = tuple(replace(member, load=load) for member, load in zip(self.members, loads, strict=True))
         other = replace(self, members=members, prescribed=prescribed)
-        other.__dict__.update({name: self.__dict__[name] for name in _WITHOUT_LOAD if name in self.__dict__})
+        kept = (name for name in self.__dict__ if isinstance(getattr(type(self), name, None), for_all_loads))
+        other.__dict__.update({name: self.__dict__[name] for name in kept})
         return other
 
     @cached_property
@@ -101,8 +87,8 @@ class JoinedBodies(CoupledMembers, LinearBody):
         """Relative error of a response."""
         return 1e-13 if self.responses_are_expensive else 1e-14
 
-    @cached_property
-    def responses_are_expensive(self) -> bool:  # type: ignore[override]  # an attribute of the protocol
+    @for_all_loads
+    def responses_are_expensive(self) -> bool:
         """Whether a response takes a sparse factorisation."""
         if self.is_dense is not None:
             return not self.is_dense
@@ -256,11 +242,11 @@ class JoinedBodies(CoupledMembers, LinearBody):
         displacement, _ = self.recover(state)
         return tuple(np.split(displacement, np.cumsum([member.n_components for member in self.members])[:-1]))
 
-    @cached_property
+    @for_all_loads
     def _compliance(self) -> Compliance:
         return Compliance.of(self)
 
-    @cached_property
+    @for_all_loads
     def _relative_stiffness(self) -> RelativeStiffness:
         return RelativeStiffness(self)
 

@@ -31,6 +31,8 @@ def test_floating_blocks_keep_the_promises_of_a_body(is_dense):
     assert body.responses_are_expensive is not is_dense
     reloaded = body.under([1.3 * member.load for member in body.members], body.prescribed + 0.1)
     check_body(body, is_symmetric=True, reloaded=reloaded)
+    assert reloaded.shapes is body.shapes  # with all that is factored
+    assert reloaded.load is not body.load
 
 
 def mixed_conditions(body):
