@@ -117,6 +117,7 @@ def test_tables_name_the_body(solution: Solution) -> None:
     assert [force["name"] for force in summary["parts"] if force["body"] == "upper"] == ["pushed", "tip"]
 
 
+@pytest.mark.slow
 def test_pictures_show_all_bodies_and_each_contact_once(solution: Solution, arch: Solution) -> None:
     names = [[picture.name for picture in default_pictures(each)] for each in (solution, arch)]
     assert names[0] == ["deformation", "zoom", "contacts", "displacement", "traction", "status", "von-mises"]

@@ -255,6 +255,7 @@ def test_one_body_that_touches_between_its_nodes_is_not_converged() -> None:
     assert not any("overlap by" in text for text in map(str, fine.warnings))
 
 
+@pytest.mark.slow
 def test_results_and_files_say_it(tmp_path: Path) -> None:
     solution = bk.run(coarse_disc(28))
     expected = measured(solution).as_dict()

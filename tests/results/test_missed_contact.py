@@ -277,6 +277,7 @@ def test_a_free_contact_of_loaded_bodies_is_missed_by_a_share_of_their_displacem
     assert missed_contacts(free, {"tip": found}) == ({"tip": (1.0, 2.0)} if is_missed else {})
 
 
+@pytest.mark.slow
 def test_two_pressed_nodes_beside_a_deeper_point_are_not_converged() -> None:
     """The lowest point of a sector is the end of two long elements, whose next nodes carry the whole load."""
     scene = bk.Scene(

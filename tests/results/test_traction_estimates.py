@@ -17,7 +17,6 @@ from bemkit.results.error_indicators import continuation_error, nodal_error
 from bemkit.results.solution import Solution
 from bemkit.solvers.active_sets import NodeStatus
 from checks.calibration.true_errors import true_errors
-from tests.slow import slow_except, slow_only
 
 LAYERS = bk.MeshOptions(accuracy=1e-3, rising_degrees=True)
 
@@ -40,8 +39,8 @@ def pin(side: str) -> Solution:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("n_elements", slow_except((80, 120, 160, 240), 80))
-@pytest.mark.parametrize("degree", slow_only([1, 2], 2))
+@pytest.mark.parametrize("n_elements", [80, 120, 160, 240])
+@pytest.mark.parametrize("degree", [1, 2])
 def test_the_estimates_are_near_the_errors(degree: int, n_elements: int) -> None:
     solution = solved("pin-in-plate", degree, bk.MeshOptions(elements=n_elements))
     ((side, _),) = solution.contact_sides.values()
@@ -121,6 +120,7 @@ def test_estimates_of_linear_elements_exclude_the_neighbours_of_a_singular_corne
     assert 0.5 < coarse.estimated_traction_error / tractions < 2.0  # 3.6 with that node
 
 
+@pytest.mark.slow
 def test_linear_elements_that_a_longer_one_of_the_other_body_excludes_have_no_estimate() -> None:
     """At the edges of a punch; the next second difference takes a node at the end of the longer element."""
     material = bk.Material(1.0, 0.3)
@@ -201,6 +201,7 @@ def test_singular_corners_are_excluded() -> None:
     assert counted < (nodal_error(table, 2, solution.n_sides, np.ones(table.n_contact)) or 0.0)
 
 
+@pytest.mark.slow
 def test_linear_elements_on_flat_sides_are_not_much_too_stiff() -> None:
     """A block on another that is wider, moved by given amounts; on curves the estimate is four times that."""
     material = bk.Material(1.0, 0.25)

@@ -92,6 +92,7 @@ def test_a_transition_beyond_a_node_with_pressure_counts_with_all_of_it() -> Non
     assert estimated(0.5, 4, pressure, s) == pytest.approx(expected, rel=1e-12)
 
 
+@pytest.mark.slow
 def test_where_sticking_ends_pressure_is_smooth() -> None:
     """A cylinder pressed on a floor: only friction below its bound has an error there, but pressure varies more."""
     parts = (

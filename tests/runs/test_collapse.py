@@ -114,8 +114,8 @@ OWN = {
     ("name", "elements"),
     slow_except(
         product(OWN, (4, 11, 24)),
-        *((name, 4) for name in ("column that tips", "column that slides", "stack bond", "joints of a thousandth")),
-        *(("crooked stack", 11), ("crooked stack pushed", 4), ("arcade", 24)),
+        *((name, 4) for name in ("column that tips", "column that slides")),
+        *(("crooked stack", 11), ("crooked stack pushed", 4)),
     ),
 )
 def test_the_factor_is_that_of_rigid_blocks_whatever_the_mesh(name: str, elements: int) -> None:
@@ -139,7 +139,7 @@ COULOMB = {0.643: 0.640, 0.580: 0.563, 0.404: 0.356, 0.332: 0.264, 0.240: 0.215}
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("factor", "expected"), slow_except(COULOMB.items(), (0.643, 0.640)))
+@pytest.mark.parametrize(("factor", "expected"), COULOMB.items())
 def test_the_coulomb_factor_of_ferris_and_tin_loi_is_bracketed(factor: float, expected: float) -> None:
     found = bk.coulomb_load_factor(assembly_of(courses(FERRIS_AND_TIN_LOI[factor], 4.0, 1.75), 0.65, 4))
     assert found.factor == pytest.approx(expected, abs=6e-4)  # three printed digits
@@ -148,6 +148,7 @@ def test_the_coulomb_factor_of_ferris_and_tin_loi_is_bracketed(factor: float, ex
     assert 0.98 * found.factor <= found.smallest <= found.factor < found.associative
 
 
+@pytest.mark.slow
 def test_coulomb_and_associative_factors_agree_where_one_motion_is_possible() -> None:
     """Two columns that slide or tip alone, and a block with cohesion 0.3 on a length of 2."""
     for name, expected in (("column that slides", 0.3), ("column that tips", 0.2)):

@@ -51,6 +51,7 @@ def test_a_leg_with_high_friction_has_two_answers() -> None:
         np.testing.assert_array_equal(again.contact.status, solution.contact.status)
 
 
+@pytest.mark.slow
 def test_a_probe_takes_the_mesh_that_an_accuracy_needs() -> None:
     scene = dataclasses.replace(leg(0.3), mesh=bk.MeshOptions(accuracy=0.1))
     (found,) = distinct_solutions(scene)

@@ -121,6 +121,10 @@ def boundary_of(solution: Any) -> Iterator[FloatArray]:
     slow_only(
         FEATURES,
         "single load",
+        "cascade",
+        "executor",
+        "body forces",
+        "motion far away",
         "start values",
         "probe",
         "scenes in turn",

@@ -146,6 +146,7 @@ def test_a_square_in_a_v_divides_its_weight_by_statics(push: float) -> None:
     assert right.force_normal == pytest.approx((1e-3 + push) / np.sqrt(2.0), rel=1e-10)
 
 
+@pytest.mark.slow
 def test_a_disc_that_contact_alone_holds_rests_between_two_blocks() -> None:
     """Its weight is the difference of what the blocks carry; also by the sparse form of many bodies."""
     weight, pressure = 1e-4, 1e-3

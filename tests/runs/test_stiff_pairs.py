@@ -24,7 +24,9 @@ def stack(ratio: float, law: bk.FrictionLaw) -> bk.Scene:
     return bk.Scene(title="A stack", bodies=bodies, contacts=contacts, law=law, discretisation=bk.Galerkin(2))
 
 
-@pytest.mark.parametrize("law", [bk.Frictionless(), bk.Coulomb(0.3)], ids=["frictionless", "coulomb"])
+@pytest.mark.parametrize(
+    "law", [pytest.param(bk.Frictionless(), marks=pytest.mark.slow), bk.Coulomb(0.3)], ids=["frictionless", "coulomb"]
+)
 @pytest.mark.parametrize("ratio", [pytest.param(1e4, marks=pytest.mark.slow), 1e8])
 def test_stiff_bodies_between_soft_ones_are_certified(ratio, law):
     solution = bk.run(stack(ratio, law))

@@ -87,6 +87,7 @@ def test_large_rotations_are_warned_of() -> None:
     assert any(words.startswith("Strains and rotations exceed 0.2") for words in map(str, warnings))
 
 
+@pytest.mark.slow
 def test_large_strains_of_one_body_of_several_are_warned_of() -> None:
     solution = run(with_overrides(load_scene("two-cylinders"), elements=40))
     assert isinstance(solution, Solution)
