@@ -106,7 +106,7 @@ SCENES = {
 }
 
 
-QUICK = ("paper-1", "loose block", "incompressible")
+QUICK = ("loose block", "incompressible")
 
 
 @pytest.mark.parametrize("name", slow_except(SCENES, *QUICK))
@@ -144,7 +144,8 @@ def test_without_contact_all_of_the_body_is_solved_for() -> None:
     assert steps[0].energy == pytest.approx(steps[1].energy, rel=1e-9)
 
 
-@pytest.mark.parametrize("name", slow_except(("paper-1", "loose block"), "loose block"))
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["paper-1", "loose block"])
 def test_the_body_keeps_the_promises_of_a_body(name: str) -> None:
     model, loaded = (
         model_of(in_both_ways(replace(SCENES[name], load_factors=(factor,)), 200)[0]) for factor in (1.0, 0.4)
@@ -219,6 +220,7 @@ def test_a_certificate_asks_for_no_further_response(monkeypatch: pytest.MonkeyPa
     assert len(solved) > n_responses
 
 
+@pytest.mark.slow
 def test_two_threads_give_the_bits_of_one(monkeypatch: pytest.MonkeyPatch) -> None:
     solutions = []
     for count in (1, 2):

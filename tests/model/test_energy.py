@@ -72,6 +72,7 @@ def test_the_energy_of_forces_inside_counts(force: bk.BodyForce) -> None:
     assert fine.energy > 0.0
 
 
+@pytest.mark.slow
 def test_a_thin_ring_heated_from_inside_has_its_own_energy() -> None:
     """On 12 constant elements, too: its state is what balances the heat, nothing has to cancel."""
     ring = thin_ring(

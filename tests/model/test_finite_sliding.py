@@ -138,7 +138,8 @@ def test_a_rigid_plane_moves_along_itself_without_limit_and_drags_by_friction() 
     assert punch.force_x == pytest.approx(-0.3 * punch.force_y, rel=1e-9)  # all nodes slip
 
 
-@pytest.mark.parametrize("drag", slow_only([0.0, 1e-3], 0.0))
+@pytest.mark.slow
+@pytest.mark.parametrize("drag", [0.0, 1e-3])
 def test_two_bodies_may_move_by_less_than_an_element(drag: float) -> None:
     disc = on_block(bk.Disk(1.0, (0.0, 1.0)), ("arc-3", "arc-4"), ("arc-1", "arc-2"), drag)
     assert bk.run(replace(disc, mesh=bk.MeshOptions(elements=240))).is_converged  # its contact has a width of 0.06

@@ -10,7 +10,7 @@ import pytest
 
 import bemkit as bk
 from bemkit.runs.steps import UnsolvableSceneError
-from tests.slow import slow_except, slow_only
+from tests.slow import slow_only
 
 STEEL = bk.Material(1e3, 0.3)
 ROCK = bk.Body(
@@ -47,7 +47,8 @@ def test_a_load_that_turns_a_round_body_is_not_held_by_its_mesh() -> None:
         bk.run(TWISTED)
 
 
-@pytest.mark.parametrize(("of_shaft", "of_ring"), slow_except([(12, 16), (18, 22)], (12, 16)))
+@pytest.mark.slow
+@pytest.mark.parametrize(("of_shaft", "of_ring"), [(12, 16), (18, 22)])
 def test_bodies_that_friction_joins_turn_together(of_shaft: int, of_ring: int) -> None:
     """A torque on a shaft that is pressed into a ring, which lies in the hole without friction.
 
@@ -73,7 +74,7 @@ def test_bodies_that_friction_joins_turn_together(of_shaft: int, of_ring: int) -
 @pytest.mark.parametrize(
     "held",
     [
-        tunnel(bk.Pressure(1.0)),
+        pytest.param(tunnel(bk.Pressure(1.0)), marks=pytest.mark.slow),
         pytest.param(replace(TWISTED, law=bk.Coulomb(0.3)), marks=pytest.mark.slow),
         tunnel(bk.Traction(bk.Expression("1 - y"), bk.Expression("-x"))),  # a push, and a moment of cos(2 angle)
         replace(tunnel(bk.Clamped()), contacts=(bk.ContactPair(("rock.wall", "lining.out"), gap=-1e-3),)),

@@ -69,7 +69,7 @@ SCENES = {
 }
 
 
-QUICK = (*product(("stick", "slip"), DRIVERS), *product(SCENES, ("augmented",)))
+QUICK = (*product(("stick", "slip"), DRIVERS), *product(("wavy obstacle", "tie, backward"), ("augmented",)))
 
 
 @lru_cache

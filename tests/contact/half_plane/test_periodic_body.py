@@ -115,6 +115,7 @@ def test_the_number_of_newton_steps_does_not_grow_with_the_elements() -> None:
     assert max(solves) <= 5, solves
 
 
+@pytest.mark.slow
 def test_units_and_places_change_nothing() -> None:
     plain = bk.run(scene(256))
     shifted = replace(
@@ -130,7 +131,7 @@ def test_units_and_places_change_nothing() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("travel", slow_except([1e3, 1e5], 1e5))
+@pytest.mark.parametrize("travel", [1e3, 1e5])
 def test_a_gap_far_larger_than_the_deformation_changes_nothing(travel: float) -> None:
     rough = replace(bk.load_scene("rough-surface"), mesh=bk.MeshOptions(elements=128))
     near = bk.run(rough)

@@ -49,7 +49,7 @@ def body_of(far: bk.FarField | None, *parts: bk.Part, towards: tuple[str, str] =
     "parts",
     [
         pytest.param((), marks=pytest.mark.slow),
-        (LOAD,),
+        pytest.param((LOAD,), marks=pytest.mark.slow),
         (LOAD, *HELD),
         pytest.param((HELD[1],), marks=pytest.mark.slow),
     ],

@@ -21,11 +21,12 @@ from bemkit.solvers.fixed_point import FixedPoint
 from bemkit.solvers.ssn import SemismoothNewton
 from bemkit.testing import check_body
 from tests.contact.joined.blocks import joined, rectangle, row_of_blocks
+from tests.slow import slow_only
 
 FORMS = pytest.mark.parametrize("is_dense", [True, False])
 
 
-@FORMS
+@pytest.mark.parametrize("is_dense", slow_only([True, False], False))
 def test_floating_blocks_keep_the_promises_of_a_body(is_dense):
     body = row_of_blocks((1.0, 3.0, 0.5), is_dense=is_dense)
     assert body.responses_are_expensive is not is_dense

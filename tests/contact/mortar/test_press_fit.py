@@ -50,6 +50,7 @@ def test_the_pressure_of_a_press_fit_is_uniform(n_elements: int, law: bk.Frictio
     assert -mean == pytest.approx(1e-3 / (of_ring + of_disc), rel=20.0 / n_elements**1.5)
 
 
+@pytest.mark.slow
 def test_nodes_on_symmetry_lines_stick_like_their_neighbours() -> None:
     solution = bk.run(press_fit(160, bk.Symmetry(x=0.0, y=0.0)))
     assert set(solution.contact.status_words()) == {"stick"}
