@@ -92,7 +92,7 @@ def test_collocation_bends_a_ring_of_a_tenth_of_its_radius(nu: float) -> None:
 
 
 @pytest.mark.parametrize(
-    "discretisation", slow_only(DISCRETISATIONS, DISCRETISATIONS[1]), ids=lambda d: type(d).__name__
+    "discretisation", slow_except(DISCRETISATIONS, DISCRETISATIONS[0]), ids=lambda d: type(d).__name__
 )
 def test_an_enclosed_disk_does_not_lock(discretisation: object) -> None:
     sides = tuple(f"arc-{k}" for k in range(1, 5))
@@ -122,7 +122,7 @@ class TwoHoles:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("nu", slow_except([0.3, 0.499995, 0.5], 0.499995))
+@pytest.mark.parametrize("nu", [0.3, 0.499995, 0.5])
 def test_collocation_of_two_holes_against_quadratic_elements(nu: float) -> None:
     parts = (
         bk.Part("floor", bk.Clamped(), sides=("bottom",)),

@@ -65,10 +65,10 @@ def test_no_point_of_a_segment_is_nearer_than_the_distance(p, a, b, fraction: fl
 
 
 def test_pairs_are_settled_batch_by_batch() -> None:
-    angle = 2.0 * np.pi * np.arange(400) / 400
+    angle = 2.0 * np.pi * np.arange(120) / 120
     start = np.stack([np.cos(angle), np.sin(angle)], axis=1)
-    nothing = np.zeros(400, int)
-    pieces = make_pieces((), start, np.roll(start, -1, axis=0), nothing - 1, np.zeros((400, 2)))
-    assert find_meeting(pieces, np.roll(np.arange(400), -1), batch=4) is None
-    folded = make_pieces((), start, start[(np.arange(400) + 200) % 400], nothing - 1, np.zeros((400, 2)))
-    assert find_meeting(folded, np.roll(np.arange(400), -1), batch=4) is not None
+    nothing = np.zeros(120, int)
+    pieces = make_pieces((), start, np.roll(start, -1, axis=0), nothing - 1, np.zeros((120, 2)))
+    assert find_meeting(pieces, np.roll(np.arange(120), -1), batch=4) is None
+    folded = make_pieces((), start, start[(np.arange(120) + 60) % 120], nothing - 1, np.zeros((120, 2)))
+    assert find_meeting(folded, np.roll(np.arange(120), -1), batch=4) is not None

@@ -78,7 +78,9 @@ def assert_right_or_unsolved(scene: bk.Scene, distance: float, push: float) -> b
     return True
 
 
-@pytest.mark.parametrize("driver", slow_only(DRIVERS, bk.LemkePivoting()), ids=lambda driver: type(driver).__name__)
+@pytest.mark.parametrize(
+    "driver", slow_only(DRIVERS, bk.LemkePivoting(), bk.AugmentedLagrangian()), ids=lambda driver: type(driver).__name__
+)
 @pytest.mark.parametrize("push", slow_except([1e-10, 1e-4], 1e-10))
 def test_the_wall_carries_the_push_however_small(driver: ContactSolver, push: float) -> None:
     """Beside what a disc clamped at the wall would exert on it, pushes are nothing; they are all there is."""

@@ -166,6 +166,7 @@ def test_newton_needs_few_solves_whatever_the_friction(friction_coefficient):
     assert_solves(problem, solution.state, friction_coefficient)
 
 
+@pytest.mark.slow
 def test_example_1_on_finite_elements():
     """The paper's first example: separation near 0.2576, change from slip to stick near 0.4676, print 0.26 and 0.47."""
     solution = solve(block_problem(Coulomb(0.5), n=32), SemismoothNewton())

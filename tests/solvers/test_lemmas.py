@@ -22,6 +22,7 @@ from bemkit.solvers.base import solve
 from bemkit.solvers.ssn import SemismoothNewton
 from tests.handmade import block_problem, random_body
 from tests.scenes import small_paper_scene
+from tests.slow import slow_only
 from tests.solvers.test_projection import N, bounds, numbers, pairs, positive, vector
 
 BODY = random_body(np.random.default_rng(0), N)
@@ -210,7 +211,7 @@ def floating():
     return problem
 
 
-@pytest.mark.parametrize("rho", [3.0, 1e2, 1e4])
+@pytest.mark.parametrize("rho", slow_only([3.0, 1e2, 1e4], 3.0))
 def test_theorem_1_on_a_floating_boundary_element_body(rho, floating):
     """(42) and (46) in every step, and convergence; the theorem is on Tresca's law, Coulomb's is not covered."""
     exact = solve(floating, SemismoothNewton()).state

@@ -81,7 +81,7 @@ def test_a_solution_is_its_own_start(driver):
 
 
 @pytest.mark.parametrize("driver", [*DRIVERS, LemkePivoting()], ids=repr)
-@pytest.mark.parametrize("status", slow_except(NodeStatus, *list(NodeStatus)[::2]), ids=lambda status: status.name)
+@pytest.mark.parametrize("status", slow_except(NodeStatus, NodeStatus.SLIP_FORWARD), ids=lambda status: status.name)
 def test_a_floating_block_from_any_start(driver, status):
     """All open, all sliding: the tangent is singular, springs help, and the result is right."""
     problem = block_problem(Coulomb(0.5), is_held_sideways=False, push=0.1)
@@ -241,7 +241,7 @@ def plain_solution(subject, driver):
 @pytest.mark.parametrize("subject", range(2))
 @pytest.mark.parametrize(
     ("length", "stress"),
-    slow_except([(1e-12, 1.0), (1e12, 1.0), (1.0, 1e-12), (1.0, 1e12), (1e12, 1e-12)], (1e-12, 1.0), (1.0, 1e12)),
+    slow_except([(1e-12, 1.0), (1e12, 1.0), (1.0, 1e-12), (1.0, 1e12), (1e12, 1e-12)], (1.0, 1e12)),
 )
 def test_units(driver, subject, length, stress):
     """Lengths by c, stresses by c: the same sets after the same number of steps and linear solves."""

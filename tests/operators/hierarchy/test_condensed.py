@@ -102,9 +102,8 @@ def test_where_the_stiffness_may_be_negative_it_is_examined(scene: bk.Scene, slo
     np.testing.assert_allclose(compressed.boundary.traction, dense.boundary.traction, atol=1e-8 * stress)
 
 
-@pytest.mark.parametrize(
-    ("name", "elements"), slow_except(product(("two-cylinders", "pin-in-plate"), (200, 600)), ("two-cylinders", 200))
-)
+@pytest.mark.slow
+@pytest.mark.parametrize(("name", "elements"), list(product(("two-cylinders", "pin-in-plate"), (200, 600))))
 def test_several_bodies_are_those_of_dense_equations(name: str, elements: int) -> None:
     assembly = bk.load_scene(name)
     assert isinstance(assembly, bk.Scene)

@@ -19,7 +19,7 @@ from bemkit.operators.material import Material
 from bemkit.operators.steklov_poincare.collocation import MixedSystem
 from bemkit.operators.steklov_poincare.hierarchical import LEAF_SIZE
 from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions
-from tests.slow import slow_except
+from tests.slow import slow_except, slow_only
 
 MATERIAL = Material(2.0, 0.3)
 OCTAGON = Polygon(tuple((np.cos(a), np.sin(a)) for a in np.pi * (0.25 * np.arange(8) + 0.1)))
@@ -91,7 +91,7 @@ NOTHING = LinearConditions(np.zeros((0, 2, 2)), np.zeros((0, 2, 2)), np.zeros((0
 
 
 @pytest.mark.parametrize("slopes", slow_except([True, False], True), ids=["slopes", "constant"])
-@pytest.mark.parametrize("name", SHAPES)
+@pytest.mark.parametrize("name", slow_only(SHAPES, "rectangle", "strip"))
 def test_answers_are_those_of_dense_equations(name: str, slopes: bool) -> None:
     mesh = mesh_of(name, 160)
     conditions, force, kept = conditions_of(mesh, 3)
@@ -111,6 +111,7 @@ def test_answers_are_those_of_dense_equations(name: str, slopes: bool) -> None:
         assert np.abs(left).max() <= 20.0 * tolerance * np.abs(found).max()
 
 
+@pytest.mark.slow
 def test_small_elements_of_graded_meshes_keep_their_digits() -> None:
     mesh = graded(150, 6.0)
     assert mesh.lengths.max() > 1e10 * mesh.lengths.min()

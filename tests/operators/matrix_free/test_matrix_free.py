@@ -104,7 +104,8 @@ def test_springs_and_friction(stiffness: float) -> None:
     assert factor.steps[0] < 25
 
 
-@pytest.mark.parametrize("most", slow_except((600, 1600, 6400), 600))
+@pytest.mark.slow
+@pytest.mark.parametrize("most", [600, 1600, 6400])
 def test_steps_do_not_grow_with_the_number_of_elements(most: int) -> None:
     steps = []
     for n in (300, most):
@@ -147,6 +148,7 @@ def test_conditions_that_hold_nothing() -> None:
         solved(system, free)
 
 
+@pytest.mark.slow
 def test_groups_lose_no_digits_on_fine_meshes() -> None:
     # the LU of the transposed equations of these groups has pivots up to 1e7 and leaves 1e-9, this one 1e-15
     scene = bk.load_scene("paper-1")
