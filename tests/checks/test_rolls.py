@@ -21,7 +21,7 @@ def test_a_roll_that_is_not_found_is_wrong(monkeypatch) -> None:
     """Without the search between nodes the first rolls are silently without contact."""
     monkeypatch.setattr("bemkit.runs.steps.with_missed_contact_named", lambda solution: solution)
     indices = [index for index in range(40) if drawn_roll(1, index).scene.mesh.accuracy is None][:4]
-    assert WRONG in {try_roll(1, index).reason for index in indices}
+    assert any(try_roll(1, index).reason == WRONG for index in indices)
 
 
 def test_rolls_are_drawn_alike() -> None:

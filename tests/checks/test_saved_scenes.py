@@ -31,10 +31,11 @@ def outcome_of(name: str) -> tuple[Outcome, str]:
         ("unloaded-without-strain", [Outcome.NAMED]),  # a corner of the obstacle lies between two nodes
         ("tip-of-a-wedge", [Outcome.NAMED]),  # a half-plane slides along the slopes of a wedge
         pytest.param("no-shear", RIGHT, marks=SLOW),
-        ("carried-along", RIGHT),
+        pytest.param("carried-along", RIGHT, marks=SLOW),
         # whether a node touches at all is decided by round-off; its overlap between nodes is warned of or named
         pytest.param("contact-between-nodes", [Outcome.WARNED, Outcome.NAMED], marks=SLOW),
-        ("far-fall-far-away", [Outcome.NAMED]),  # along a circle, by a fifth of the size of the plate
+        # along a circle, by a fifth of the size of the plate
+        pytest.param("far-fall-far-away", [Outcome.NAMED], marks=SLOW),
         # a half-plane 161 wide, whose gaps are zero but for -4e-15, after a motion of 1e-4 without contact
         pytest.param("back-at-rest", RIGHT, marks=SLOW),
         # its overlap ended within 1e-9 of the way, which was 2e-6 of the deformation
@@ -53,7 +54,7 @@ def outcome_of(name: str) -> tuple[Outcome, str]:
         pytest.param(
             "touches-between-nodes", [Outcome.WARNED, Outcome.NAMED], marks=SLOW
         ),  # a disc of constant elements, likewise
-        ("ends-that-differ-by-round-off", [Outcome.WARNED]),
+        pytest.param("ends-that-differ-by-round-off", [Outcome.WARNED], marks=SLOW),
         ("nothing-holds", [Outcome.NAMED]),  # a block that touches nothing, and two without support
         pytest.param("wedge-let-go", [Outcome.WARNED], marks=SLOW),  # round-off of the load before
         pytest.param("pin-that-spins", [Outcome.WARNED], marks=SLOW),  # of quadratic elements that turn by 90 degrees

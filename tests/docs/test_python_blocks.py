@@ -27,6 +27,7 @@ SLOW = [
         "tutorials/adding-a-driver.md",
         "tutorials/property-tests.md",
         *("several-bodies.md", "tutorials/a-body-of-ones-own.md", "tutorials/adding-a-discretisation.md"),
+        *("theory.md", "how-to/read-a-certificate.md", "how-to/choose-elements.md", "tutorials/operators.md"),
     )
 ]
 

@@ -38,7 +38,7 @@ def violations(solution: bk.Solution, friction: float) -> list[float]:
 
 @pytest.mark.parametrize("example", [1, 2])
 @pytest.mark.parametrize("discretisation", slow_except(DISCRETISATIONS, "constant"))
-@pytest.mark.parametrize("friction", slow_except((0.05, 0.2, 0.5, 1.0, 2.0, 3.0, 5.0), 0.05, 5.0))
+@pytest.mark.parametrize("friction", slow_except((0.05, 0.2, 0.5, 1.0, 2.0, 3.0, 5.0), 5.0))
 def test_friction_up_to_five_takes_at_most_ten_solves(example: int, discretisation: str, friction: float) -> None:
     solution = solved(example, discretisation, friction)
     assert solution.is_converged
@@ -55,7 +55,9 @@ def test_friction_of_ten_and_a_hundred_still_converges(discretisation: str, fric
 
 
 @pytest.mark.parametrize(
-    "solver", [bk.AugmentedLagrangian(), bk.FixedPoint(), bk.LemkePivoting()], ids=lambda s: type(s).__name__
+    "solver",
+    slow_except([bk.AugmentedLagrangian(), bk.FixedPoint(), bk.LemkePivoting()], bk.FixedPoint()),
+    ids=lambda s: type(s).__name__,
 )
 @pytest.mark.parametrize("friction", slow_except([3.0, 10.0, 100.0], 10.0))
 def test_other_drivers_are_right_or_say_that_they_failed(solver: ContactSolver, friction: float) -> None:

@@ -56,7 +56,7 @@ def case(request: pytest.FixtureRequest) -> tuple[int, str]:
     return request.param  # type: ignore[no-any-return]
 
 
-@pytest.mark.parametrize("discretisation", ["constant", "linear"])
+@pytest.mark.parametrize("discretisation", slow_except(["constant", "linear"], "constant"))
 def test_result_is_certified(case: tuple[int, str], discretisation: str) -> None:
     solution = solved(case[0], discretisation, case[1])
     assert solution.status is bk.Status.CONVERGED

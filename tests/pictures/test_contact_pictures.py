@@ -167,7 +167,11 @@ def test_teeth_of_a_small_body_do_not_cross_it() -> None:
 
 
 @pytest.mark.parametrize(
-    ("draw", "peak"), [(draw_contact_traction, "down to -0.0"), (draw_contact_clearance, "up to 0.0")]
+    ("draw", "peak"),
+    slow_only(
+        [(draw_contact_traction, "down to -0.0"), (draw_contact_clearance, "up to 0.0")],
+        (draw_contact_clearance, "up to 0.0"),
+    ),
 )
 def test_peaks_at_the_edges_of_a_punch_are_cut_and_told(draw: Callable[..., Axes], peak: str) -> None:
     solution = run(load_scene("tilted-punch"))

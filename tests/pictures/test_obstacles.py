@@ -154,9 +154,9 @@ def test_a_turn_is_drawn_about_the_centre() -> None:
 @pytest.mark.parametrize(
     "obstacle",
     [
-        bk.RigidSpline(tuple((0.5 + x, y - 1.0) for x, y in ROUND)),
+        pytest.param(bk.RigidSpline(tuple((0.5 + x, y - 1.0) for x, y in ROUND)), marks=pytest.mark.slow),
         bk.SignedDistance(bk.Expression("hypot(x - 0.5, y + 1) - 1")),
-        bk.RigidPolygon(tuple((0.5 + x, y - 1.0) for x, y in ROUND)),
+        pytest.param(bk.RigidPolygon(tuple((0.5 + x, y - 1.0) for x, y in ROUND)), marks=pytest.mark.slow),
     ],
 )
 def test_scenes_of_one_body_take_and_draw_them(obstacle: bk.Obstacle) -> None:

@@ -73,9 +73,10 @@ def test_of_many_elements_few_points_are_measured_from_the_boundary(monkeypatch:
     assert max(measured) < 0.3 * mesh.n_elements
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("discretisation", "accuracy"),
-    slow_except([("constant", 0.06), ("linear", 0.04), ("quadratic", 0.01)], ("quadratic", 0.01)),
+    [("constant", 0.06), ("linear", 0.04), ("quadratic", 0.01)],
 )
 def test_a_ring_under_pressure_has_lames_stresses_everywhere(discretisation: str, accuracy: float) -> None:
     """A quarter of a ring of radii 1 and 2 with a pressure of 3 inside: errors of 20 to 48 elements."""

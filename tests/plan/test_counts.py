@@ -88,7 +88,13 @@ SCENES: dict[str, Callable[[], bk.Scene]] = {
     "kind",
     slow_only(
         SCENES,
+        "frictionless",
         "frictionless, linear",
+        "load history, linear",
+        "quadratic",
+        "curved",
+        "exterior",
+        "parts of their own laws",
         "no contact, quadratic",
         "curved, linear",
         "exterior, quadratic",

@@ -129,6 +129,7 @@ def test_the_plan_says_what_is_compressed_and_which_kernels_run() -> None:
     assert prepare(scene, scene.build_mesh()).largest_matrix < plan.sizes.n_displacements
 
 
+@pytest.mark.slow
 def test_memory_of_compressed_equations_grows_like_the_elements(memory: Callable[[float], None]) -> None:
     small, large, larger = (bk.make_plan(scene_of(n), scene_of(n).build_mesh()).memory for n in (3000, 8000, 13000))
     assert larger - large == pytest.approx(large - small, rel=1e-2)

@@ -214,6 +214,7 @@ def test_stick_ratios_are_those_of_crude_elements(friction: float) -> None:
     assert static_cylinder_stick_ratio(friction, STEEL) == pytest.approx(parabola, abs=1.2e-2)
 
 
+@pytest.mark.slow
 def test_stick_ratios_of_known_cases() -> None:
     # converged in panels and points to 1e-8; crude elements above give two digits of them
     assert spence_stick_ratio(0.3, STEEL) == pytest.approx(0.68908656, abs=1e-7)

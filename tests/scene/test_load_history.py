@@ -88,6 +88,7 @@ def test_static_and_incremental_law_differ_on_a_coarse_mesh_too() -> None:
     assert stick_ratio(incremental) > 0.6
 
 
+@pytest.mark.slow
 def test_proportional_frictionless_loading_does_not_depend_on_the_steps() -> None:
     scene = dataclasses.replace(cylinder(0.03, (1.0,)), law=bk.Frictionless())
     at_once = bk.run(scene)

@@ -31,7 +31,11 @@ def forces_of(*sides: str) -> np.ndarray:
 
 
 @pytest.mark.parametrize(
-    "sides", [("pin.*", "plate.hole"), ("pin.arc-1,arc-2, arc-3 ,arc-4", "plate.hole-1, hole-2, hole-3, hole-4")]
+    "sides",
+    [
+        pytest.param(("pin.*", "plate.hole"), marks=pytest.mark.slow),
+        ("pin.arc-1,arc-2, arc-3 ,arc-4", "plate.hole-1, hole-2, hole-3, hole-4"),
+    ],
 )
 def test_lists_and_whole_shapes_are_those_sides(sides: tuple[str, str]) -> None:
     assert np.array_equal(forces_of(*sides), forces_of("pin.arc", "plate.hole"))

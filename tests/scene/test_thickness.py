@@ -165,6 +165,7 @@ def test_every_output_has_the_unit_of_force(tmp_path: Path, without: Callable[..
     assert "force x [N]" in (tmp_path / "r.html").read_text("utf-8")
 
 
+@pytest.mark.slow
 def test_sweeps_and_collapse_have_the_unit_of_force(tmp_path: Path) -> None:
     scene = replace(pressed(bk.Force(y=-4.0)), steps=(), units=UNITS, thickness=THICKNESS)
     found = bk.sweep(scene, {"thickness": [4.0, 8.0]})

@@ -22,6 +22,9 @@ def solution(request: pytest.FixtureRequest) -> bk.Solution:
 
 def test_right_fields_pass(solution) -> None:
     assert check_solution(solution).worst < 1e-6
+
+
+def test_two_bodies_pass() -> None:
     two = bk.run(replace(bk.load_scene("two-cylinders"), mesh=bk.MeshOptions(elements=40)))
     assert check_solution(two).is_good
 

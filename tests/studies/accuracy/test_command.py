@@ -120,6 +120,7 @@ def test_a_scene_without_a_reference_says_what_a_fine_solution_costs() -> None:
     assert " GB)" in message
 
 
+@pytest.mark.slow
 def test_an_over_resolved_solution_is_the_reference_if_asked_for() -> None:
     result = call("study", "receding-layer", *FEW, "--meshes", "uniform", "--over-resolve", "120")
     assert result.return_value == 0

@@ -125,6 +125,7 @@ def test_bodies_and_sides_come_in_any_order() -> None:
         np.testing.assert_allclose(solution.contact.sigma_n[own], plain().contact.sigma_n[expected], atol=1e-11)
 
 
+@pytest.mark.slow
 def test_multipliers_on_the_other_side_change_forces_by_the_discretisation_error() -> None:
     """Pressures are singular at corners: two per cent of the load with elements of an eighth of a side."""
     given = assembly()

@@ -51,7 +51,7 @@ def test_every_axis_is_tested_here() -> None:
         find_axes(["rho"])
 
 
-@pytest.mark.parametrize("name", slow_except(EXTREMES, "size", "sliding"))
+@pytest.mark.parametrize("name", slow_except(EXTREMES, "sliding"))
 @pytest.mark.parametrize(
     ("number", "discretisation"),
     slow_except([(1, CONSTANT), (2, LINEAR)], (1, CONSTANT)),

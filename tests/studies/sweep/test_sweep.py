@@ -65,12 +65,16 @@ def bodies_made(monkeypatch: pytest.MonkeyPatch) -> list[str]:
         pytest.param({"parts.top-load.condition.y": [-1e-3, -1.0, -1e4]}, 1, marks=pytest.mark.slow),
         pytest.param({"parts.foundation.condition.obstacle.point[1]": [0.0, -1e-5]}, 1, marks=pytest.mark.slow),
         # the obstacle turns: the body is condensed anew, not assembled
-        ({"parts.foundation.condition.obstacle.normal[0]": [0.0, 1e-4], FRICTION: [0.2, 0.4]}, 1),
+        pytest.param(
+            {"parts.foundation.condition.obstacle.normal[0]": [0.0, 1e-4], FRICTION: [0.2, 0.4]},
+            1,
+            marks=pytest.mark.slow,
+        ),
         ({"load_factors[0]": [0.5, 3.0]}, 1),
         pytest.param({FRICTION: [0.2, 0.4], "material.poisson_ratio": [0.0, 0.3, 0.5]}, 3, marks=pytest.mark.slow),
         pytest.param({"mesh.elements": [32, 48]}, 0, marks=pytest.mark.slow),
         ({"shape.height": [1.0, 1.5], FRICTION: [0.2, 0.4]}, 2),
-        ({"solver.max_steps": [50, 60]}, 1),
+        pytest.param({"solver.max_steps": [50, 60]}, 1, marks=pytest.mark.slow),
     ],
     ids=lambda value: "-".join(value) if isinstance(value, dict) else str(value),
 )

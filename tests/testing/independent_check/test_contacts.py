@@ -177,6 +177,7 @@ def test_rigid_bodies_move_and_are_loaded_as_they_are_told(among: bool) -> None:
     assert "energy" in violations_of(replace(solution, rigid={"punch": sunk})).faults
 
 
+@pytest.mark.slow
 def test_a_disc_that_turns_in_its_hole_is_not_in_the_rock() -> None:
     circle, sides = bk.Disk(2.0), ("arc-1", "arc-2", "arc-3", "arc-4")
     rock = bk.Body(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import dataclasses
 from functools import lru_cache
+from itertools import product
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from bemkit.testing.independent_check import violations_of
 from bemkit.testing.independent_check.boundary import boundary_of
 from bemkit.testing.independent_check.inside import inner_work
 from checks.random_scenes import random_case
+from tests.slow import slow_only
 from tests.testing.independent_check.company import first_body, in_company, with_body
 
 FORCES = (
@@ -53,8 +55,7 @@ def test_right_answers_pass(is_symmetric: bool) -> None:
     assert check.reciprocity < 1e-3
 
 
-@pytest.mark.parametrize("among", [False, True], ids=["one body", "one of several"])
-@pytest.mark.parametrize("number", range(3))
+@pytest.mark.parametrize(("number", "among"), slow_only(product(range(3), [False, True]), (0, True), (2, True)))
 def test_forces_that_are_left_out_are_noticed(number: int, among: bool) -> None:
     solution = solved(among=among)
     assert violations_of(solution).is_good

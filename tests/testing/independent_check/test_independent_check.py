@@ -12,10 +12,13 @@ import bemkit as bk
 from bemkit.testing.independent_check import Violations, violations_of
 from bemkit.testing.independent_check.obstacles import distance_to
 from tests.scenes import CONSTANT, FLOOR, LINEAR, block, small_paper_scene
+from tests.slow import slow_only
 from tests.testing.independent_check.company import first_body, in_company, with_body
 
 IN_BOTH = pytest.mark.parametrize("among", [False, True], ids=["one body", "one of several"])
-PLACES = pytest.mark.parametrize(("discretisation", "among"), [(LINEAR, False), (CONSTANT, False), (LINEAR, True)])
+PLACES = pytest.mark.parametrize(
+    ("discretisation", "among"), slow_only([(LINEAR, False), (CONSTANT, False), (LINEAR, True)], (LINEAR, True))
+)
 
 
 @lru_cache
