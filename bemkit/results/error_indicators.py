@@ -39,8 +39,6 @@ PAIR_CALIBRATION = (1.0, 1.75)
 STIFFNESS_CALIBRATION = (1.0, 0.15)
 """Factors between squared relative errors in the energy norm and relative errors of contact tractions, for degree 1 and
 for higher ones."""
-ARC_CALIBRATION = 4.0
-"""A further factor of linear elements on curves, which also miss a part of a uniform radial displacement."""
 LARGEST_STIFFNESS_SHARE = 1.0 / 3.0
 """Largest error of contact tractions that errors in the energy norm cause, relative to these."""
 MEAN_CALIBRATION = 1.25
@@ -178,15 +176,13 @@ def contact_errors(contact: ContactTable, degree: int) -> FloatArray:
     return errors
 
 
-def stiffness_error(energy_error: float, degree: int, *, is_curved: bool) -> float:
+def stiffness_error(energy_error: float, degree: int) -> float:
     """Estimate the relative error of contact tractions that errors in the energy norm anywhere on the bodies cause.
 
     Bodies that are moved by given amounts are too stiff by the square of the relative error, and so are their
-    reactions; under given loads they are right. Large errors are not of that order yet. Of `is_curved` contacts linear
-    elements miss more.
+    reactions; under given loads they are right. Large errors are not of that order yet.
     """
-    factor = STIFFNESS_CALIBRATION[min(degree, 2) - 1] * (ARC_CALIBRATION if is_curved and degree == 1 else 1.0)
-    return min(factor * energy_error**2, LARGEST_STIFFNESS_SHARE * energy_error)
+    return min(STIFFNESS_CALIBRATION[min(degree, 2) - 1] * energy_error**2, LARGEST_STIFFNESS_SHARE * energy_error)
 
 
 def nodal_error(contact: ContactTable, degree: int, n_sides: Callable[[str], int], share: FloatArray) -> float | None:

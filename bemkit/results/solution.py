@@ -183,8 +183,7 @@ class Solution(SolvedScene, Explorable):
         squared = self.places.squared_traction_error()
         if squared is None:
             return None
-        energy, degree = self.estimated_error or 0.0, self.places.lowest_degree
-        stiffness = stiffness_error(energy, degree, is_curved=self.places.is_curved)
+        stiffness = stiffness_error(self.estimated_error or 0.0, self.places.lowest_degree)
         return float(np.hypot(np.sqrt(squared) / size, stiffness))
 
     @cached_property

@@ -253,3 +253,22 @@ def test_ends_of_contact_at_a_support_count(wall: str) -> None:
     _, tractions = true_errors(coarse, bk.run(replace(scene, discretisation=bk.Galerkin(2), mesh=LAYERS)))
     assert coarse.estimated_traction_error is not None
     assert 0.7 < coarse.estimated_traction_error / tractions < 2.0  # 0.3 without that
+
+
+@pytest.mark.parametrize("n_elements", [40, 160])
+def test_linear_elements_on_arcs_miss_a_part_of_what_presses_them(n_elements: int) -> None:
+    """A ring on a thicker mandrel [Timoshenko1970]: the nodes are all alike, and only the chords between are wrong."""
+    ring = bk.Scene(
+        title="Ring on a mandrel",
+        shape=bk.Ring(1.0, 2.0),
+        material=bk.Material(1.0, 0.3),
+        parts=(bk.Part("hole", bk.Contact(bk.RigidCircle((0.0, 0.0), 1.01)), ("inner",)),),
+        symmetry=bk.Symmetry(x=0.0, y=0.0),
+        discretisation=bk.Galerkin(1),
+        mesh=bk.MeshOptions(elements=n_elements),
+    )
+    solution = bk.run(ring)
+    plane_strain = ring.material.youngs_modulus / (1.0 - 0.3**2)
+    pressure = 0.01 * plane_strain / (5.0 / 3.0 + 0.3 / 0.7)
+    error = np.abs(solution.contact.sigma_n / -pressure - 1.0).max()
+    assert solution.estimated_traction_error == pytest.approx(error, rel=0.1)  # second differences add to it
