@@ -95,19 +95,22 @@ class ContactPlaces:
     def singular_points(self) -> list[tuple[FloatArray, float]]:
         """Points (2,) at which tractions have no bound, singular corners and edges, and lengths [m] of elements there.
 
+        They are compared with lengths of whole contacts, which symmetry lines may halve.
+
         Both sides of a contact have the length of the longer elements, since an error of one side is one of the other.
         Points with elements longer than `LARGEST_REACH` are excluded.
         """
         points = []
         for name, corners in self.corners.items():
             mesh = self.solution.bodies[name].mesh
-            length = float(mesh.lengths[self._touching(name)].sum())
+            n_lines = 0 if mesh.symmetry is None else 2 - (mesh.symmetry.x, mesh.symmetry.y).count(None)
+            length = 2.0**n_lines * float(mesh.lengths[self._touching(name)].sum())
             for corner in corners:
                 point = np.array([corner.x, corner.y])
                 points.append((point, _reach(mesh, np.array(corner.elements), point), length))
         for one, two, point, _ in self._edges:
             reach = max(_reach(side.mesh, side.elements_at(point), point) for side in (one, two))
-            points.append((point, reach, min(one.length, two.length)))
+            points.append((point, reach, min(one.whole_length, two.whole_length)))
         long = [point for point, reach, length in points if reach > LARGEST_REACH * length]  # on one of two sides
         return [
             (point, reach)

@@ -76,6 +76,15 @@ class Side:
         """Length of boundary [m]."""
         return float(self.mesh.lengths[self.mesh.part(self.part)].sum())
 
+    @property
+    def whole_length(self) -> float:
+        """Length of boundary [m], with the images of a side that symmetry lines halve."""
+        symmetry, elements = self.mesh.symmetry, self.mesh.part(self.part)
+        lines = () if symmetry is None else (symmetry.x, symmetry.y)
+        points = np.concatenate([self.mesh.start[elements], self.mesh.end[elements]])
+        n_crossed = sum(line is not None and line in points[:, axis] for axis, line in enumerate(lines))
+        return 2.0**n_crossed * self.length
+
     def near(self, point: FloatArray) -> ZoneEnd:
         """Return the nearest place on the side, as the end of a zone."""
         zone_length = self.length if self.zone_length is None else self.zone_length
