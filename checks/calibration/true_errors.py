@@ -60,4 +60,5 @@ def _tractions_at(solution: Solution, contact: str, places: Located) -> FloatArr
     is_known, elements = distances <= _SAME * body.mesh.diameter, np.arange(body.mesh.n_elements)
     row, unknown, factors = continued_to_ends(space, elements, is_known[space.element_dofs])
     at_dofs[row, unknown] = np.einsum("nl,nlc->nc", factors, at_dofs[row])
+    at_dofs[~body.boundary.traction.any(axis=1)] = 0.0  # beyond the end of a partner nothing goes on
     return values_at(space, from_own_nodes(space, at_dofs), places)
