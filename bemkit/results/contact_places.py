@@ -224,9 +224,16 @@ class ContactPlaces:
             on_curves += self.solution.n_sides(contact) * self._squared_error_on_curves(contact)
             if own_degree == 0 or contact in table.circumferences:  # nodes at centres; no ends
                 continue
-            at_start = continuation_error(s, tractions[rows], own_degree)
-            at_end = continuation_error((side.length - s)[::-1], tractions[rows][::-1], own_degree)
-            at_ends += self.solution.n_sides(contact) * float(shares[0] * at_start + shares[-1] * at_end)
+            if self.solution.n_sides(contact) > 1:  # the other side may end there, and none goes on beyond its nodes
+                continue
+            lengths = side.mesh.lengths[along_boundary(side.mesh, side.mesh.part(side.part))]
+            for order, distances, length in (
+                (slice(None), s, lengths[0]),
+                (slice(None, None, -1), (side.length - s)[::-1], lengths[-1]),
+            ):
+                if distances[0] <= (1.0 + LYING_AT) * length:  # within an element
+                    missed = continuation_error(distances, tractions[rows][order], own_degree)
+                    at_ends += float(shares[order][0]) * missed
         at_nodes = nodal_error(table, degree, self.solution.n_sides, share)
         return None if at_nodes is None else at_nodes + at_ends + on_curves
 

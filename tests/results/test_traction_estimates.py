@@ -272,3 +272,28 @@ def test_linear_elements_on_arcs_miss_a_part_of_what_presses_them(n_elements: in
     pressure = 0.01 * plane_strain / (5.0 / 3.0 + 0.3 / 0.7)
     error = np.abs(solution.contact.sigma_n / -pressure - 1.0).max()
     assert solution.estimated_traction_error == pytest.approx(error, rel=0.1)  # second differences add to it
+
+
+@pytest.mark.parametrize("corner", [1.4, 1.05])
+def test_a_side_that_hangs_over_the_end_of_the_other_goes_on_nowhere(corner: float) -> None:
+    """Its last node in contact is no neighbour of a held one: a line through both was wrong by 180 times all forces."""
+    below = bk.Body(
+        name="below",
+        shape=bk.Rectangle(4.0, 1.0, (-2.0, -1.0)),
+        material=bk.Material(1.0, 0.3),
+        parts=(bk.Part("base", bk.Clamped(), ("bottom",)),),
+    )
+    above = replace(
+        below, name="above", shape=bk.Rectangle(1.0, 0.5, (corner, 0.0)), parts=(), body_forces=(bk.Gravity(1e-3),)
+    )
+    scene = bk.Scene(
+        title="Overhang",
+        bodies=(below, above),
+        contacts=(bk.ContactPair(("above.bottom", "below.top")),),
+        law=bk.Coulomb(0.3),
+        discretisation=bk.Galerkin(2),
+        mesh=bk.MeshOptions(elements=60),
+    )
+    solution = bk.run(scene)
+    assert solution.estimated_traction_error is not None
+    assert solution.estimated_traction_error < 0.3
