@@ -54,6 +54,7 @@ def test_every_fourth_trial_has_several_bodies() -> None:
     assert random_assembly(7, 3) != random_assembly(8, 3)
 
 
+@pytest.mark.slow
 def test_assemblies_are_the_same_after_a_scene_file(tmp_path: Path) -> None:
     for index in range(4):
         case = random_assembly(7, index)

@@ -12,7 +12,7 @@ from click.testing import CliRunner
 from bemkit.cli.main import _run_to_end, commands
 from bemkit.errors import BemkitError
 from bemkit.scene.toml import scene_from_toml, shipped_files
-from tests.slow import slow_except
+from tests.slow import slow_except, slow_only
 
 KINDS = ("block", "cylinders", "pin", "rough-surface", "wall")
 ENTRY = re.compile(r'(?:"[^"]*"|[^\s"=]+) = ')
@@ -40,7 +40,7 @@ def test_two_commands_from_nothing_to_a_picture(words: str, capsys) -> None:
     assert [path for path in Path("figures").iterdir() if path.stat().st_size > 5000]
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", slow_only(KINDS, "wall", "cylinders"))
 def test_every_line_has_an_effect(kind: str) -> None:
     text = shipped_files("new")[kind].read_text("utf-8")
     whole, lines = scene_from_toml(text), text.splitlines()

@@ -50,6 +50,7 @@ def test_report_and_plot_have_the_exit_code_of_run(without: Callable[..., None])
     assert call("report", "bad.h5", "-o", "r.html", "-q") == 1
 
 
+@pytest.mark.slow
 def test_the_animation_of_a_history_that_fails_has_its_exit_code(capsys) -> None:
     """All of its finished steps are right."""
     parts = (

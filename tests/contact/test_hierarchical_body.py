@@ -128,6 +128,7 @@ def test_statuses_and_tractions_are_those_of_dense_equations(name: str) -> None:
     assert compressed.energy == pytest.approx(dense.energy, rel=1e-9)
 
 
+@pytest.mark.slow
 def test_the_paper_s_method_without_slopes_is_the_same() -> None:
     compressed, dense = (bk.run(each) for each in in_both_ways(paper(1), 240, slopes=False))
     np.testing.assert_array_equal(compressed.contact.status, dense.contact.status)

@@ -124,6 +124,7 @@ class Sliding(LinearBody):
         return self.load
 
 
+@pytest.mark.slow
 def test_the_linear_programme_takes_memory_in_proportion_to_the_nodes():
     few, many = memory_of_the_programme(400), memory_of_the_programme(1600)
     assert many < 6.0 * few  # four times the nodes; dense blocks would take sixteen times

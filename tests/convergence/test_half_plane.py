@@ -112,6 +112,7 @@ def test_a_flat_punch() -> None:
     assert pressure_error(solution, lambda x: 1.0 / (np.pi * np.sqrt(1.0 - x**2)), 0.95) < WITHIN
 
 
+@pytest.mark.slow
 def test_a_punch_under_a_moment() -> None:
     """Of a flat punch that carries the moment M, p = P / (pi w) + 2 M x / (pi w), w = sqrt(1 - x^2)."""
     solution = pressed("0 * x", 1.0, bk.FarField(force_y=1.0, x=0.0, moment=-0.1))

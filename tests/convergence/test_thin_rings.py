@@ -10,7 +10,7 @@ import pytest
 
 import bemkit as bk
 from bemkit.geometry.outline import Outline
-from tests.slow import slow_except, slow_only
+from tests.slow import slow_except
 
 DISCRETISATIONS = [bk.ConstantCollocation(), bk.Galerkin(1), bk.Galerkin(2)]
 POISSON_RATIOS = [0.49, 0.4995, 0.499995, 0.4999999999, 0.5]
@@ -61,7 +61,7 @@ def shaft_error(radius: float, nu: float, n: int, discretisation: object, **opti
 
 
 @pytest.mark.parametrize(
-    "discretisation", slow_only(DISCRETISATIONS, DISCRETISATIONS[1]), ids=lambda d: type(d).__name__
+    "discretisation", slow_except(DISCRETISATIONS, DISCRETISATIONS[0]), ids=lambda d: type(d).__name__
 )
 @pytest.mark.parametrize(
     ("radius", "nu"), slow_except([(0.3, 0.499995), (0.8, 0.4995), (0.8, 0.5), (0.99, 0.49)], (0.3, 0.499995))
@@ -83,7 +83,8 @@ def test_rings_of_any_thickness_and_ratio(radius: float, discretisation: object)
             assert shaft_error(radius, nu, n, discretisation, symmetry=symmetry, law=law) < limit
 
 
-@pytest.mark.parametrize("nu", slow_except([0.3, 0.5], 0.5))
+@pytest.mark.slow
+@pytest.mark.parametrize("nu", [0.3, 0.5])
 def test_collocation_bends_a_ring_of_a_tenth_of_its_radius(nu: float) -> None:
     load = bk.Part("load", bk.Traction(y=bk.Expression("-y")), sides=OUTER)
     energies = [ring(0.9, nu, 160, each, load).energy for each in (DISCRETISATIONS[0], DISCRETISATIONS[2])]

@@ -45,7 +45,13 @@ def test_the_comparison_can_fail() -> None:
 # what these run has quick tests of its own
 SLOW = [
     (page, OUTPUTS_SHOWN[page])
-    for page in ("paper-tables.md", "tutorials/first-steps.md", "tutorials/several-bodies.md", "command-line.md")
+    for page in (
+        "paper-tables.md",
+        "tutorials/first-steps.md",
+        "tutorials/several-bodies.md",
+        "command-line.md",
+        "verification.md",
+    )
 ]
 
 

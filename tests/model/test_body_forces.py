@@ -405,6 +405,7 @@ def test_result_files_hold_body_forces(tmp_path: Path) -> None:
     np.testing.assert_allclose(gradient, np.tile([0.0, 1.0], (2, 1)), atol=1e-5)
 
 
+@pytest.mark.slow
 def test_adaptive_meshes_take_body_forces() -> None:
     given = block(parts=(FLOOR,), law=bk.Coulomb(0.3), mesh=bk.MeshOptions(accuracy=3e-3))
     solution, fine = bk.run(given), bk.run(dataclasses.replace(given, mesh=bk.MeshOptions(200)))

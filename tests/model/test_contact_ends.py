@@ -84,7 +84,8 @@ def test_a_linear_end_node_is_of_the_first_order() -> None:
     assert fine[-1] < 2e-3
 
 
-@pytest.mark.parametrize(("degree", "allowed"), slow_except([(1, 5e-3), (2, 1e-3), (3, 2e-4), (6, 2e-5)], (2, 1e-3)))
+@pytest.mark.slow
+@pytest.mark.parametrize(("degree", "allowed"), [(1, 5e-3), (2, 1e-3), (3, 2e-4), (6, 2e-5)])
 def test_the_middle_of_a_disc_that_lies_beside_rollers(degree: int, allowed: float) -> None:
     scene = replace(bk.load_scene("disc-between-plates"), discretisation=bk.Galerkin(degree))
     table = bk.run(scene).contact

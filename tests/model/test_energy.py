@@ -39,6 +39,7 @@ def test_slopes_that_keep_means_bend_the_same_ring_the_right_way() -> None:
     assert solution.boundary.displacement[top, 1] < 0.0 < solution.energy
 
 
+@pytest.mark.slow
 def test_scenes_without_contact_are_judged_too(monkeypatch: pytest.MonkeyPatch) -> None:
     squeeze = bk.Part("load", bk.Traction(y=bk.Expression("-y")), sides=tuple(f"outer-{k}" for k in range(1, 5)))
     scene = thin_ring(0.8, 40, squeeze, symmetry=bk.Symmetry(x=0.0, y=0.0), law=bk.Frictionless())

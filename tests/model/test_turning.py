@@ -37,6 +37,7 @@ def tunnel(inside: bk.Condition, **options: object) -> bk.Scene:
 TWISTED = tunnel(bk.Pressure(1.0, 0.1))
 
 
+@pytest.mark.slow
 def test_a_load_that_turns_a_round_body_is_not_held_by_its_mesh() -> None:
     # 2 pi 0.7^2 0.1; around a hole the boundary runs clockwise
     words = r"turns body 'lining' clockwise about \(0, 0\) with 0\.3079, and contacts that are round"

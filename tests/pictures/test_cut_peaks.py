@@ -34,6 +34,7 @@ def test_a_long_range_is_drawn_as_it_is() -> None:
     assert not axes.texts
 
 
+@pytest.mark.slow
 def test_the_boundary_of_a_shipped_scene_tells_what_is_cut() -> None:
     scene = replace(bk.load_scene("clamped-angle"), mesh=bk.MeshOptions(accuracy=1e-2))
     axes = draw_boundary_traction(bk.run(scene))

@@ -147,6 +147,7 @@ def test_tolerances_out_of_range_are_refused(tolerance: float) -> None:
         bk.Hierarchical(tolerance)
 
 
+@pytest.mark.slow
 def test_large_compressed_scenes_begin_on_coarser_meshes() -> None:
     assert run.cascade_of(scene_of(16384)) == (1024, 16)
     assert not run.cascade_of(scene_of(16000))

@@ -158,6 +158,7 @@ def test_ends_of_contact_inside_elements_count_in_the_energy() -> None:
     assert 0.5 < coarse.estimated_error / energy < 3.0  # 0.26 without them
 
 
+@pytest.mark.slow
 def test_errors_at_a_singular_corner_spread_to_its_neighbour() -> None:
     """Four elements of degree 6 touch: the corner's is excluded, and causes the error of the next one."""
     shape = bk.Polygon(((-0.5, 0.0), (0.5, 0.0), (0.88, 0.8), (-0.36, 0.8)), ("bottom", "right", "top", "left"))

@@ -80,6 +80,7 @@ def test_a_mirror_exchanges_the_sides_and_turns_the_slip(
     assert or_bounded(one) == pytest.approx(or_bounded(other), abs=1e-6)
 
 
+@pytest.mark.slow
 @given(st.floats(0.4, 3.1), st.sampled_from([FREE, HELD]), kappas)
 def test_halves_of_a_wedge_have_its_exponents(half: float, side: WedgeSide, kappa: float) -> None:
     """Fields of a symmetric wedge are symmetric or antisymmetric: a roller, or a held tangent, on the middle line."""

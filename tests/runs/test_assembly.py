@@ -378,6 +378,7 @@ def test_what_goes_with_one_body_alone_is_refused() -> None:
         bk.run(replace(patch(1), contacts=()))
 
 
+@pytest.mark.slow
 def test_what_one_side_feels_the_other_gives_back() -> None:
     """Forces of both sides of a contact, integrated over their own elements, to round-off; so of every block."""
     solution = bk.run(replace(bk.load_scene("two-cylinders"), mesh=bk.MeshOptions(elements=60)))

@@ -167,6 +167,7 @@ def test_scenes_without_such_a_coefficient_are_named(scene: bk.Scene, error: typ
         bk.critical_friction(scene)
 
 
+@pytest.mark.slow
 def test_steps_and_load_factors_count() -> None:
     with pytest.raises(LoadHistoryError, match="a load history of 32 steps has no single state"):
         bk.critical_friction(bk.load_scene("friction-loop"))

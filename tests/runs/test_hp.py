@@ -141,6 +141,7 @@ def test_a_fixed_degree_takes_layers_alone() -> None:
     assert later[-1].scene.discretisation == bk.Galerkin(4)
 
 
+@pytest.mark.slow
 def test_a_mesh_is_not_planned_as_the_last_where_places_of_change_still_move() -> None:
     """They leave errors of 2e-5 on the first mesh that follows them: too much for 1e-5, whatever its degree."""
     assert [degree_of(solution) for solution in risen("paper-1", 5e-5)] == [2, 4, 6]
@@ -190,6 +191,7 @@ def test_layers_where_loads_jump() -> None:
     assert len(cut) - 1 == 5
 
 
+@pytest.mark.slow
 def test_the_last_mesh_has_no_layers_for_another_one() -> None:
     """On Example 2 fewer than where there were so many: 54 elements; its places are told well enough nevertheless."""
     last = risen("paper-2", 3e-5)[-1]

@@ -101,6 +101,7 @@ def _block(name: str, y: float, given: dict[str, bk.PrescribedDisplacement]) -> 
     return bk.Body(name=name, shape=shape, material=bk.Material(1.0, 0.3), parts=parts, placement=placement)
 
 
+@pytest.mark.slow
 def test_nor_is_what_a_body_exerts_on_a_held_node_of_its_partner() -> None:
     """The lower block is pushed along at a side whose corner the upper one rubs, by nodes of its own."""
     given = {"left": (0.0, None), "bottom": (None, 0.0)}
@@ -114,6 +115,7 @@ def test_nor_is_what_a_body_exerts_on_a_held_node_of_its_partner() -> None:
     check_balance(loading, 1e-10)
 
 
+@pytest.mark.slow
 def test_bodies_and_a_punch_balance_too() -> None:
     """A punch is pressed down by a force and moved to and fro."""
     steps = (
@@ -265,6 +267,7 @@ def test_a_bound_in_the_result_is_that_of_the_slip() -> None:
     assert check.is_good, check.faults
 
 
+@pytest.mark.slow
 def test_a_law_that_never_agrees_with_its_slip_is_named() -> None:
     """A bound that all but vanishes at the first slip, under a load: the block snaps forward without end."""
     brittle = SlipWeakening(0.4, 0.0, 1e-6)

@@ -39,6 +39,7 @@ def leg(friction: float) -> bk.Scene:
     )
 
 
+@pytest.mark.slow
 def test_a_leg_with_high_friction_has_two_answers() -> None:
     found = distinct_solutions(leg(3.0))
     assert len(found) == 2

@@ -125,6 +125,7 @@ def test_states_that_are_not_finite_end_as_a_status_without_warnings_of_numpy(wi
     assert np.isnan(solution.energy)
 
 
+@pytest.mark.slow
 def test_so_do_those_of_several_bodies(with_fields) -> None:
     def infinite(model: Model, actual: Callable[..., Any], state: ContactState) -> Any:
         return actual(model, ContactState(state.displacement, np.full_like(state.traction, np.inf)))

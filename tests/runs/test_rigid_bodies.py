@@ -78,6 +78,7 @@ def test_the_shipped_punch_tilts_as_on_a_half_plane() -> None:
     np.testing.assert_allclose(pressure, (force + 2.0 * moment * x) / (np.pi * np.sqrt(1.0 - x**2)), rtol=1e-2)
 
 
+@pytest.mark.slow
 def test_an_eccentric_force_tilts_the_punch_and_its_moment_is_balanced() -> None:
     by_moment = solved(driven(moment=-0.1 * FORCE)).rigid["punch"]
     by_place = solved(driven(centre=(1.1, 1.0), moment=0.0)).rigid["punch"]  # type: ignore[arg-type]
@@ -354,6 +355,7 @@ def test_steps_of_motions_and_forces_follow_each_other() -> None:
         bk.run([driven(), longer])
 
 
+@pytest.mark.slow
 def test_load_factors_scale_motions_and_forces() -> None:
     """Sideways by a motion and down by a force, both in two steps: the last one has the whole of both."""
     scene = replace(driven(x=1e-2), law=SOME, load_factors=(0.5, 1.0))
@@ -369,7 +371,8 @@ def test_load_factors_scale_motions_and_forces() -> None:
     assert half.rigid["punch"].force_y == pytest.approx(-0.5 * FORCE, rel=1e-10)
 
 
-@pytest.mark.parametrize("scale", slow_except([1e-9, 1e9], 1e9))
+@pytest.mark.slow
+@pytest.mark.parametrize("scale", [1e-9, 1e9])
 def test_forces_and_motions_set_the_units(scale: float) -> None:
     """No other load is there to measure by: results are those of another unit of force."""
     for changes, name in (({"force_y": -scale * FORCE}, "y"), ({"force_y": None, "y": -scale * FORCE}, "force_y")):

@@ -70,6 +70,7 @@ def test_neighbours_have_similar_lengths() -> None:
     assert max(ratio.max(), 1.0 / ratio.min()) <= STEEPEST * (1.0 + 1e-9)
 
 
+@pytest.mark.slow
 def test_later_meshes_start_from_earlier_solutions() -> None:
     first, *later = adapted(2, "quadratic", 1e-3)
     cold = bk.run(later[-1].scene, mesh=later[-1].mesh)
@@ -120,6 +121,7 @@ def test_a_mesh_that_is_accurate_enough_is_the_best_one() -> None:
     assert _best_last((fine,), "", 1e-2, refinement)[-1].message.startswith(f"One mesh with {fine.n_elements} elements")
 
 
+@pytest.mark.slow
 def test_a_mesh_that_misses_contact_has_no_error() -> None:
     """A block at rest has the error zero on a first mesh that misses a thin roll, and no mesh is accurate for that."""
     block = bk.Rectangle(1.0, 1.0)
@@ -173,7 +175,7 @@ def test_an_accuracy_out_of_reach_ends_at_the_budget(budget: dict[str, float], r
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("size", slow_except([1e-9, 1e9], 1e9))
+@pytest.mark.parametrize("size", [1e-9, 1e9])
 def test_meshes_do_not_depend_on_units(size: float) -> None:
     scene = paper(2, mesh=bk.MeshOptions(accuracy=3e-3))
     loads = {"top-load": bk.Traction(y=bk.Expression("-(x/L)**2 * (1 - x/L)**2".replace("L", repr(size))))}

@@ -110,6 +110,7 @@ def test_results_do_not_depend_on_rho():
             assert_same(problem, solution.state, reference.state)
 
 
+@pytest.mark.slow
 def test_incremental_law_is_the_static_law_moved():
     """Moving the reference slip by what the body can follow without strain moves the solution along."""
     problem = block_problem(Coulomb(0.5), is_held_sideways=False, push=0.1)

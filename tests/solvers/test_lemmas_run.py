@@ -15,6 +15,7 @@ from bemkit.solvers.base import solve
 from bemkit.solvers.fixed_point import FixedPoint
 from bemkit.solvers.ssn import SemismoothNewton
 from tests.handmade import block_problem
+from tests.slow import slow_only
 
 NEWTON = SemismoothNewton(max_steps=20)
 DRIVERS = [NEWTON, AugmentedLagrangian(max_steps=20), FixedPoint(NEWTON, max_steps=20)]
@@ -43,7 +44,7 @@ def test_a_wrong_projection_or_derivative_misleads_newtons_method(name, monkeypa
     assert misled(NEWTON, name, monkeypatch)
 
 
-@pytest.mark.parametrize("solver", DRIVERS, ids=lambda solver: type(solver).__name__)
+@pytest.mark.parametrize("solver", slow_only(DRIVERS, DRIVERS[1]), ids=lambda solver: type(solver).__name__)
 @pytest.mark.parametrize("name", ["positive_part_derivative", "clip_to_bound_derivative"])
 def test_a_wrong_derivative_misleads_every_driver(name, solver, monkeypatch):
     """Their linear conditions are those of the sets that the derivatives tell."""

@@ -150,6 +150,7 @@ def test_uniform_slip_is_exact() -> None:
         assert set(contact.status_words()) == {"slip"}
 
 
+@pytest.mark.slow
 def test_the_tie_on_the_whole_body_ends_whatever_the_driver() -> None:
     """Pushed by exactly the friction it has, nothing but friction holding it: stick or slip, but an answer."""
     scene = bk.Scene(

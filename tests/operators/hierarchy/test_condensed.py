@@ -83,6 +83,7 @@ def test_a_rigid_motion_far_away_takes_no_force() -> None:
     assert np.abs(condensed.stiffness @ retained).max() < 1e-11
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("scene", "slopes", "n_elements"),
     [

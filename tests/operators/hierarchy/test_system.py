@@ -128,6 +128,7 @@ def test_small_elements_of_graded_meshes_keep_their_digits() -> None:
     assert np.abs(traction - expected).max() <= 20e-8 * np.abs(expected).max()
 
 
+@pytest.mark.slow
 def test_conditions_that_change_leave_what_a_new_factorisation_finds() -> None:
     mesh = mesh_of("rectangle", 220)
     conditions, force, kept = conditions_of(mesh, 4)

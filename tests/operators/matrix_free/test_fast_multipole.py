@@ -55,6 +55,7 @@ def test_graded_meshes(power: float) -> None:
     assert error_of(multipole_of(graded(200, power))) < TINY
 
 
+@pytest.mark.slow
 def test_errors_follow_the_tolerance() -> None:
     errors = [error_of(multipole_of(mesh_of("rectangle", 400), tolerance=each)) for each in (1e-3, 1e-6, 1e-9)]
     # series of random densities err by less than their bound, and do err

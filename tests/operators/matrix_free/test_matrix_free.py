@@ -25,7 +25,7 @@ from bemkit.operators.matrix_free.traction_hierarchy import TractionHierarchy
 from bemkit.operators.steklov_poincare.hierarchical import HierarchicalCollocation
 from tests.operators.hierarchy.test_system import MATERIAL, SHAPES, conditions_of, graded, mesh_of, system_of
 from tests.scenes import paper
-from tests.slow import slow_except, slow_only
+from tests.slow import slow_except
 
 NOTHING = np.zeros(0, np.intp)
 ACCURATE = MatrixFree(1e-10)
@@ -86,7 +86,8 @@ def test_graded_meshes() -> None:
     assert factor.steps[0] <= 14
 
 
-@pytest.mark.parametrize("stiffness", slow_only([1e-2, 1e4], 1e-2))
+@pytest.mark.slow
+@pytest.mark.parametrize("stiffness", [1e-2, 1e4])
 def test_springs_and_friction(stiffness: float) -> None:
     """Below springs, t + k E' u = 0, beside them t_1 = 0.3 t_2 without moving across, elsewhere loads."""
     mesh = mesh_of("rectangle", 240)

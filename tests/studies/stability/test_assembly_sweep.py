@@ -46,7 +46,7 @@ def test_every_axis_is_tested_here(pin):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", slow_except(EXTREMES, "elements"))
+@pytest.mark.parametrize("name", EXTREMES)
 def test_the_ends_of_every_axis_are_right_or_named(pin, name):
     (axis,) = find_axes([name])
     for row in sweep(pin, [dataclasses.replace(axis, values=EXTREMES[name])]):
@@ -58,7 +58,7 @@ def test_the_ends_of_every_axis_are_right_or_named(pin, name):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", slow_except(SIMILAR, "turn"))
+@pytest.mark.parametrize("name", SIMILAR)
 def test_parts_chosen_by_a_region_follow_the_body(name):
     cylinders = with_overrides(load_scene("two-cylinders"), elements=40)
     assert isinstance(cylinders, Scene)

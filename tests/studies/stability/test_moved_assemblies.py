@@ -112,6 +112,7 @@ def test_a_reflected_assembly_slips_the_other_way() -> None:
         np.testing.assert_allclose(solution.contact.sigma_t[own], -plain().contact.sigma_t[expected][::-1], atol=1e-11)
 
 
+@pytest.mark.slow
 def test_bodies_and_sides_come_in_any_order() -> None:
     """Contacts that meet in a corner do not: of equally long ones the first has the multiplier there."""
     given = assembly()

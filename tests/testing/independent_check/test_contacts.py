@@ -234,6 +234,7 @@ def beside_one_that_carries_nothing(traction: float) -> Solution:
     return replace(solution, contact=table)
 
 
+@pytest.mark.slow
 def test_bodies_that_carry_nothing_are_not_judged_by_their_round_off() -> None:
     """A pull of 1e-15 of the load is round-off of the others, beside nothing at all; 1e-6 of it is a fault."""
     assert violations_of(beside_one_that_carries_nothing(1e-15)).faults == ()
