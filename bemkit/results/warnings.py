@@ -57,7 +57,7 @@ def find_warnings(solution: Solution) -> tuple[ResultWarning, ...]:
     """Return the warnings about a solution, first those of its plan; at most three of a kind, then their number."""
     if not solution.is_certified:
         return solution.plan.warnings
-    remedy = _remedy(solution.bodies.values())
+    remedy = _remedy(solution)
     laws = solution.laws
     of_all = [_error(solution, remedy)]
     if may_overlap(solution.scene, [body.scene for body in solution.bodies.values()]):
@@ -98,9 +98,11 @@ def _in_body(name: str, warnings: Iterable[ResultWarning]) -> Iterator[ResultWar
         yield replace(warning, subject=subject, text=f"Body {name!r}: {warning.text}") if name else warning
 
 
-def _remedy(bodies: Iterable[SolvedBody]) -> str:
+def _remedy(solution: Solution) -> str:
     """Return the remedy in words; an accuracy needs an error estimate and meshes that may be graded."""
-    for body in bodies:
+    if solution.stated.mesh.accuracy is not None:
+        return "give a smaller accuracy" if solution.is_converged else "allow more elements"
+    for body in solution.bodies.values():
         is_periodic = body.mesh.surface is not None and body.mesh.surface.is_periodic
         if is_periodic or not body.scene.discretisation.estimates_error:
             return "use more elements"
