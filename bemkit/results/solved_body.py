@@ -298,6 +298,11 @@ class SolvedBody:
 
     @property
     def energy_of_round_off(self) -> float:
-        """Elastic energy [J/m] of a rigid motion that may be round-off."""
+        """Elastic energy [J/m] that may be round-off: of a rigid motion, and of tractions that strain nothing.
+
+        A pressure all around an incompressible body is such.
+        """
+        modulus = self.scene.material.plane_modulus
         moved = float(np.abs(self.boundary.displacement).max(initial=0.0))
-        return self.mesh.n_elements * self.scene.material.plane_modulus * (_ROUND_OFF * moved) ** 2
+        pressed = float(np.abs(self.boundary.traction).max(initial=0.0)) * self.mesh.diameter / modulus
+        return self.mesh.n_elements * modulus * (_ROUND_OFF * max(moved, pressed)) ** 2

@@ -14,7 +14,7 @@ from rich.console import Console
 import bemkit as bk
 from bemkit.cli.console import print_plan, print_summary
 from bemkit.contact.laws import Coulomb, Frictionless
-from bemkit.contact.obstacle import Gap
+from bemkit.contact.obstacle import Gap, RigidHalfPlane
 from bemkit.errors import ResultWarning, first_of_each_kind, without_duplicates
 from bemkit.formulas import Expression
 from bemkit.geometry.shapes import Rectangle
@@ -26,7 +26,7 @@ from bemkit.results.tables import to_json
 from bemkit.results.warnings import FEWEST_NODES, find_warnings
 from bemkit.runs.adaptive import run_adaptive
 from bemkit.runs.run import run
-from bemkit.scene.conditions import Clamped, Contact, Part, PrescribedDisplacement, Traction
+from bemkit.scene.conditions import Clamped, Contact, Part, PrescribedDisplacement, Pressure, Roller, Traction
 from bemkit.scene.discretisation import Galerkin, MeshOptions
 from bemkit.scene.scene import Scene
 from bemkit.scene.toml import load_scene, with_overrides
@@ -246,6 +246,36 @@ def test_an_accuracy_is_advised_only_where_meshes_can_follow_it() -> None:
     ):
         (words,) = {words.split(": ")[-1] for words in map(str, run(scene).warnings) if " zone of part " in words}
         assert words == f"use more elements there{', or give an accuracy' if is_possible else ''}."
+
+
+def test_a_smaller_accuracy_is_advised_where_one_was_reached(solution: Solution) -> None:
+    energy = solution.energy * (solution.estimated_error / 0.06) ** 2  # type: ignore[operator]
+    for status, words in (
+        (Status.CONVERGED, "give a smaller accuracy"),
+        (Status.ACCURACY_NOT_REACHED, "allow more elements"),
+    ):
+        scene = dataclasses.replace(solution.scene, mesh=MeshOptions(accuracy=0.1))
+        found = changed_solution(dataclasses.replace(solution, status=status, scene=scene), energy=energy)
+        assert f"The estimated error is 6 %: {words}." in map(str, find_warnings(found))
+
+
+def test_a_pressure_that_strains_nothing_has_no_error() -> None:
+    """All around an incompressible body: displacements and energy are round-off, of either sign."""
+    confined = Scene(
+        title="Confined block",
+        shape=Rectangle(1.0, 1.0),
+        material=Material(1.0, 0.5),
+        parts=(
+            Part("floor", Contact(RigidHalfPlane()), sides=("bottom",)),
+            Part("walls", Roller(), sides=("left", "right")),
+            Part("top", Pressure(0.01), sides=("top",)),
+        ),
+        discretisation=Galerkin(1),
+        mesh=MeshOptions(elements=40),
+    )
+    found = run(confined)
+    assert found.estimated_error == 0.0
+    assert not found.warnings
 
 
 def test_an_estimate_that_cannot_be_made_is_doubted(solution: Solution) -> None:
