@@ -18,6 +18,7 @@ from bemkit.scene.unit_names import amount
 
 if TYPE_CHECKING:
     from bemkit.results.solution import Solution
+    from bemkit.scene.contacts import ContactPair
 
 LEAST_OVERLAP = 0.1
 """Depth that may be the error of small displacements beside a contact zone, relative to the largest displacement of
@@ -45,7 +46,10 @@ def _of_bodies(solution: Solution, outlines: dict[str, Polyline]) -> Iterator[Re
             _is_beside(solution, own, _parts_in_contact(solution, own, other))[outline.elements]
             for own, other, outline in ((one, two, lines[k]), (two, one, lines[m]))
         ]
-        least = lines[k].tolerance + lines[m].tolerance + _least_overlap(solution, (one, two))
+        pairs = [
+            pair for pair in solution.scene.elastic_contacts if {body for body, _ in pair.elastic_parts} == {one, two}
+        ]
+        least = lines[k].tolerance + lines[m].tolerance + _least_overlap(solution, (one, two), pairs)
         depth, place = deepest_overlap(lines[k], lines[m], least, beside)
         if depth > 0.0:
             yield _between(solution, f"Bodies {one!r} and {two!r}", f"{one} / {two}", depth, place)
@@ -69,12 +73,12 @@ def _of_rigid_bodies(solution: Solution, name: str, outline: Polyline) -> Iterat
     for rigid in solution.scene.rigid:
         if not is_finite(rigid.obstacle):
             continue
-        pairs = (pair for pair in solution.scene.contacts if pair.rigid_body == rigid.name)
+        pairs = [pair for pair in solution.scene.contacts if pair.rigid_body == rigid.name]
         parts = [part for pair in pairs for body, part in pair.elastic_parts if body == name]
         points, motion = _points_beside(solution, name, parts, outline), solution.rigid[rigid.name]
         moved = rigid.motions_at(points) @ np.array([motion.x, motion.y, motion.turn])
         depth, place = _deepest(rigid.obstacle, points - moved, points)
-        if depth > outline.tolerance + _least_overlap(solution, (name,)):
+        if depth > outline.tolerance + _least_overlap(solution, (name,), pairs):
             pair = f"Body {name!r} and rigid body {rigid.name!r}"
             yield _between(solution, pair, f"{name} / {rigid.name}", depth, place)
 
@@ -97,11 +101,14 @@ def _deepest(obstacle: Obstacle, points: FloatArray, places: FloatArray) -> tupl
     return -float(gap.min()), places[int(gap.argmin())]
 
 
-def _least_overlap(solution: Solution, names: Collection[str]) -> float:
-    """Return the depth [m] that may be round-off or the error of small displacements."""
-    bodies = [solution.bodies[name] for name in names]
+def _least_overlap(solution: Solution, names: Collection[str], pairs: Collection[ContactPair] = ()) -> float:
+    """Return the depth [m] that may be round-off, the error of small displacements, or a gap that contacts add."""
+    bodies, table = [solution.bodies[name] for name in names], solution.contact
     moved = max(float(np.abs(body.boundary.displacement).max()) for body in bodies)
-    return ROUND_OFF * min(body.mesh.diameter for body in bodies) + LEAST_OVERLAP * moved
+    points = np.stack([table.x, table.y], axis=1)
+    gaps = (pair.gap_at(points[table.rows(pair.name)]).max(initial=0.0) for pair in pairs)
+    added = max(map(float, gaps), default=0.0)
+    return ROUND_OFF * min(body.mesh.diameter for body in bodies) + LEAST_OVERLAP * moved + added
 
 
 def _displaced(body: SolvedBody) -> Polyline:

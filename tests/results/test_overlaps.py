@@ -100,3 +100,22 @@ def test_obstacles_of_several_parts_are_measured_once() -> None:
     halves = replace(scene, bodies=(replace(block, parts=(block.parts[0], left, right)),))
     found = [warning for warning in bk.run(halves).warnings if warning.kind == "overlap beside contacts"]
     assert [warning.subject for warning in found] == ["block left"]
+
+
+@pytest.mark.parametrize("gap", [0.0, 2e-3])
+def test_a_gap_that_a_contact_adds_is_no_overlap(gap: float) -> None:
+    """Bodies drawn touching come as near as the gap; their corners bulge beside the contact."""
+    lower = bk.Body(
+        name="lower",
+        shape=bk.Rectangle(3.0, 1.0, (-1.5, -1.0)),
+        material=STEEL,
+        parts=(bk.Part("base", bk.Clamped(), ("bottom",)),),
+        mesh=bk.MeshOptions(elements=60),
+    )
+    load = bk.Part("load", bk.Traction(y=-0.01), ("top",))
+    upper = replace(lower, name="upper", shape=bk.Rectangle(2.0, 1.0, (-1.0, 0.0)), parts=(load,))
+    scene = bk.Scene(
+        title="gap", bodies=(lower, upper), contacts=(bk.ContactPair(("upper.bottom", "lower.top"), gap=gap),),
+        law=bk.Coulomb(0.3), discretisation=bk.Galerkin(1),
+    )  # fmt: skip
+    assert not [warning for warning in bk.run(scene).warnings if warning.kind == "overlap beside contacts"]
