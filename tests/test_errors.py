@@ -16,6 +16,7 @@ import bemkit
 import bemkit.runs.run
 from bemkit.cli.main import main
 from bemkit.errors import BemkitError, InputError, NoResultError, concerning, one_line
+from tests.statements import statements
 
 MISTAKES_OF_THE_CALLER = {"TypeError", "AttributeError", "AssertionError", "NotImplementedError"}
 """Built-in errors that tell a programmer of a wrong call; no input of the command line leads to them."""
@@ -47,8 +48,7 @@ def test_no_module_raises_a_bare_built_in_error() -> None:
     for name in all_modules():
         file = importlib.import_module(name).__file__
         assert file is not None
-        nodes = ast.walk(ast.parse(Path(file).read_text("utf-8")))
-        raises = (node.exc for node in nodes if isinstance(node, ast.Raise))
+        raises = (node.exc for node in statements(Path(file)) if isinstance(node, ast.Raise))
         errors = (each.func if isinstance(each, ast.Call) else each for each in raises)
         raised |= {(name, error.id) for error in errors if isinstance(error, ast.Name)}
     built_in = {(name, word) for name, word in raised if hasattr(builtins, word)}

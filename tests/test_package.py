@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 
 import bemkit
+from tests.statements import statements
 
 PACKAGE = Path(bemkit.__file__).parent
 
@@ -61,7 +62,7 @@ def dotted(path: Path) -> str:
 def imports_of(path: Path, package: Path = PACKAGE) -> set[str]:
     """Return the modules of the package that a module imports, in functions and for its types too."""
     found = set()
-    for node in ast.walk(ast.parse(path.read_text())):
+    for node in statements(path):
         if isinstance(node, ast.ImportFrom) and node.module and node.module.split(".")[0] == NAME:
             for alias in node.names:
                 inner = Path(package, *node.module.split(".")[1:], alias.name)

@@ -167,6 +167,7 @@ def test_cylinders_pressed_then_sheared_are_those_of_cattaneo_and_mindlin() -> N
     assert np.interp(half_width, table.x[right], slip[right]) == pytest.approx(edge, rel=5e-3)
 
 
+@pytest.mark.slow
 def test_two_sides_of_one_body_touch_as_its_half_touches_a_wall() -> None:
     """A clamp with a slot that closes: by symmetry each half meets a smooth rigid line in the middle."""
     gap, material = 0.01, bk.Material(1.0, 0.3)

@@ -165,6 +165,7 @@ def test_the_rule_does_not_depend_on_units_and_position() -> None:
         assert bk.run(near).status is bk.run(replace(near, bodies=(block,), rigid=(far_away,))).status is status
 
 
+@pytest.mark.slow
 def test_loads_of_any_size_deform_without_sliding() -> None:
     """Displacements grow with the load, and so does what contact forces displace."""
     for force in (1e-9, 1e-3):

@@ -52,7 +52,6 @@ def rings_on_a_shaft(law: bk.FrictionLaw) -> bk.Scene:
     slow_except(
         [(turn, law) for turn in (0.0, 7.0) for law in (bk.Coulomb(0.2), bk.Frictionless())],
         (0.0, bk.Coulomb(0.2)),
-        (7.0, bk.Frictionless()),
     ),
 )
 @pytest.mark.parametrize(

@@ -111,7 +111,7 @@ def test_operators_are_combined_and_solved_with_as_linear_operators_of_scipy() -
     ("make", "symmetry"),
     [
         (LinearSpace, bk.Symmetry(x=0.0)),
-        (QuadraticSpace, None),
+        pytest.param(QuadraticSpace, None, marks=pytest.mark.slow),
         pytest.param(LinearSpace, None, marks=pytest.mark.slow),
         pytest.param(QuadraticSpace, bk.Symmetry(x=0.0), marks=pytest.mark.slow),
     ],

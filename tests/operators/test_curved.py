@@ -211,6 +211,7 @@ def duffy(corner_xi: float, corner_t: float) -> tuple[FloatArray, FloatArray, Fl
     slow_only(
         product(("ring", "dome", "ellipse", "disk of four elements"), (DEGREES, HIGH)),
         *product(("ring", "dome", "ellipse", "disk of four elements"), (HIGH,)),
+        ("ellipse", DEGREES),
     ),
 )
 def test_touching_pairs_against_duffy(name: str, degrees: Degrees) -> None:

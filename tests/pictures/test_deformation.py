@@ -239,6 +239,7 @@ def test_the_stress_of_a_half_plane_fills_a_rectangle_below_its_surface() -> Non
     assert axes.get_ylim()[0] < -0.9 * depth
 
 
+@pytest.mark.slow
 def test_a_flat_relief_is_drawn_across_the_whole_height() -> None:
     solution = bk.run(with_overrides(load_scene("cylinder-on-half-plane"), elements=60))
     axes = draw_deformation(solution)

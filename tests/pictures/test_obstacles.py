@@ -115,6 +115,7 @@ def test_hatching_stays_close_to_the_surface() -> None:
     assert hatching.get_clip_path() is not None  # and off the body
 
 
+@pytest.mark.slow
 def test_a_clockwise_spline_fills_its_outside() -> None:
     axes = Figure().add_subplot()
     draw_obstacles(axes, shown(block(bk.RigidSpline(ROUND[::-1]))))

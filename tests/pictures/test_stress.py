@@ -29,6 +29,7 @@ def points_of(solution: bk.Solution) -> StressMesh:
     return stress_mesh(solution.body, 0.1, shown(solution).frame)
 
 
+@pytest.mark.slow
 def test_points_stay_as_far_from_short_elements_as_a_picture_shows() -> None:
     scene = replace(bk.load_scene("bending"), mesh=bk.MeshOptions(elements=400), discretisation=bk.Galerkin(1))
     solution = bk.run(scene)

@@ -71,6 +71,7 @@ def test_the_edges_of_a_punch_that_slides(friction: float, poisson_ratio: float)
         assert found == pytest.approx(0.5 + sign * beta, abs=1e-7)
 
 
+@pytest.mark.slow
 @given(angles, sides, sides, kappas)
 def test_a_mirror_exchanges_the_sides_and_turns_the_slip(
     angle: float, outgoing: WedgeSide, incoming: WedgeSide, kappa: float

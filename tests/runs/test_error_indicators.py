@@ -30,7 +30,6 @@ ELEMENTS = {"linear": bk.Galerkin(1), "quadratic": bk.Galerkin(2)}
     slow_except(
         product(PROBLEMS, ELEMENTS),
         ("L", "linear"),
-        ("paper-1", "quadratic"),
     ),
 )
 @pytest.mark.parametrize("exponent", slow_except((1.0, 2.0), 2.0))

@@ -51,6 +51,7 @@ def test_a_wall_in_running_bond() -> None:
     assert all(is_non_mortar(sides[one], sides[two]) for one, two in pairs)
 
 
+@pytest.mark.slow
 def test_sizes_may_differ_by_far() -> None:
     ground = block((-100.0, -1.0), (100.0, 0.0), 2, 1)
     small = [block((k, 0.0), (k + 1e-3, 1e-3), 3, 2) for k in np.arange(-90.0, 90.0)]

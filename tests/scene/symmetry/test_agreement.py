@@ -164,6 +164,7 @@ def test_only_translations_along_the_line_are_left(
         assert np.allclose(np.abs(motions[0])[~is_held], np.abs(expected)[~is_held], rtol=0.0, atol=1e-12)
 
 
+@pytest.mark.slow
 def test_the_roller_of_the_paper_and_the_image_agree() -> None:
     shipped = bk.load_scene("paper-2")
     roller = bk.run(shipped)

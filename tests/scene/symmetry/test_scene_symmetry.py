@@ -13,6 +13,7 @@ from bemkit.geometry.spaces import LinearSpace
 from bemkit.geometry.symmetry.images import element_images
 from bemkit.scene.symmetry import AsymmetricSceneError, find_symmetry
 from tests.scenes import EccentricRing, square, squeezed
+from tests.slow import slow_only
 
 HALF = bk.Symmetry(x=0.5)
 
@@ -94,8 +95,9 @@ def test_what_is_not_symmetric_is_refused(case: str) -> None:
         replace(scene, symmetry=HALF).build_mesh()
 
 
-@pytest.mark.parametrize("centre", [(0.4, 0.0), (-0.4, 0.0)])
-def test_a_hole_on_one_side_only_is_refused(centre: tuple[float, float]) -> None:
+@pytest.mark.parametrize("x", slow_only([0.4, -0.4], -0.4))
+def test_a_hole_on_one_side_only_is_refused(x: float) -> None:
+    centre = (x, 0.0)
     scene = squeezed(EccentricRing(centre), symmetry=bk.Symmetry(x=0.0))
     with pytest.raises(AsymmetricSceneError, match="away from the boundary"):
         scene.build_mesh()

@@ -100,6 +100,7 @@ def test_same_statuses_after_the_same_iterations(name: str) -> None:
     )
 
 
+@pytest.mark.slow
 def test_a_reflected_assembly_slips_the_other_way() -> None:
     solution = bk.run(assembly(reflects=True))
     assert (solution.linear_solves, solution.outer_steps) == (plain().linear_solves, plain().outer_steps)

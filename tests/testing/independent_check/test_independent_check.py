@@ -15,7 +15,7 @@ from tests.scenes import CONSTANT, FLOOR, LINEAR, block, small_paper_scene
 from tests.slow import slow_only
 from tests.testing.independent_check.company import first_body, in_company, with_body
 
-IN_BOTH = pytest.mark.parametrize("among", [False, True], ids=["one body", "one of several"])
+IN_BOTH = pytest.mark.parametrize("among", slow_only([False, True], True), ids=["one body", "one of several"])
 PLACES = pytest.mark.parametrize(
     ("discretisation", "among"), slow_only([(LINEAR, False), (CONSTANT, False), (LINEAR, True)], (LINEAR, True))
 )
