@@ -1,4 +1,4 @@
-"""Friction coefficients, loads and given displacements that jump between contact nodes or inside elements."""
+"""Friction coefficients, loads, given displacements and gaps that jump between contact nodes or inside elements."""
 
 from __future__ import annotations
 
@@ -9,13 +9,16 @@ import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray, IntArray
 from bemkit.contact.laws import FrictionLaw
+from bemkit.contact.obstacle import Gap
 from bemkit.errors import ResultWarning, format_point
+from bemkit.formulas import ScalarField, evaluate_field
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.vectors import norms
 from bemkit.operators.steklov_poincare.nodal_conditions import TractionField
 from bemkit.results.contact_table import ContactTable
 from bemkit.results.solved_body import SolvedBody
-from bemkit.scene.conditions import PrescribedDisplacement, Pressure, Traction
+from bemkit.results.solved_scene import SolvedScene
+from bemkit.scene.conditions import Contact, PrescribedDisplacement, Pressure, Traction
 
 _CHANGE = 0.1
 """Change from place to place, relative to the larger value, above which it may be a jump."""
@@ -75,7 +78,7 @@ def _law_jumps(law: FrictionLaw, pressure: float, points: FloatArray, is_asked: 
 
 
 def load_jumps(body: SolvedBody) -> Iterator[ResultWarning]:
-    """Warn of loads and given displacements of a body that jump inside an element.
+    """Warn of loads, given displacements and given gaps of a body that jump inside an element.
 
     Quadrature and interpolation take the jump to another place of the element.
     """
@@ -85,6 +88,8 @@ def load_jumps(body: SolvedBody) -> Iterator[ResultWarning]:
                 kind, at = "load", load.at
             case PrescribedDisplacement() as given:
                 kind, at = "displacement", partial(_given_at, given)
+            case Contact(obstacle=Gap(value=value)) if callable(value):
+                kind, at = "gap", partial(_gap_at, value)
             case _:
                 continue
         for place in _jumps_on(body.mesh, elements, at):
@@ -97,6 +102,25 @@ def load_jumps(body: SolvedBody) -> Iterator[ResultWarning]:
 
 def _given_at(given: PrescribedDisplacement, points: FloatArray, normals: FloatArray) -> FloatArray:
     return given.at(points)
+
+
+def gap_jumps(solution: SolvedScene) -> Iterator[ResultWarning]:
+    """Warn of gaps that listed contacts add and that jump inside an element of the side with the nodes."""
+    for pair in solution.scene.contacts:
+        if callable(pair.gap) and pair.name in solution.contact_sides:
+            side = solution.contact_sides[pair.name][0]
+            mesh = solution.bodies[side.body].mesh
+            for place in _jumps_on(mesh, mesh.part(side.part), partial(_gap_at, pair.gap)):
+                text = (
+                    f"Contact {pair.name!r}: the gap jumps at {format_point(place)}, inside an element: divide the "
+                    "sides there into parts, each with a contact and a gap of its own."
+                )
+                yield ResultWarning("jump of gap", pair.name, text)
+
+
+def _gap_at(gap: ScalarField, points: FloatArray, normals: FloatArray) -> FloatArray:
+    values = evaluate_field(gap, points)
+    return np.stack([values, np.zeros_like(values)], axis=1)
 
 
 def _jumps_on(mesh: BoundaryMesh, elements: IntArray, at: TractionField) -> FloatArray:

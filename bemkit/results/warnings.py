@@ -10,7 +10,7 @@ import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray
 from bemkit.contact.laws import FrictionLaw, LawOfCoefficients
-from bemkit.contact.obstacle import RigidHalfPlane
+from bemkit.contact.obstacle import Gap, RigidHalfPlane
 from bemkit.errors import ResultWarning, first_of_each_kind
 from bemkit.geometry.local_values import values_on_elements
 from bemkit.geometry.mesh import BoundaryMesh
@@ -72,6 +72,7 @@ def find_warnings(solution: Solution) -> tuple[ResultWarning, ...]:
         *of_bodies,
         _unbounded_tractions(solution),
         _law_jumps(solution.contact, laws),
+        _gap_jumps(solution),
         _no_load(solution),
         _narrow_zones(solution.contact, smooth, remedy),
         _hidden_overlaps(solution.contacts_between_nodes, solution.contact, solution.units, remedy),
@@ -375,12 +376,20 @@ def _law_jumps(contact: ContactTable, laws: Mapping[str, FrictionLaw]) -> Iterat
 
 
 def _load_jumps(body: SolvedBody) -> Iterator[ResultWarning]:
-    """Warn of jumps of loads and given displacements that are formulas or functions."""
-    conditions = (part.condition for part in body.scene.parts)
-    if any(callable(value) for each in conditions if not isinstance(each, Contact) for value in vars(each).values()):
+    """Warn of jumps of loads, given displacements and gaps that are formulas or functions."""
+    gaps = (obstacle for obstacle in body.scene.obstacles.values() if isinstance(obstacle, Gap))
+    loads = (part.condition for part in body.scene.parts if not isinstance(part.condition, Contact))
+    if any(callable(value) for each in chain(gaps, loads) for value in vars(each).values()):
         from bemkit.results.jumps import load_jumps
 
         yield from load_jumps(body)
+
+
+def _gap_jumps(solution: Solution) -> Iterator[ResultWarning]:
+    if any(callable(pair.gap) for pair in solution.scene.contacts):
+        from bemkit.results.jumps import gap_jumps
+
+        yield from gap_jumps(solution)
 
 
 def _varies(law: FrictionLaw) -> bool:

@@ -119,3 +119,21 @@ def test_a_jump_that_matters_little_is_not() -> None:
     load = bk.Traction(y=bk.Expression("where(x < 1.237, -0.01, -0.0112)"))
     assert jumps_of(pushed(load))
     assert not jumps_of(pushed(load, bk.MeshOptions(elements=150, density={"top": 30.0})))
+
+
+@pytest.mark.parametrize(("formula", "n_jumps"), [("where(x < 0.737, 0, 1e-3)", 1), ("1e-3 * abs(x - 0.737)", 0)])
+def test_gaps_that_jump_are_named(formula: str, n_jumps: int) -> None:
+    block = pushed(bk.Traction(y=-0.01))
+    gap = bk.Part("floor", bk.Contact(bk.Gap(bk.Expression(formula))), ("bottom",))
+    texts = jumps_of(replace(block, parts=(gap, *block.parts[1:])))
+    assert [text.startswith("Part 'floor': the gap jumps at (0.737, 0), inside") for text in texts] == n_jumps * [True]
+    lower = bk.Body(
+        name="lower", shape=bk.Rectangle(2.0, 1.0, (0.0, -1.0)), material=bk.Material(1.0, 0.3),
+        parts=(bk.Part("base", bk.Clamped(), ("bottom",)),),
+    )  # fmt: skip
+    upper = bk.Body(name="upper", shape=block.shape, material=lower.material, parts=block.parts[1:])
+    pair = bk.ContactPair(("upper.bottom", "lower.top"), gap=bk.Expression(formula))
+    mesh = bk.MeshOptions(elements=36)
+    texts = jumps_of(bk.Scene(title="Two", bodies=(lower, upper), contacts=(pair,), law=bk.Frictionless(), mesh=mesh))
+    start = "Contact 'upper.bottom / lower.top': the gap jumps at (0.737, 0), inside"
+    assert [text.startswith(start) for text in texts] == n_jumps * [True]
