@@ -23,9 +23,9 @@ AddedGap: TypeAlias = Callable[[FloatArray], FloatArray]
 _POINTS_PER_NODE = 4
 """Sample points for each node of an element. Between them a polynomial exceeds its largest sample by a few per cent at
 most."""
-_SHORTEST = 4.0**-4
-"""Length of the last interval about a least clearance, relative to its element. A parabola through the points there
-finds the least clearance of a smooth gap to round-off."""
+_SHORTEST = 4.0**-14
+"""Length of the last interval about a least clearance, relative to its element: sharp corners of an obstacle overlap on
+as short a piece as they are deep."""
 _SAME = 1e-13
 """Distance along a side, relative to its length, up to which two points of an element are the same."""
 _SAME_POINT = 1e-9
@@ -238,6 +238,7 @@ def with_least_clearances(sample: Sample, n_pieces: int, xi: FloatArray) -> Poin
     found, owners = [values], [np.repeat(pieces, xi.size)]
     # friction that acts across a gap has a normal component where the direction of contact turns
     is_free = np.all((values.is_free | (values.clearance > 0.0)).reshape(n_pieces, xi.size), axis=1)
+    least_overlap = _SAME * float(values.s.max(initial=0.0))
     while pieces.size:
         clearance, size = values.clearance.reshape(pieces.size, xi.size), high - low
         row, nearest = np.nonzero(_least(clearance) | ((is_free & (size == 2.0))[:, None] & _minima(clearance)))
@@ -245,7 +246,7 @@ def with_least_clearances(sample: Sample, n_pieces: int, xi: FloatArray) -> Poin
         beside, first = nearest[:, None] + np.arange(-2, 3), np.clip(nearest - 1, 0, xi.size - 3)
         bound = 2.0 * least - clearance[row[:, None], np.clip(beside, 0, xi.size - 1)].max(axis=1)
         goal = np.where(is_free[row], 0.0, least.min(initial=0.0))
-        chosen = (bound < np.minimum(0.0, goal)) & (size[row] > 2.0 * _SHORTEST)
+        chosen = (bound < np.minimum(-least_overlap, goal)) & (size[row] > 2.0 * _SHORTEST)
         row, first = row[chosen], first[chosen]
         middle, pieces, is_free = 0.5 * (high + low)[row], pieces[row], is_free[row]
         low, high = (middle + 0.5 * size[row] * xi[end] for end in (first, first + 2))
