@@ -13,6 +13,7 @@ from bemkit.contact.obstacle import Gap
 from bemkit.errors import ResultWarning, format_point
 from bemkit.formulas import ScalarField, evaluate_field
 from bemkit.geometry.mesh import BoundaryMesh
+from bemkit.geometry.neighbours import break_nodes
 from bemkit.geometry.vectors import norms
 from bemkit.operators.steklov_poincare.nodal_conditions import TractionField
 from bemkit.results.contact_table import ContactTable
@@ -80,12 +81,18 @@ def _law_jumps(law: FrictionLaw, pressure: float, points: FloatArray, is_asked: 
 def load_jumps(body: SolvedBody) -> Iterator[ResultWarning]:
     """Warn of loads, given displacements and given gaps of a body that jump inside an element.
 
-    Quadrature and interpolation take the jump to another place of the element.
+    Quadrature and interpolation take the jump to another place of the element. Of a load that varies on a single
+    element of a half-plane only the mean acts.
     """
     for part, elements in body.scene.parts_on(body.mesh):
         match part.condition:
             case Traction() | Pressure() as load:
                 kind, at = "load", load.at
+                if any(map(callable, vars(load).values())) and _has_single_element(body.mesh, elements):
+                    text = (
+                        f"Only the mean of the load acts on the element of part {part.name!r}: use more elements there."
+                    )
+                    yield ResultWarning("load on a single element", part.name, text)
             case PrescribedDisplacement() as given:
                 kind, at = "displacement", partial(_given_at, given)
             case Contact(obstacle=Gap(value=value)) if callable(value):
@@ -98,6 +105,11 @@ def load_jumps(body: SolvedBody) -> Iterator[ResultWarning]:
                 f"there into parts, each with a {kind} of its own."
             )
             yield ResultWarning(f"jump of {kind}", part.name, text)
+
+
+def _has_single_element(mesh: BoundaryMesh, elements: IntArray) -> bool:
+    """Whether an element of the surface of a half-plane has no neighbour on its part."""
+    return mesh.surface is not None and bool(break_nodes(mesh)[mesh.elements[elements]].all(axis=1).any())
 
 
 def _given_at(given: PrescribedDisplacement, points: FloatArray, normals: FloatArray) -> FloatArray:

@@ -215,7 +215,8 @@ class Surface:
         """Return the difference [-] of displacements from those by tractions and the motion far away."""
         modulus = self.measured.solved.scene.material.plane_modulus
         moved = float(np.abs(self.measured.solved.boundary.displacement).max())
-        unit = max(float(np.abs(self.force).sum()) / modulus, _IN_MOTION * moved)
+        by_force = max(float(np.abs(self.force).sum()), self.trusted_force) / modulus
+        unit = max(by_force, _IN_MOTION * moved)
         return float(np.abs(self._fitted[1]).max()) / unit if unit > 0.0 else 0.0
 
     def imbalance(self) -> float:

@@ -9,6 +9,7 @@ import numpy as np
 from bemkit.arrays import FloatArray
 from bemkit.results.contact_table import ContactTable
 from bemkit.results.solved_body import SolvedBody
+from bemkit.scene.conditions import DistributedLoad
 from bemkit.testing.independent_check.motions import strained_displacement
 
 CONTACT_LIMIT = 1e-6
@@ -37,7 +38,8 @@ class Scales:
     slipped : float [m]
         The same of the difference from the load step before.
     trusted : float [Pa]
-        Least scale of stresses: its `CONTACT_LIMIT`-th part is the round-off of tractions; see `_trusted_stress`.
+        Least scale of stresses: its `CONTACT_LIMIT`-th part is the round-off of tractions; see `_trusted_stress`. Given
+        loads that cancel on each element leave theirs.
     strained : float [Pa]
         The larger of `stress` and that of the strains: heat strains a free body without tractions.
     """
@@ -71,6 +73,7 @@ def scales_of(body: SolvedBody, before: SolvedBody | None, at_obstacles: Contact
     fields = (body.boundary.traction, at_obstacles.sigma_n, at_obstacles.sigma_t)
     largest_traction = max(largest(np.abs(each)) for each in fields)
     trusted = _trusted_stress(body, max(displacement, earlier), at_obstacles.weight)
+    trusted = max(trusted, 64.0 * EPSILON / CONTACT_LIMIT * _largest_load(body))
     stress = max(largest_traction, trusted)
     length = max(stress / modulus * diameter, 1e-6 * displacement)
     # forces inside strain a body, too, that an overlap has pushed aside and that touches nothing any more
@@ -106,6 +109,16 @@ def _trusted_stress(body: SolvedBody, displacement: float, weights: FloatArray) 
     shortest = float((weights if weights.size else body.mesh.lengths).min())
     digits = 64.0 * EPSILON * diameter / (shortest * freedom)
     return min(digits / CONTACT_LIMIT, 1e-4) * displacement / diameter * material.plane_modulus
+
+
+def _largest_load(body: SolvedBody) -> float:
+    """Return the largest given load [Pa] of a body at the ends and middles of its elements, which may cancel."""
+    mesh, xi, sizes = body.mesh, np.array([-1.0, 0.0, 1.0]), [0.0]
+    for part, elements in body.scene.parts_on(mesh):
+        if isinstance(part.condition, DistributedLoad) and elements.size:
+            points, normals = (at(elements, xi).reshape(-1, 2) for at in (mesh.points, mesh.normals_at))
+            sizes.append(float(np.abs(part.condition.at(points, normals)).max()))
+    return max(sizes)
 
 
 def largest(values: FloatArray) -> float:

@@ -226,3 +226,22 @@ def test_a_half_plane_among_several_bodies_is_checked_too() -> None:
     moved = replace(result, boundary=replace(result.boundary, displacement=displacement))
     seen = violations_of(replace(solution, bodies={**solution.bodies, "base": moved}))
     assert seen.faults == ("elasticity",)
+
+
+@pytest.mark.parametrize(("elements", "is_warned"), [(18, True), (72, False)])
+def test_half_planes_say_where_only_the_mean_of_a_load_acts(elements: int, is_warned: bool) -> None:
+    """A load that has no mean would vanish without a word; the check knows how large its round-off is."""
+    load = bk.Part("load", bk.Traction(y=bk.Expression("x - 1 / 36")), where=bk.Expression("x > 0 and x < 1 / 18"))
+    contact = bk.Part("contact", bk.Contact(bk.Gap(1.0)), where=bk.Expression("x < -2 / 9"))
+    scene = bk.Scene(
+        title="twisted",
+        shape=bk.PeriodicHalfPlane(1.0, -0.5),
+        material=bk.Material(1e3, 0.3),
+        parts=(load, contact),
+        mesh=bk.MeshOptions(elements),
+    )
+    solution = bk.run(scene)
+    found = [warning.text for warning in solution.warnings if warning.kind == "load on a single element"]
+    text = "Only the mean of the load acts on the element of part 'load': use more elements there."
+    assert found == [text] * is_warned
+    assert violations_of(solution).is_good
