@@ -22,6 +22,7 @@ def test_scenes_are_drawn_alike(n_bodies: int) -> None:
     assert drawn_scene(n_bodies, 7, 3)[0] != drawn_scene(n_bodies, 7, 4)[0]
 
 
+@pytest.mark.slow
 def test_true_errors_of_a_known_problem() -> None:
     """Example 1 on quadratic elements, against the same mesh with all elements bisected twice."""
     coarse = bk.run(paper(1, bk.Galerkin(2), bk.MeshOptions(elements=40)))

@@ -24,6 +24,7 @@ def call(*arguments: str) -> int:
     return caught.value.code
 
 
+@pytest.mark.slow
 def test_the_animation_may_be_named_where_pictures_are(capsys) -> None:
     assert call("run", "paper-1", *SMALL, "-q", "--plot", "figures", "--what", "moonlight") == 2
     assert "moonlight" in capsys.readouterr().err

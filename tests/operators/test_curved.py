@@ -302,6 +302,7 @@ def test_the_boundary_is_seen_under_half_a_turn(name: str) -> None:
     np.testing.assert_allclose(seen[1], 0.0, atol=1e-12 * mesh.lengths.max())
 
 
+@pytest.mark.slow
 def test_tiny_curved_elements_leave_no_cracks_between_them() -> None:
     mesh = discretise(Sector(1.0, -90.0, 0.0).outline(), n_elements=16)
     for _ in range(25):

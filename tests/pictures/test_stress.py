@@ -144,6 +144,7 @@ def test_the_weight_counts() -> None:
     )
 
 
+@pytest.mark.slow
 def test_bodies_without_an_end_are_drawn_as_far_as_the_frame() -> None:
     scene = bk.Scene(
         title="hole",

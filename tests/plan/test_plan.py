@@ -275,6 +275,7 @@ def test_a_million_elements_are_refused_before_the_mesh_is_made(
     assert max(filter(None, built)) <= 5000  # small ones, by which the large one is judged
 
 
+@pytest.mark.slow
 def test_the_memory_of_large_meshes_is_told_from_a_small_one(memory: Callable[[float], None]) -> None:
     scene = bk.load_scene("paper-1")
     # collocation compares the distances of all elements, which takes seconds

@@ -61,6 +61,7 @@ def test_tractions_at_right_angles_are_bounded_unless_something_held_meets_somet
     assert leading_exponent(RIGHT, outgoing, incoming, kappa(0.3)) is None
 
 
+@pytest.mark.slow
 @given(frictions, st.floats(0.0, 0.5))
 def test_the_edges_of_a_punch_that_slides(friction: float, poisson_ratio: float) -> None:
     """Tractions go like r^(-1/2 + beta) at one edge and r^(-1/2 - beta) at the other [Johnson1985]."""

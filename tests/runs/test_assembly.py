@@ -492,6 +492,7 @@ def test_stiff_bodies_between_soft_ones_touch_each_other() -> None:
         np.testing.assert_allclose(one, other, rtol=1e-5, atol=1e-5 * np.abs(one).max())
 
 
+@pytest.mark.slow
 def test_round_off_of_a_long_way_is_refined_on_graded_meshes() -> None:
     """A plate moves fifty times as far to its pin as both deform; its support carries more than the contact."""
     elastic = bk.Material(1.0, 0.3)

@@ -81,6 +81,7 @@ def test_a_load_history_is_one_scene_and_one_result(tmp_path) -> None:  # type: 
     np.testing.assert_allclose(bk.interior_fields(read.bodies["block 0-0"]).stress(points), inside, rtol=1e-12)
 
 
+@pytest.mark.slow
 def test_steps_that_are_reached_are_kept_in_the_result_of_a_scene() -> None:
     assembly = replace(wall(2, 2, push=True), load_factors=(1.0, 5.0))  # friction holds 2.4
     solution = bk.run(assembly)

@@ -255,6 +255,7 @@ def test_friction_grows_with_the_speed(duration: float) -> None:
     assert -last.force_tangential / last.force_normal == pytest.approx(expected, rel=1e-9)
 
 
+@pytest.mark.slow
 def test_a_bound_in_the_result_is_that_of_the_slip() -> None:
     law = bk.RateStrengthening(0.1, 0.02, 0.01)
     steps = (LOOP.steps[0], bk.Step(2.0, {SHEAR: "0.05*(t - 1)"}, increments=4))

@@ -97,6 +97,7 @@ def test_the_disc_between_plates_has_its_spectral_solution() -> None:
     assert -solution.contact.sigma_n[0] == pytest.approx(exact.pressure(np.zeros(1))[0], rel=1e-4)
 
 
+@pytest.mark.slow
 def test_a_stick_zone_of_one_node_is_resolved() -> None:
     """The whole body of Example 2: on the first mesh a single node sticks, between two zones that slip."""
     first, *_, last = run_adaptive(square(mesh=bk.MeshOptions(accuracy=1e-2)))

@@ -43,6 +43,7 @@ def spurious_shear(degree: int, length: float, *, swap: bool = False) -> tuple[f
     return float(np.abs(state.sigma_t).max() / -state.sigma_n.min()), float(pair.body.weights @ -state.sigma_n)
 
 
+@pytest.mark.slow
 def test_pressing_alone_leaves_no_shear() -> None:
     """With the normals of one side alone it is 0.04 to 0.11 on any mesh."""
     shear, force = spurious_shear(2, 0.005)

@@ -67,6 +67,7 @@ def test_the_word_errors_may_be_left_out_and_the_other_commands_stay() -> None:
     assert call("study", "solutions", "paper-1", "--elements", "20", "--starts", "1").return_value == 0
 
 
+@pytest.mark.slow
 def test_rows_in_the_file_are_not_computed_again_and_others_are_added(
     tmp_path: Path,
 ) -> None:
@@ -204,6 +205,7 @@ def test_narrow_terminals_show_less_and_nothing_is_cut(capsys: pytest.CaptureFix
         assert "absent" in shown
 
 
+@pytest.mark.slow
 def test_progress_goes_to_standard_error(capsys: pytest.CaptureFixture[str]) -> None:
     terminal = Console(stderr=True, force_terminal=True)
     runs = all_runs(bk.load_scene("paper-1"), [bk.Galerkin(1)], [uniform((20,))], [bk.SemismoothNewton()])

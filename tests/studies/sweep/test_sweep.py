@@ -87,6 +87,7 @@ def test_rows_are_what_runs_give_and_bodies_are_made_once(
     check_rows(scene, table)
 
 
+@pytest.mark.slow
 def test_load_histories_begin_at_rest_in_every_row(bodies_made: list[str]) -> None:
     scene = replace(SCENE, load_factors=(0.5, 1.0, 0.7))
     table = bk.sweep(scene, {FRICTION: [0.3, 0.5], "load_factors[2]": [0.8, 0.2]})
