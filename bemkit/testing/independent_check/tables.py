@@ -66,7 +66,10 @@ def resultant_mismatch(solution: Solution, contacts: Iterable[MeasuredContact]) 
 
 
 def _at_held_nodes(contact: MeasuredContact, contacts: Iterable[MeasuredContact]) -> FloatArray:
-    """Return the force (2,) [N/m] of a fixed obstacle at nodes without contact that supports hold, along its frame."""
+    """Return the force (2,) [N/m] of a fixed obstacle at nodes without contact that supports hold, along its frame.
+
+    Beside corners between two contact parts tractions have the size that elements state; see `nodal_mismatch`.
+    """
     body, boundary, total = contact.owner.body, contact.owner.body.boundary, np.zeros(2)
     if contact.facing is None or contact.pair is not None:
         return total
@@ -75,11 +78,13 @@ def _at_held_nodes(contact: MeasuredContact, contacts: Iterable[MeasuredContact]
     elements = body.solved.mesh.part(contact.owner.part)
     nodes, traction = boundary.nodes[elements], np.zeros_like(body.solved.boundary.points)
     traction[contact.nodes] = contact.forces / contact.table.weight[:, None]
-    is_known = np.isin(nodes, contact.nodes)
+    is_known, beside_corners = np.isin(nodes, contact.nodes), _beside_corners(body)
     for k in np.flatnonzero(np.isin(nodes, held).any(axis=1) & is_known.any(axis=1)).tolist():
         own = slice(k, k + 1)
         values = _continued(traction[nodes[own]], is_known[own], nodes[own])[0]
         lengths = boundary.basis[elements[k]] @ boundary.shares[elements[k]]
+        if beside_corners[elements[k]] and (mean := lengths @ values / lengths.sum()).any():
+            values = values * (body.solved.boundary.traction[elements[k]] @ mean) / (mean @ mean)
         force = (np.isin(nodes[k], held) * lengths) @ values
         # along the frame of the nearest contact node of the element; others may lie across a thin body
         beside = np.flatnonzero(np.isin(contact.nodes, nodes[k]))
