@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -20,7 +20,7 @@ def check_apart(scene: Scene, bodies: Sequence[PlacedBody]) -> None:
     """Check that no two bodies overlap by more than the interference of the contacts between them.
 
     Elastic bodies but for half-planes are compared with each other, with rigid bodies and, beside the parts that touch
-    them, with fixed obstacles, both of finite size.
+    them, with fixed obstacles of any body, both of finite size.
 
     Raises
     ------
@@ -44,25 +44,31 @@ def check_apart(scene: Scene, bodies: Sequence[PlacedBody]) -> None:
                 k, names = int(gap.argmin()), (body.name, rigid.name)
                 if -gap[k] > ROUND_OFF * body.mesh.diameter + _interference(scene, names):
                     raise _overlap(names, -float(gap[k]), points[k])
-    for body, outline in zip(finite, outlines, strict=True):
-        _check_obstacles(body, outline)
+    for obstacle, touching in finite_obstacles({body.name: body.scene for body in finite}):
+        for body, outline in zip(finite, outlines, strict=True):
+            _check_obstacle(obstacle, touching, body, outline)
 
 
-def _check_obstacles(body: PlacedBody, outline: Polyline) -> None:
-    """Check that fixed obstacles of finite size overlap a body nowhere deeper than on the parts that touch them."""
-    points = outline.points.reshape(-1, 2)
-    for obstacle, parts in finite_obstacles(body.scene):
-        gap = obstacle.gap(points, points)
-        touches = np.isin(outline.elements, np.concatenate([body.mesh.part(part) for part in parts]))
-        touches = np.repeat(touches, outline.points.shape[1])
-        beside = np.where(touches, np.inf, gap)
-        depth, stated = -float(beside.min()), -float(gap[touches].min(initial=0.0))
-        if depth > stated + ROUND_OFF * body.mesh.diameter:
-            x, y = points[int(beside.argmin())]
-            raise OverlapError(
-                f"the obstacle of part {parts[0]!r} overlaps the body by {depth:.4g} beside this part, at ({x:.6g}, "
-                f"{y:.6g}): move it away, or let the part include all that may touch it"
-            )
+def _check_obstacle(
+    obstacle: Obstacle, touching: Mapping[str, Sequence[str]], body: PlacedBody, line: Polyline
+) -> None:
+    """Check that a fixed obstacle overlaps a body nowhere deeper than on the parts that touch it."""
+    points, parts = line.points.reshape(-1, 2), touching.get(body.name, [])
+    gap = obstacle.gap(points, points)
+    elements = np.concatenate([np.zeros(0, np.intp), *(body.mesh.part(part) for part in parts)])
+    touches = np.repeat(np.isin(line.elements, elements), line.points.shape[1])
+    beside = np.where(touches, np.inf, gap)
+    depth, stated = -float(beside.min()), -float(gap[touches].min(initial=0.0))
+    if depth > stated + ROUND_OFF * body.mesh.diameter:
+        (x, y), (owner, (first, *_)) = points[int(beside.argmin())], next(iter(touching.items()))
+        whose, where = f"{first!r} of body {owner!r}", f"body {body.name!r} by {depth:.4g}"
+        remedy = "let a part of it touch it, too"
+        if parts:
+            whose, where = f"{parts[0]!r}", f"the body by {depth:.4g} beside this part"
+            remedy = "let the part include all that may touch it"
+        raise OverlapError(
+            f"the obstacle of part {whose} overlaps {where}, at ({x:.6g}, {y:.6g}): move it away, or {remedy}"
+        )
 
 
 def is_finite(obstacle: Obstacle) -> bool:
@@ -70,16 +76,16 @@ def is_finite(obstacle: Obstacle) -> bool:
     return isinstance(obstacle, RigidCircle | RigidPolygon)
 
 
-def finite_obstacles(scene: BodyScene) -> list[tuple[Obstacle, list[str]]]:
-    """Return the different fixed obstacles of finite size of a body, each with the parts that may touch it."""
-    found: list[tuple[Obstacle, list[str]]] = []
-    for part, obstacle in scene.obstacles.items():
-        if is_finite(obstacle):
-            parts = next((known for other, known in found if other == obstacle), None)
-            if parts is None:
-                found.append((obstacle, [part]))
-            else:
-                parts.append(part)
+def finite_obstacles(scenes: Mapping[str, BodyScene]) -> list[tuple[Obstacle, dict[str, list[str]]]]:
+    """Return the different fixed obstacles of finite size of bodies, each with the parts that may touch it, by body."""
+    found: list[tuple[Obstacle, dict[str, list[str]]]] = []
+    for name, scene in scenes.items():
+        for part, obstacle in scene.obstacles.items():
+            if is_finite(obstacle):
+                touching = next((known for other, known in found if other == obstacle), None)
+                if touching is None:
+                    found.append((obstacle, touching := {}))
+                touching.setdefault(name, []).append(part)
     return found
 
 

@@ -33,8 +33,8 @@ def overlap_warnings(solution: Solution) -> Iterator[ResultWarning]:
     bodies = {name: body for name, body in solution.bodies.items() if body.mesh.surface is None}
     outlines = {name: _displaced(body) for name, body in bodies.items()}
     yield from _of_bodies(solution, outlines)
+    yield from _of_fixed_obstacles(solution, outlines)
     for name, outline in outlines.items():
-        yield from _of_fixed_obstacles(solution, name, outline)
         yield from _of_rigid_bodies(solution, name, outline)
 
 
@@ -55,18 +55,21 @@ def _of_bodies(solution: Solution, outlines: dict[str, Polyline]) -> Iterator[Re
             yield _between(solution, f"Bodies {one!r} and {two!r}", f"{one} / {two}", depth, place)
 
 
-def _of_fixed_obstacles(solution: Solution, name: str, outline: Polyline) -> Iterator[ResultWarning]:
-    for obstacle, parts in finite_obstacles(solution.bodies[name].scene):
-        points = _points_beside(solution, name, parts, outline)
-        depth, place = _deepest(obstacle, points, points)
-        if depth > outline.tolerance + _least_overlap(solution, (name,)):
-            yield ResultWarning(
-                "overlap beside contacts",
-                f"{name} {parts[0]}".strip(),
-                f"The obstacle of part {parts[0]!r} overlaps {f'body {name!r}' if name else 'the body'} by "
-                f"{_depth_at(solution, depth, place)}, beside this part: let the part include all that may touch it.",
-                depth,
-            )
+def _of_fixed_obstacles(solution: Solution, outlines: dict[str, Polyline]) -> Iterator[ResultWarning]:
+    for obstacle, touching in finite_obstacles({name: solution.bodies[name].scene for name in outlines}):
+        owner, (part, *_) = next(iter(touching.items()))
+        for name, outline in outlines.items():
+            parts = touching.get(name, [])
+            points = _points_beside(solution, name, parts, outline)
+            depth, place = _deepest(obstacle, points, points)
+            if depth > outline.tolerance + _least_overlap(solution, (name,)):
+                whose, where = f"{part!r} of body {owner!r}", f"body {name!r}"
+                at, remedy = _depth_at(solution, depth, place), "let a part of it touch it, too"
+                if parts:
+                    whose, where = f"{parts[0]!r}", where if name else "the body"
+                    at, remedy = f"{at}, beside this part", "let the part include all that may touch it"
+                text = f"The obstacle of part {whose} overlaps {where} by {at}: {remedy}."
+                yield ResultWarning("overlap beside contacts", f"{name} {(parts or [part])[0]}".strip(), text, depth)
 
 
 def _of_rigid_bodies(solution: Solution, name: str, outline: Polyline) -> Iterator[ResultWarning]:

@@ -78,3 +78,16 @@ def test_an_obstacle_inside_of_a_body_beside_the_part_that_touches_it_is_refused
     message = r"obstacle of part 'tread' overlaps the body by 0\.\d+ beside this part, at \(2, 1\.5"
     with pytest.raises(OverlapError, match=message) if is_refused else nullcontext():
         prepare(scene)
+
+
+@pytest.mark.parametrize(("x", "is_refused"), [(1.7, True), (2.1, False)])
+def test_an_obstacle_of_one_body_inside_of_another_is_refused(x: float, is_refused: bool) -> None:
+    scene = blocks(-0.1)
+    side = bk.Part("side", bk.Contact(bk.RigidCircle((x + 1.5, 1.6), 0.2)), ("right",))
+    neighbour = bk.Body(name="third", shape=bk.Rectangle(0.5, 0.5, (2.75, 1.3)), material=STEEL)
+    neighbour = replace(neighbour, parts=(bk.Part("top", bk.Clamped(), ("top",)),))
+    lower, upper = scene.bodies
+    scene = replace(scene, bodies=(replace(lower, parts=(*lower.parts, side)), upper, neighbour))
+    message = r"obstacle of part 'side' of body 'lower' overlaps body 'third' by 0\.\d+, at \(3\.\d+, 1\.\d+\): move"
+    with pytest.raises(OverlapError, match=message) if is_refused else nullcontext():
+        prepare(scene)

@@ -119,3 +119,17 @@ def test_a_gap_that_a_contact_adds_is_no_overlap(gap: float) -> None:
         law=bk.Coulomb(0.3), discretisation=bk.Galerkin(1),
     )  # fmt: skip
     assert not [warning for warning in bk.run(scene).warnings if warning.kind == "overlap beside contacts"]
+
+
+def test_obstacles_of_one_body_that_overlap_another_are_warned_of() -> None:
+    """The second block is pushed into the disc that the first one may touch."""
+    scene = pressed(0.1, 0.05, is_rigid=False)
+    (block,) = scene.bodies
+    moved = bk.Part("right", bk.PrescribedDisplacement(x=-0.05, y=0.0), ("right",))
+    other = bk.Body(name="other", shape=bk.Rectangle(0.2, 0.2, (1.001, 0.9)), material=STEEL, parts=(moved,))
+    still = replace(
+        block, parts=tuple(replace(p, condition=bk.Clamped()) if p.name == "base" else p for p in block.parts)
+    )
+    solution = bk.run(replace(scene, bodies=(still, other)))
+    texts = [warning.text for warning in solution.warnings if warning.kind == "overlap beside contacts"]
+    assert any("The obstacle of part 'top' of body 'block' overlaps body 'other' by" in text for text in texts), texts
