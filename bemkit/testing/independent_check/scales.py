@@ -33,13 +33,12 @@ class Scales:
     coordinates : float [m]
         Round-off of lengths that are differences of coordinates.
     turned : float [m]
-        Round-off of displacement components: the largest displacement times the error of normals of curved elements,
-        which are differentiated from coordinates.
+        Round-off of displacement components: the largest displacement times the error of normals, which are
+        differentiated from coordinates.
     slipped : float [m]
         The same of the difference from the load step before.
     trusted : float [Pa]
-        Least scale of stresses: its `CONTACT_LIMIT`-th part is the round-off of tractions; see `_trusted_stress`. Given
-        loads that cancel on each element leave theirs.
+        Least scale of stresses: its `CONTACT_LIMIT`-th part is the round-off of tractions; see `_trusted_stress`.
     strained : float [Pa]
         The larger of `stress` and that of the strains: heat strains a free body without tractions.
     """
@@ -73,7 +72,11 @@ def scales_of(body: SolvedBody, before: SolvedBody | None, at_obstacles: Contact
     fields = (body.boundary.traction, at_obstacles.sigma_n, at_obstacles.sigma_t)
     largest_traction = max(largest(np.abs(each)) for each in fields)
     trusted = _trusted_stress(body, max(displacement, earlier), at_obstacles.weight)
-    trusted = max(trusted, 64.0 * EPSILON / CONTACT_LIMIT * _largest_load(body))
+    # tractions that loads leave which cancel on each element, or coordinates of bodies that lie far away
+    away = max(float(farthest) - 2.0 * diameter, 0.0) / float(body.mesh.lengths.min())
+    round_off = EPSILON * max(64.0 * _largest_load(body), away * modulus)
+    if largest_traction <= round_off:
+        trusted = max(trusted, round_off / CONTACT_LIMIT)
     stress = max(largest_traction, trusted)
     length = max(stress / modulus * diameter, 1e-6 * displacement)
     # forces inside strain a body, too, that an overlap has pushed aside and that touches nothing any more
@@ -84,6 +87,8 @@ def scales_of(body: SolvedBody, before: SolvedBody | None, at_obstacles: Contact
     curved = body.mesh.lengths[~body.mesh.is_straight]
     # derivatives of 14 points amplify their errors by up to 14^2 at the ends of an element
     error = 1e-12 + (200.0 * EPSILON * float(farthest) / float(curved.min()) if curved.size else 0.0)
+    # ends of straight ones are differences of coordinates far away
+    error += 4.0 * EPSILON * float(farthest) / float(body.mesh.lengths.min())
     strained = float(np.abs(strained_displacement(body)).max()) / diameter * modulus
     return Scales(
         stress=stress or 1.0,
