@@ -17,7 +17,7 @@ from bemkit.arrays import FloatArray
 from bemkit.errors import InputError
 from bemkit.formulas import Expression, ExpressionError, ScalarField
 from bemkit.scene.body_forces import scaled_body_force
-from bemkit.scene.conditions import with_fields
+from bemkit.scene.conditions import Contact, with_fields
 from bemkit.scene.scene import Scene
 from bemkit.scene.steps import Step, TimeValue
 
@@ -98,11 +98,24 @@ def _at_time(scene: Scene, changes: Mapping[str, Any], factor: TimeValue, time: 
     from bemkit.scene.keys import Key, with_value
 
     for place, value in changes.items():
+        if place.partition(".")[0] == "law" and not _has_contact_of_its_law(scene):
+            raise InputError(
+                f"{place} changes, but every contact has a law of its own: change these, such as "
+                "parts.<name>.condition.law or contacts[0].law"
+            )
         scene = with_value(scene, Key(place), _value(value, time))
     scaled = _value(factor, time)
     if not isinstance(scaled, int | float) or not math.isfinite(scaled):
         raise InputError(f"load_factor is {scaled!r} at t = {time:g}: give a number, or a formula of t only")
     return replace(with_scaled_loads(scene, float(scaled)), steps=(Step(time),))
+
+
+def _has_contact_of_its_law(scene: Scene) -> bool:
+    """Whether a contact, or one that may be found, takes the law of the scene."""
+    parts = [*scene.parts, *(part for body in scene.bodies for part in body.parts)]
+    contacts = [part.condition for part in parts if isinstance(part.condition, Contact)]
+    found = () if scene.touching is None else (scene.touching,)
+    return any(each.law is None for each in (*contacts, *scene.contacts, *found))
 
 
 def _value(value: Any, time: float) -> Any:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pickle
+from contextlib import nullcontext
 from dataclasses import replace
 from typing import Any
 
@@ -108,6 +109,18 @@ def test_steps_in_scene_files() -> None:
 def test_steps_that_fit_nowhere_are_named(steps: tuple[bk.Step, ...], message: str) -> None:
     with pytest.raises(bk.InputError, match=message):
         bk.run(replace(SCENE, steps=steps))
+
+
+@pytest.mark.parametrize("law", [bk.Coulomb(0.5), None])
+def test_steps_change_no_law_that_no_contact_takes(law: bk.FrictionLaw | None) -> None:
+    parts = tuple(
+        replace(part, condition=replace(part.condition, law=law)) if isinstance(part.condition, bk.Contact) else part
+        for part in SCENE.parts
+    )
+    scene = replace(SCENE, parts=parts, steps=(bk.Step(1.0), bk.Step(2.0, {"law.friction_coefficient": 0.1})))
+    message = r"steps\[1\]: law.friction_coefficient changes, but every contact has a law of its own: change these"
+    with nullcontext() if law is None else pytest.raises(bk.InputError, match=message):
+        load_steps(scene)
 
 
 @pytest.mark.parametrize(
