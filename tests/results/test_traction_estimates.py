@@ -258,7 +258,7 @@ def test_ends_of_contact_at_a_support_count(wall: str) -> None:
 
 @pytest.mark.parametrize("n_elements", [40, 160])
 def test_linear_elements_on_arcs_miss_a_part_of_what_presses_them(n_elements: int) -> None:
-    """A ring on a thicker mandrel [Timoshenko1970]: the nodes are all alike, and only the chords between are wrong."""
+    """A ring on a thicker mandrel: the nodes are all alike, and only the chords between are wrong."""
     ring = bk.Scene(
         title="Ring on a mandrel",
         shape=bk.Ring(1.0, 2.0),
