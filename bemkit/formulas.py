@@ -172,6 +172,11 @@ def _not_finite(values: FloatArray, x: FloatArray, y: FloatArray, name: str, rem
     return ExpressionError(f"{name} is {value} at (x, y) = ({place[0]:.6g}, {place[1]:.6g}); {remedy}")
 
 
+def has_fields(owner: object) -> bool:
+    """Whether attributes of an object, such as a load or a gap, are formulas or functions of the coordinates."""
+    return any(map(callable, vars(owner).values()))
+
+
 def check_field(value: object, name: str) -> None:
     """Refuse what is neither a finite number, nor a formula for a number, nor a function.
 

@@ -11,7 +11,7 @@ from bemkit.arrays import BoolArray, FloatArray, IntArray
 from bemkit.contact.laws import FrictionLaw
 from bemkit.contact.obstacle import Gap
 from bemkit.errors import ResultWarning, format_point
-from bemkit.formulas import ScalarField, evaluate_field
+from bemkit.formulas import ScalarField, evaluate_field, has_fields
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.neighbours import break_nodes
 from bemkit.geometry.vectors import norms
@@ -52,7 +52,7 @@ def law_jumps(contact: ContactTable, laws: Mapping[str, FrictionLaw]) -> Iterato
         pressure = float(np.abs(contact.sigma_n[rows]).max(initial=0.0))
         if rows.size < 2 or pressure == 0.0:
             continue
-        points = np.stack([contact.x[rows], contact.y[rows]], axis=1)
+        points = contact.points[rows]
         is_pressed, arc = contact.sigma_n[rows] != 0.0, np.diff(contact.s[rows])
         # between two pieces of a contact the arc length stays, and nothing is blurred
         is_on_piece = norms(np.diff(points, axis=0)) <= (1.0 + _AT_NODE) * arc
@@ -86,14 +86,14 @@ def load_jumps(body: SolvedBody) -> Iterator[ResultWarning]:
     """
     for part, elements in body.scene.parts_on(body.mesh):
         match part.condition:
-            case Traction() | Pressure() as load:
+            case (Traction() | Pressure()) as load if has_fields(load):
                 kind, at = "load", load.at
-                if any(map(callable, vars(load).values())) and _has_single_element(body.mesh, elements):
+                if _has_single_element(body.mesh, elements):
                     text = (
                         f"Only the mean of the load acts on the element of part {part.name!r}: use more elements there."
                     )
                     yield ResultWarning("load on a single element", part.name, text)
-            case PrescribedDisplacement() as given:
+            case PrescribedDisplacement() as given if has_fields(given):
                 kind, at = "displacement", partial(_given_at, given)
             case Contact(obstacle=Gap(value=value)) if callable(value):
                 kind, at = "gap", partial(_gap_at, value)

@@ -108,8 +108,7 @@ def _least_overlap(solution: Solution, names: Collection[str], pairs: Collection
     """Return the depth [m] that may be round-off, the error of small displacements, or a gap that contacts add."""
     bodies, table = [solution.bodies[name] for name in names], solution.contact
     moved = max(float(np.abs(body.boundary.displacement).max()) for body in bodies)
-    points = np.stack([table.x, table.y], axis=1)
-    gaps = (pair.gap_at(points[table.rows(pair.name)]).max(initial=0.0) for pair in pairs)
+    gaps = (pair.gap_at(table.points[table.rows(pair.name)]).max(initial=0.0) for pair in pairs)
     added = max(map(float, gaps), default=0.0)
     return ROUND_OFF * min(body.mesh.diameter for body in bodies) + LEAST_OVERLAP * moved + added
 

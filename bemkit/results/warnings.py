@@ -12,6 +12,7 @@ from bemkit.arrays import BoolArray, FloatArray
 from bemkit.contact.laws import FrictionLaw, LawOfCoefficients
 from bemkit.contact.obstacle import Gap, RigidHalfPlane
 from bemkit.errors import ResultWarning, first_of_each_kind
+from bemkit.formulas import has_fields
 from bemkit.geometry.local_values import values_on_elements
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.neighbours import break_nodes
@@ -23,7 +24,7 @@ from bemkit.results.between_nodes import BetweenNodes
 from bemkit.results.contact_table import ContactTable, free_contacts
 from bemkit.results.solution import Solution
 from bemkit.results.solved_body import SolvedBody
-from bemkit.scene.conditions import Clamped, Contact, PrescribedDisplacement, Roller
+from bemkit.scene.conditions import Clamped, DistributedLoad, PrescribedDisplacement, Roller
 from bemkit.scene.unit_names import UnitNames, amount
 
 LARGEST_ERROR = 0.05
@@ -377,9 +378,8 @@ def _law_jumps(contact: ContactTable, laws: Mapping[str, FrictionLaw]) -> Iterat
 
 def _load_jumps(body: SolvedBody) -> Iterator[ResultWarning]:
     """Warn of jumps of loads, given displacements and gaps that are formulas or functions."""
-    gaps = (obstacle for obstacle in body.scene.obstacles.values() if isinstance(obstacle, Gap))
-    loads = (part.condition for part in body.scene.parts if not isinstance(part.condition, Contact))
-    if any(callable(value) for each in chain(gaps, loads) for value in vars(each).values()):
+    given = (*body.scene.obstacles.values(), *(part.condition for part in body.scene.parts))
+    if any(has_fields(each) for each in given if isinstance(each, Gap | DistributedLoad | PrescribedDisplacement)):
         from bemkit.results.jumps import load_jumps
 
         yield from load_jumps(body)

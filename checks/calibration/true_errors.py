@@ -54,7 +54,7 @@ def _tractions_at(solution: Solution, contact: str, places: Located) -> FloatArr
     table = solution.contact
     body, rows = solution.bodies[solution.contact_sides[contact][0].body], table.rows(contact)
     space = space_of(body)
-    tree = KDTree(np.column_stack([table.x, table.y])[rows])
+    tree = KDTree(table.points[rows])
     distances, nearest = tree.query(dof_points(space))  # on the contact boundary the node itself, unless it is held
     at_dofs = np.column_stack([table.sigma_n, table.sigma_t])[rows][nearest][space.element_dofs]
     is_known, elements = distances <= _SAME * body.mesh.diameter, np.arange(body.mesh.n_elements)

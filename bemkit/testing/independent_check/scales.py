@@ -73,7 +73,8 @@ def scales_of(body: SolvedBody, before: SolvedBody | None, at_obstacles: Contact
     largest_traction = max(largest(np.abs(each)) for each in fields)
     trusted = _trusted_stress(body, max(displacement, earlier), at_obstacles.weight)
     # tractions that loads leave which cancel on each element, or coordinates of bodies that lie far away
-    away = max(float(farthest) - 2.0 * diameter, 0.0) / float(body.mesh.lengths.min())
+    shortest = float(body.mesh.lengths.min())
+    away = max(float(farthest) - 2.0 * diameter, 0.0) / shortest
     round_off = EPSILON * max(64.0 * _largest_load(body), away * modulus)
     if largest_traction <= round_off:
         trusted = max(trusted, round_off / CONTACT_LIMIT)
@@ -88,7 +89,7 @@ def scales_of(body: SolvedBody, before: SolvedBody | None, at_obstacles: Contact
     # derivatives of 14 points amplify their errors by up to 14^2 at the ends of an element
     error = 1e-12 + (200.0 * EPSILON * float(farthest) / float(curved.min()) if curved.size else 0.0)
     # ends of straight ones are differences of coordinates far away
-    error += 4.0 * EPSILON * float(farthest) / float(body.mesh.lengths.min())
+    error += 4.0 * EPSILON * float(farthest) / shortest
     strained = float(np.abs(strained_displacement(body)).max()) / diameter * modulus
     return Scales(
         stress=stress or 1.0,
