@@ -86,6 +86,11 @@ def break_nodes(mesh: BoundaryMesh) -> BoolArray:
     return read_only(corner_nodes(mesh) | changes)
 
 
+def lone_elements(mesh: BoundaryMesh) -> BoolArray:
+    """Return the (n_elements,) mask of elements with a corner or an end of a part at both ends."""
+    return np.asarray(break_nodes(mesh)[mesh.elements].all(axis=1))
+
+
 def corner_nodes(mesh: BoundaryMesh, angle: float = 1e-6) -> BoolArray:
     """Return which nodes are corners.
 

@@ -19,7 +19,7 @@ import numpy as np
 from bemkit.arrays import BoolArray, FloatArray
 from bemkit.geometry.local_values import values_on_elements
 from bemkit.geometry.mesh import BoundaryMesh
-from bemkit.geometry.neighbours import break_nodes
+from bemkit.geometry.neighbours import break_nodes, lone_elements
 from bemkit.geometry.spaces import BoundarySpace, ConstantSpace, dof_points
 from bemkit.geometry.symmetry.images import reflected_to_whole
 from bemkit.operators.rigid_modes import without_motion
@@ -312,7 +312,7 @@ def blind_elements(mesh: BoundaryMesh, degree: int) -> BoolArray:
     """
     whole = mesh.whole
     if degree == 0:
-        is_blind = np.asarray(break_nodes(whole)[whole.elements].all(axis=1))
+        is_blind = lone_elements(whole)
     else:
         ones = 1.0 + _second_differences(whole, np.zeros((whole.n_elements, 2)))
         is_blind = np.isnan(ones) & (_extrapolated_to_ends(whole, ones, of_nodes=False) == 0.0)

@@ -13,7 +13,7 @@ from bemkit.contact.obstacle import Gap
 from bemkit.errors import ResultWarning, format_point
 from bemkit.formulas import ScalarField, evaluate_field, has_fields
 from bemkit.geometry.mesh import BoundaryMesh
-from bemkit.geometry.neighbours import break_nodes
+from bemkit.geometry.neighbours import lone_elements
 from bemkit.geometry.vectors import norms
 from bemkit.operators.steklov_poincare.nodal_conditions import TractionField
 from bemkit.results.contact_table import ContactTable
@@ -88,7 +88,7 @@ def load_jumps(body: SolvedBody) -> Iterator[ResultWarning]:
         match part.condition:
             case (Traction() | Pressure()) as load if has_fields(load):
                 kind, at = "load", load.at
-                if _has_single_element(body.mesh, elements):
+                if body.mesh.surface is not None and lone_elements(body.mesh)[elements].any():
                     text = (
                         f"Only the mean of the load acts on the element of part {part.name!r}: use more elements there."
                     )
@@ -105,11 +105,6 @@ def load_jumps(body: SolvedBody) -> Iterator[ResultWarning]:
                 f"there into parts, each with a {kind} of its own."
             )
             yield ResultWarning(f"jump of {kind}", part.name, text)
-
-
-def _has_single_element(mesh: BoundaryMesh, elements: IntArray) -> bool:
-    """Whether an element of the surface of a half-plane has no neighbour on its part."""
-    return mesh.surface is not None and bool(break_nodes(mesh)[mesh.elements[elements]].all(axis=1).any())
 
 
 def _given_at(given: PrescribedDisplacement, points: FloatArray, normals: FloatArray) -> FloatArray:

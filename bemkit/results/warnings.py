@@ -15,7 +15,7 @@ from bemkit.errors import ResultWarning, first_of_each_kind
 from bemkit.formulas import has_fields
 from bemkit.geometry.local_values import values_on_elements
 from bemkit.geometry.mesh import BoundaryMesh
-from bemkit.geometry.neighbours import break_nodes
+from bemkit.geometry.neighbours import lone_elements
 from bemkit.geometry.vectors import norms
 from bemkit.model.contacts import may_overlap
 from bemkit.operators.linear_solvers import Tag
@@ -172,7 +172,7 @@ def _without_estimate(body: SolvedBody) -> Iterator[ResultWarning]:
     if not discretisation.estimates_error or body.coefficient_errors is not None:
         return  # elements of high degree are judged by themselves
     whole = body.mesh.whole
-    is_alone = break_nodes(whole)[whole.elements].all(axis=1)
+    is_alone = lone_elements(whole)
     if (share := whole.lengths[is_alone].sum() / whole.lengths.sum()) > LARGEST_SHARE_ALONE:
         yield ResultWarning(
             "single elements",
