@@ -14,6 +14,8 @@ if TYPE_CHECKING:
 
 _MOST_OF_A_KIND = 3
 """Largest number of warnings of one kind that are listed."""
+_ROUND_OFF = 1e-9
+"""Coordinate that is written as zero, relative to the size of a body."""
 
 
 class BemkitError(Exception):
@@ -66,9 +68,19 @@ def shown_path(path: Path) -> str:
     return printable(str(path))[:200]
 
 
-def format_point(point: FloatArray) -> str:
-    """Write a point for a message, with digits enough to find it in a file."""
-    return f"({point[0]:.9g}, {point[1]:.9g})"
+def format_point(point: FloatArray | tuple[float, float], size: float = 0.0, digits: int = 9) -> str:
+    """Write a point for a message; nine digits are enough to find it in a file.
+
+    Parameters
+    ----------
+    point : (2,) array [m]
+    size : float [m]
+        Size of the body that the point is on. A coordinate that is round-off beside it is written as 0.
+    digits : int
+    """
+    least = _ROUND_OFF * max(size, abs(point[0]), abs(point[1]))
+    x, y = (0.0 if abs(coordinate) < least else coordinate for coordinate in point)
+    return f"({x:.{digits}g}, {y:.{digits}g})"
 
 
 def called(owner: object, method: str, arguments: tuple[Any, ...], remedy: str) -> Any:

@@ -10,12 +10,13 @@ import pkgutil
 from importlib.util import find_spec
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import bemkit
 import bemkit.runs.run
 from bemkit.cli.main import main
-from bemkit.errors import BemkitError, InputError, NoResultError, concerning, one_line
+from bemkit.errors import BemkitError, InputError, NoResultError, concerning, format_point, one_line
 from tests.statements import statements
 
 MISTAKES_OF_THE_CALLER = {"TypeError", "AttributeError", "AssertionError", "NotImplementedError"}
@@ -88,3 +89,18 @@ def test_the_command_line_leaves_defects_their_traceback(monkeypatch: pytest.Mon
     monkeypatch.setattr(bemkit.runs.run, "run", fail)
     with pytest.raises(ValueError, match="shapes do not match"):
         main(["run", "paper-1"])
+
+
+@pytest.mark.parametrize(
+    ("point", "size", "digits", "words"),
+    [
+        ((2.856e-9, 0.0), 10.0, 9, "(0, 0)"),
+        ((2.856e-9, 0.0), 1e-8, 9, "(2.856e-09, 0)"),
+        ((1e5, -1e-5), 0.0, 9, "(100000, 0)"),
+        ((1.0 / 3.0, -2.0 / 3.0), 1.0, 4, "(0.3333, -0.6667)"),
+    ],
+)
+def test_round_off_beside_the_size_of_a_body_is_written_as_zero(
+    point: tuple[float, float], size: float, digits: int, words: str
+) -> None:
+    assert format_point(np.array(point), size, digits) == words

@@ -6,7 +6,7 @@ import numpy as np
 
 from bemkit.arrays import FloatArray
 from bemkit.contact.solvability import UnsolvableLoad
-from bemkit.errors import InputError
+from bemkit.errors import InputError, format_point
 from bemkit.geometry.spaces import dof_points
 from bemkit.model.prepared import Prepared
 from bemkit.model.units import Units
@@ -78,8 +78,7 @@ def _modes_in_words(modes: FloatArray, units: Units) -> str:
 def _pivot(mode: FloatArray, units: Units) -> str:
     """Name the point about which a mode (shift along x, along y, turn) turns the body."""
     pivot = units.to_physical(np.array([-mode[1], mode[0]]) / mode[2])
-    x, y = np.where(np.abs(pivot) < _ROUND_OFF * units.length, 0.0, pivot).tolist()
-    return f"about ({x:.4g}, {y:.4g})"
+    return f"about {format_point(pivot, units.length, digits=4)}"
 
 
 def describe(prepared: Prepared, load: UnsolvableLoad) -> str:

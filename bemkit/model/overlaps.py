@@ -9,6 +9,7 @@ import numpy as np
 from bemkit.arrays import FloatArray
 from bemkit.contact.obstacle import Obstacle, RigidCircle
 from bemkit.contact.polygon import RigidPolygon
+from bemkit.errors import format_point
 from bemkit.geometry.proximity.overlap import ROUND_OFF, Polyline, deepest_overlap, near_pairs
 from bemkit.model.contacts import OverlapError
 from bemkit.model.placed import PlacedBody
@@ -100,6 +101,6 @@ def _interference(scene: Scene, names: tuple[str, str]) -> float:
 def _overlap(names: tuple[str, str], depth: float, place: FloatArray) -> OverlapError:
     one, two = names
     return OverlapError(
-        f"bodies {one!r} and {two!r} overlap by {depth:.4g} at ({place[0]:.6g}, {place[1]:.6g}): move them apart, or "
+        f"bodies {one!r} and {two!r} overlap by {depth:.4g} at {format_point(place, digits=6)}: move them apart, or "
         "state a contact with an interference between them"
     )

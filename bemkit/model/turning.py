@@ -13,6 +13,7 @@ from typing import TypeAlias
 import numpy as np
 
 from bemkit.arrays import FloatArray, IntArray
+from bemkit.errors import format_point
 from bemkit.geometry.neighbours import common_centre
 from bemkit.geometry.quadrature import gauss_legendre
 from bemkit.geometry.vectors import cross, norms
@@ -23,8 +24,6 @@ from bemkit.scene.unit_names import amount
 from bemkit.solvers.base import ContactSolution, Status
 
 _N_POINTS = 12
-_ROUND_OFF = 1e-9
-"""Round-off of positions, relative to the diameter."""
 _BALANCED = 1e-6
 """Moment that counts as none, relative to the sum of the sizes of the moments of all loads."""
 _UNSETTLED = (Status.STALLED, Status.CYCLING, Status.MAX_STEPS, Status.INNER_FAILED, Status.SINGULAR)
@@ -112,9 +111,7 @@ def _titles(bodies: list[PlacedBody]) -> str:
 
 
 def _place(bodies: list[PlacedBody], centre: FloatArray) -> str:
-    diameter = max(body.mesh.diameter for body in bodies)
-    x, y = np.where(np.abs(centre) < _ROUND_OFF * diameter, 0.0, centre).tolist()
-    return f"({x:.4g}, {y:.4g})"
+    return format_point(centre, max(body.mesh.diameter for body in bodies), digits=4)
 
 
 def _centre_of_turning(bodies: list[PlacedBody], sides: list[_Side]) -> FloatArray | None:

@@ -56,12 +56,15 @@ def law_jumps(contact: ContactTable, laws: Mapping[str, FrictionLaw]) -> Iterato
         is_pressed, arc = contact.sigma_n[rows] != 0.0, np.diff(contact.s[rows])
         # between two pieces of a contact the arc length stays, and nothing is blurred
         is_on_piece = norms(np.diff(points, axis=0)) <= (1.0 + _AT_NODE) * arc
+        size = float(np.ptp(points, axis=0).max())
         for place in _law_jumps(law, pressure, points, is_on_piece & (is_pressed[:-1] | is_pressed[1:])):
-            text = (
-                f"Friction of contact {name!r} jumps at {format_point(place)}, inside an element: divide the contact "
-                "there into parts, each with a law of its own."
-            )
-            yield ResultWarning("jump of friction", name, text)
+            remedy = "the contact there into parts, each with a law of its own"
+            yield _named("friction", name, f"Friction of contact {name!r}", place, size, remedy)
+
+
+def _named(kind: str, name: str, subject: str, place: FloatArray, size: float, remedy: str) -> ResultWarning:
+    text = f"{subject} jumps at {format_point(place, size)}, inside an element: divide {remedy}."
+    return ResultWarning(f"jump of {kind}", name, text)
 
 
 def _law_jumps(law: FrictionLaw, pressure: float, points: FloatArray, is_asked: BoolArray) -> FloatArray:
@@ -100,11 +103,8 @@ def load_jumps(body: SolvedBody) -> Iterator[ResultWarning]:
             case _:
                 continue
         for place in _jumps_on(body.mesh, elements, at):
-            text = (
-                f"Part {part.name!r}: the {kind} jumps at {format_point(place)}, inside an element: divide the part "
-                f"there into parts, each with a {kind} of its own."
-            )
-            yield ResultWarning(f"jump of {kind}", part.name, text)
+            remedy = f"the part there into parts, each with a {kind} of its own"
+            yield _named(kind, part.name, f"Part {part.name!r}: the {kind}", place, body.mesh.diameter, remedy)
 
 
 def _given_at(given: PrescribedDisplacement, points: FloatArray, normals: FloatArray) -> FloatArray:
@@ -118,11 +118,8 @@ def gap_jumps(solution: SolvedScene) -> Iterator[ResultWarning]:
             side = solution.contact_sides[pair.name][0]
             mesh = solution.bodies[side.body].mesh
             for place in _jumps_on(mesh, mesh.part(side.part), partial(_gap_at, pair.gap)):
-                text = (
-                    f"Contact {pair.name!r}: the gap jumps at {format_point(place)}, inside an element: divide the "
-                    "sides there into parts, each with a contact and a gap of its own."
-                )
-                yield ResultWarning("jump of gap", pair.name, text)
+                remedy = "the sides there into parts, each with a contact and a gap of its own"
+                yield _named("gap", pair.name, f"Contact {pair.name!r}: the gap", place, mesh.diameter, remedy)
 
 
 def _gap_at(gap: ScalarField, points: FloatArray, normals: FloatArray) -> FloatArray:

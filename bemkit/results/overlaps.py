@@ -14,6 +14,7 @@ from bemkit.geometry.proximity.overlap import ROUND_OFF, Polyline, deepest_overl
 from bemkit.model.overlaps import finite_obstacles, is_finite
 from bemkit.results.points_between import Interpolation
 from bemkit.results.solved_body import SolvedBody
+from bemkit.results.solved_scene import place_in
 from bemkit.scene.unit_names import amount
 
 if TYPE_CHECKING:
@@ -93,7 +94,7 @@ def _between(solution: Solution, pair: str, subject: str, depth: float, place: F
 
 
 def _depth_at(solution: Solution, depth: float, place: FloatArray) -> str:
-    return f"{amount(depth, 'length', solution.units, 2)} at ({place[0]:.4g}, {place[1]:.4g})"
+    return f"{amount(depth, 'length', solution.units, 2)} at {place_in(solution, place)}"
 
 
 def _deepest(obstacle: Obstacle, points: FloatArray, places: FloatArray) -> tuple[float, FloatArray]:

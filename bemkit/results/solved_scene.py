@@ -11,7 +11,7 @@ import numpy as np
 from bemkit.arrays import FloatArray
 from bemkit.contact.body import SlipHistory
 from bemkit.contact.laws import FrictionLaw
-from bemkit.errors import InputError
+from bemkit.errors import InputError, format_point
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.results.contact_table import ContactTable
 from bemkit.results.part_forces import ContactForce, PartForce, RigidResult
@@ -231,6 +231,11 @@ def contact_facts(solution: SolvedScene) -> list[dict[str, Any]]:
         | _peak(solution.contact, contact.name)
         for contact in solution.contacts
     ]
+
+
+def place_in(solution: SolvedScene, point: FloatArray | tuple[float, float]) -> str:
+    """Write a point (2,) [m] of a solution for a message."""
+    return format_point(point, max(body.mesh.diameter for body in solution.bodies.values()), digits=4)
 
 
 def _peak(table: ContactTable, part: str) -> dict[str, float]:

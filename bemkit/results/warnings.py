@@ -11,7 +11,7 @@ import numpy as np
 from bemkit.arrays import BoolArray, FloatArray
 from bemkit.contact.laws import FrictionLaw, LawOfCoefficients
 from bemkit.contact.obstacle import Gap, RigidHalfPlane
-from bemkit.errors import ResultWarning, first_of_each_kind
+from bemkit.errors import ResultWarning, first_of_each_kind, format_point
 from bemkit.formulas import has_fields
 from bemkit.geometry.local_values import values_on_elements
 from bemkit.geometry.mesh import BoundaryMesh
@@ -24,6 +24,7 @@ from bemkit.results.between_nodes import BetweenNodes
 from bemkit.results.contact_table import ContactTable, free_contacts
 from bemkit.results.solution import Solution
 from bemkit.results.solved_body import SolvedBody
+from bemkit.results.solved_scene import place_in
 from bemkit.scene.conditions import Clamped, DistributedLoad, PrescribedDisplacement, Roller
 from bemkit.scene.unit_names import UnitNames, amount
 
@@ -129,8 +130,8 @@ def _unbounded_tractions(solution: Solution) -> Iterator[ResultWarning]:
         yield ResultWarning(
             "singular contact traction",
             f"{' '.join(names)} ({x:.12g}, {y:.12g})".strip(),
-            f"{prefix}Contact tractions are singular at ({x:.4g}, {y:.4g}) (r^{power:.2g}). Use forces instead of peak "
-            f"values, or round the corner. {excluded if is_excluded else 'Use more elements.'}",
+            f"{prefix}Contact tractions are singular at {place_in(solution, (x, y))} (r^{power:.2g}). Use forces "
+            f"instead of peak values, or round the corner. {excluded if is_excluded else 'Use more elements.'}",
             power,
         )
 
@@ -278,14 +279,12 @@ def _coarse_curves(mesh: BoundaryMesh) -> Iterator[ResultWarning]:
     cosines = np.stack([np.sum(before * middle, axis=1), np.sum(middle * after, axis=1)])
     turn = np.degrees(np.arccos(np.clip(cosines, -1.0, 1.0))).sum(axis=0)
     if turn.max() > LARGEST_TURN:
-        x, y = mesh.centres[curved[np.argmax(turn)]]
-        yield ResultWarning(
-            "coarse curve",
-            "",
-            f"The boundary turns by {turn.max():.0f} degrees on one element, near ({x:.4g}, {y:.4g}); no error "
-            "estimate holds there: use more elements.",
-            float(turn.max()),
+        place = format_point(mesh.centres[curved[turn.argmax()]], mesh.diameter, digits=4)
+        text = (
+            f"The boundary turns by {turn.max():.0f} degrees on one element, near {place}; no error estimate holds "
+            "there: use more elements."
         )
+        yield ResultWarning("coarse curve", "", text, float(turn.max()))
 
 
 def _narrow_zones(contact: ContactTable, smooth: Collection[str], remedy: str) -> Iterator[ResultWarning]:

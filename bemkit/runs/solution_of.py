@@ -22,6 +22,7 @@ from bemkit.results.contact_table import ContactTable, bound_at, free_contacts
 from bemkit.results.part_forces import PartForce, RigidResult, contact_forces, forces_on_parts, nodal_resultant
 from bemkit.results.solution import Solution
 from bemkit.results.solved_body import BoundaryFields, SideName, SolvedBody
+from bemkit.results.solved_scene import place_in
 from bemkit.results.transitions import find_transitions
 from bemkit.results.warnings import find_warnings
 from bemkit.scene.unit_names import amount
@@ -192,10 +193,10 @@ def with_missed_contact_named(solution: Solution) -> Solution:
     if not solution.is_converged:
         return solution
     if solution.unfound_contacts:
-        name, (x, y) = next(iter(solution.unfound_contacts.items()))
+        name, place = next(iter(solution.unfound_contacts.items()))
         between = solution.narrow_contacts_between_nodes[name]
         depth = amount(between.penetration_depth, "length", solution.units, 2)
-        words = f"Contact {name!r} overlaps by {depth} at ({x:.4g}, {y:.4g})."
+        words = f"Contact {name!r} overlaps by {depth} at {place_in(solution, place)}."
     elif apart := _pressed_apart(solution):
         words = f"Contact {apart[0]!r} has a force, but its sides touch nowhere."
     else:
