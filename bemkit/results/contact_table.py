@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields
 from functools import cached_property
 from types import MappingProxyType
@@ -12,7 +12,7 @@ import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray, IntArray, read_only
 from bemkit.contact.laws import FrictionLaw
-from bemkit.errors import InputError
+from bemkit.errors import InputError, ResultWarning
 from bemkit.solvers.active_sets import NodeStatus
 
 STATUS_WORDS: Mapping[NodeStatus, str] = MappingProxyType(
@@ -233,6 +233,17 @@ def bound_at(table: ContactTable, law: FrictionLaw) -> FloatArray | None:
 def free_contacts(table: ContactTable) -> set[str]:
     """Return the names of the contacts without any force."""
     return {name for name in table.parts if not table.sigma_n[table.rows(name)].any()}
+
+
+def facing_away(table: ContactTable) -> Iterator[ResultWarning]:
+    """Warn of contacts that can touch nowhere, because their boundary faces away from the obstacle."""
+    for name in table.parts:
+        if np.isinf(table.gap[table.rows(name)]).all():
+            text = (
+                f"Contact {name!r} can touch nowhere: its boundary faces away from the obstacle. Choose a side that "
+                "faces it, or turn the direction of the obstacle round."
+            )
+            yield ResultWarning("contact faces away", name, text)
 
 
 def narrow_contacts(table: ContactTable) -> set[str]:

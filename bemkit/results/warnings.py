@@ -21,7 +21,7 @@ from bemkit.model.contacts import may_overlap
 from bemkit.operators.linear_solvers import Tag
 from bemkit.operators.rigid_modes import without_motion
 from bemkit.results.between_nodes import BetweenNodes
-from bemkit.results.contact_table import ContactTable, free_contacts
+from bemkit.results.contact_table import ContactTable, facing_away, free_contacts
 from bemkit.results.solution import Solution
 from bemkit.results.solved_body import SolvedBody
 from bemkit.results.solved_scene import place_in
@@ -76,6 +76,7 @@ def find_warnings(solution: Solution) -> tuple[ResultWarning, ...]:
         _law_jumps(solution.contact, laws),
         _gap_jumps(solution),
         _no_load(solution),
+        facing_away(solution.contact),
         _narrow_zones(solution.contact, smooth, remedy),
         _hidden_overlaps(solution.contacts_between_nodes, solution.contact, solution.units, remedy),
     ]

@@ -14,7 +14,7 @@ from rich.console import Console
 import bemkit as bk
 from bemkit.cli.console import print_plan, print_summary
 from bemkit.contact.laws import Coulomb, Frictionless
-from bemkit.contact.obstacle import Gap, RigidHalfPlane
+from bemkit.contact.obstacle import Gap, Obstacle, RigidHalfPlane
 from bemkit.errors import ResultWarning, first_of_each_kind, without_duplicates
 from bemkit.formulas import Expression
 from bemkit.geometry.shapes import Rectangle
@@ -85,6 +85,26 @@ def test_large_rotations_are_warned_of() -> None:
     scene = Scene(title="t", shape=Rectangle(1.0, 1.0), material=Material(1.0, 0.3), parts=parts)
     warnings = run(with_overrides(scene, elements=24)).warnings
     assert any(words.startswith("Strains and rotations exceed 0.2") for words in map(str, warnings))
+
+
+@pytest.mark.parametrize(
+    ("side", "obstacle", "faces_away"),
+    [
+        ("top", RigidHalfPlane(), True),
+        ("bottom", RigidHalfPlane(), False),
+        ("bottom", Gap(0.1, direction=(0.0, 1.0)), True),
+        ("bottom", Gap(0.1, direction=(0.0, -1.0)), False),
+    ],
+)
+def test_contacts_that_face_away_from_their_obstacle_are_named(side: str, obstacle: Obstacle, faces_away: bool) -> None:
+    parts = (
+        Part("support", Clamped(), sides=("left",)),
+        Part("end", Traction(y=-1e-3), sides=("right",)),
+        Part("foot", Contact(obstacle, Frictionless()), sides=(side,)),
+    )
+    scene = Scene(title="t", shape=Rectangle(1.0, 1.0), material=Material(1.0, 0.3), parts=parts)
+    words = [str(w) for w in run(with_overrides(scene, elements=16)).warnings if w.kind == "contact faces away"]
+    assert [sentence.split(":")[0] for sentence in words] == ["Contact 'foot' can touch nowhere"] * faces_away
 
 
 @pytest.mark.slow
