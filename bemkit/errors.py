@@ -68,6 +68,11 @@ def shown_path(path: Path) -> str:
     return printable(str(path))[:200]
 
 
+def counted(number: int, noun: str) -> str:
+    """Return a number with a noun, in the plural unless it is one."""
+    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
+
+
 def format_point(point: FloatArray | tuple[float, float], size: float = 0.0, digits: int = 9) -> str:
     """Write a point for a message; nine digits are enough to find it in a file.
 

@@ -16,7 +16,7 @@ import pytest
 import bemkit
 import bemkit.runs.run
 from bemkit.cli.main import main
-from bemkit.errors import BemkitError, InputError, NoResultError, concerning, format_point, one_line
+from bemkit.errors import BemkitError, InputError, NoResultError, concerning, counted, format_point, one_line
 from tests.statements import statements
 
 MISTAKES_OF_THE_CALLER = {"TypeError", "AttributeError", "AssertionError", "NotImplementedError"}
@@ -104,3 +104,7 @@ def test_round_off_beside_the_size_of_a_body_is_written_as_zero(
     point: tuple[float, float], size: float, digits: int, words: str
 ) -> None:
     assert format_point(np.array(point), size, digits) == words
+
+
+def test_one_thing_is_counted_in_the_singular() -> None:
+    assert [counted(number, "step") for number in (0, 1, 2)] == ["0 steps", "1 step", "2 steps"]

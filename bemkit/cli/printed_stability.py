@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 from rich.text import Text
 
 from bemkit.cli.outputs import plain_table, stdout_console
+from bemkit.errors import counted
 from bemkit.studies.stability.axes import Axis
 from bemkit.studies.stability.records import StabilityRecord, Verdict, cells
 
@@ -45,4 +46,4 @@ def print_verdicts(records: Sequence[StabilityRecord]) -> None:
     console = stdout_console()
     counts = Counter(record.verdict for record in records)
     words = [f"{counts[verdict.value]} {verdict.value}" for verdict in Verdict if counts[verdict.value]]
-    console.print(Text(f"{len(records)} rows: {', '.join(words)}", style="bold"))
+    console.print(Text(f"{counted(len(records), 'row')}: {', '.join(words)}", style="bold"))

@@ -9,6 +9,7 @@ import numpy as np
 from rich.text import Text
 
 from bemkit.cli.outputs import plain_table, stdout_console
+from bemkit.errors import counted
 from bemkit.studies.sweep.table import Sweep
 
 _SHOWN = ("force_normal", "force_tangential", "energy", "contact_length", "peak_pressure")
@@ -40,13 +41,15 @@ def print_sweep(sweep: Sweep) -> None:
     console.print(table)
     if len(sweep.solved) > MOST_PRINTED:
         more = len(sweep.solved) - MOST_PRINTED
-        console.print(Text(f"{more} rows more: write them to a file (-o, --csv, --json)", style="dim"))
+        console.print(Text(f"{counted(more, 'row')} more: write them to a file (-o, --csv, --json)", style="dim"))
     for row in sweep.failed:
         values = ", ".join(f"{key} = {value:g}" for key, value in zip(sweep.keys, row.values, strict=True))
         console.print(Text(f"{values}: {row.status.replace('_', ' ')}: {row.message}", style="red"))
     inaccurate = [row for row in sweep.solved if row.message]
     if inaccurate:
-        console.print(Text(f"{len(inaccurate)} rows are less accurate than asked: see their messages", style="yellow"))
+        console.print(
+            Text(f"{counted(len(inaccurate), 'row')} less accurate than asked: see the messages", style="yellow")
+        )
 
 
 def _short_keys(keys: Sequence[str]) -> list[str]:

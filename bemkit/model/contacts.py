@@ -12,7 +12,7 @@ from bemkit.arrays import BoolArray, FloatArray, IntArray
 from bemkit.contact.contact_nodes import approaches
 from bemkit.contact.laws import FrictionLaw, Frictionless, LawError, LawOfCoefficients
 from bemkit.contact.obstacle import RigidHalfPlane
-from bemkit.errors import InputError
+from bemkit.errors import InputError, format_point
 from bemkit.geometry.spaces import dof_points
 from bemkit.model.contact_data import ContactData, FacingPart, find_contact
 from bemkit.model.placed import PlacedBody, groups
@@ -155,10 +155,10 @@ def check_overlap(pair: ContactPair, overlap: float, deepest: FloatArray, size: 
     OverlapError
     """
     if overlap > pair.interference + OVERLAP_TOLERANCE * size:
-        x, y = deepest
         raise OverlapError(
-            f"contact {pair.name!r}: the bodies overlap by {overlap:.4g} at ({x:.6g}, {y:.6g}), and an "
-            f"interference of {pair.interference:g} is given: move them apart, or give the interference that is meant"
+            f"contact {pair.name!r}: the bodies overlap by {overlap:.4g} at {format_point(deepest, size, digits=6)}, "
+            f"and an interference of {pair.interference:g} is given: move them apart, or give the interference that is "
+            "meant"
         )
 
 

@@ -63,15 +63,14 @@ def _check_obstacle(
     beside = np.where(touches, np.inf, gap)
     depth, stated = -float(beside.min()), -float(gap[touches].min(initial=0.0))
     if depth > stated + ROUND_OFF * body.mesh.diameter:
-        (x, y), (owner, (first, *_)) = points[int(beside.argmin())], next(iter(touching.items()))
+        owner, (first, *_) = next(iter(touching.items()))
+        place = format_point(points[int(beside.argmin())], body.mesh.diameter, digits=6)
         whose, where = f"{first!r} of body {owner!r}", f"body {body.name!r} by {depth:.4g}"
         remedy = "let a part of it touch it, too"
         if parts:
             whose, where = f"{parts[0]!r}", f"the body by {depth:.4g} beside this part"
             remedy = "let the part include all that may touch it"
-        raise OverlapError(
-            f"the obstacle of part {whose} overlaps {where}, at ({x:.6g}, {y:.6g}): move it away, or {remedy}"
-        )
+        raise OverlapError(f"the obstacle of part {whose} overlaps {where}, at {place}: move it away, or {remedy}")
 
 
 def is_finite(obstacle: Obstacle) -> bool:

@@ -14,7 +14,7 @@ import numpy as np
 
 from bemkit.arrays import FloatArray, IntArray
 from bemkit.contact.equilibrium import NOISE_FACTOR, round_off_of
-from bemkit.errors import ResultWarning
+from bemkit.errors import ResultWarning, format_point
 from bemkit.geometry.spaces import BoundarySpace, dof_points
 from bemkit.geometry.vectors import norms
 from bemkit.model.contacts import ContactInterface
@@ -108,11 +108,11 @@ def _pushed_in(
     for part in dict.fromkeys(candidates.parts):
         node = int(np.argmax(np.where(np.equal(candidates.parts, part), overlap, -math.inf)))
         if overlap[node] > SMALLEST_OVERLAP * np.abs(displacement).max():
-            x, y = candidates.points[node]
+            place = format_point(candidates.points[node], body.mesh.diameter, digits=6)
             depth = amount(overlap[node], "length", units, 3)
             name = name_at_obstacle(body.name, part)
             text = (
-                f"Supports push part {name!r} {depth} into its obstacle at ({x:.6g}, {y:.6g}), "
+                f"Supports push part {name!r} {depth} into its obstacle at {place}, "
                 "where contact cannot act: let them move with the obstacle, or leave a free element between them."
             )
             found.append(ResultWarning("pushed into obstacle", name, text, float(overlap[node])))

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bemkit.contact.laws import FrictionLaw
+from bemkit.errors import counted
 from bemkit.model.placed import PlacedBody, groups
 from bemkit.model.prepared import Prepared
 from bemkit.operators.counts import Entries
@@ -268,8 +269,8 @@ def _mesh_items(scene: BodyScene, sizes: Sizes, proposal: Symmetry | None) -> It
     outline = scene.shape.outline()
     if outline.drawing is not None:
         read = "; ".join(outline.drawing.notes) or "taken as it is"
-        yield PlanItem("drawn outline", True, f"{_count(len(outline.sides), 'side')}; {read}")
-    yield PlanItem("elements", True, f"{n} on {_count(sizes.n_loops, 'closed curve')}")
+        yield PlanItem("drawn outline", True, f"{counted(len(outline.sides), 'side')}; {read}")
+    yield PlanItem("elements", True, f"{n} on {counted(sizes.n_loops, 'closed curve')}")
     yield _further_meshes(scene.mesh.accuracy, "the number of elements is given", "first mesh")
     curved = f"{n_curved} of {n} elements are curved" if n_curved else "all elements are straight"
     yield PlanItem("quadrature on curved elements", n_curved > 0, curved)
@@ -309,7 +310,7 @@ def _contact_items(scene: BodyScene, sizes: Sizes, n_steps: int) -> Iterator[Pla
     yield PlanItem("contact system", True, f"{n} nodes may touch; every contact step solves for {c} unknowns")
     yield PlanItem("second elastic body", False, "the obstacles are rigid")
     yield _friction_item(scene.laws.values(), ", static" if n_steps == 1 else ", incremental")
-    tangential = f"{c - n} of {_count(n, 'contact node')}" if c > n else "supports give all of them"
+    tangential = f"{c - n} of {counted(n, 'contact node')}" if c > n else "supports give all of them"
     yield PlanItem("tangential unknowns", c > n, tangential)
     modes = "the supports hold all rigid motions"
     if n_free:
@@ -334,10 +335,13 @@ def items_of_several(prepared: Prepared, sizes: Sizes, n_steps: int, *, is_dense
     n_pairs = len(scene.elastic_contacts)
     n_fixed = sum(rows.other < 0 for rows in prepared.rows)
     yield PlanItem("contacts between bodies", n_pairs > 0, f"{n_pairs}, coupled by mortar integrals")
-    yield PlanItem("rigid obstacles", n_fixed > 0, f"{n_fixed} parts face them" if n_fixed else "no part faces one")
+    yield PlanItem(
+        "rigid obstacles", n_fixed > 0, f"faced by {counted(n_fixed, 'part')}" if n_fixed else "no part faces one"
+    )
     n_rigid = len(scene.rigid)
     moving = (
-        f"{n_rigid} in {len(scene.contacts) - n_pairs} contacts, {n_load_controlled(scene)} motions driven by loads"
+        f"{n_rigid} in {counted(len(scene.contacts) - n_pairs, 'contact')}, "
+        f"{counted(n_load_controlled(scene), 'motion')} driven by loads"
     )
     yield PlanItem("rigid bodies", n_rigid > 0, moving if n_rigid else "there are none")
     yield _friction_item(rows.law for rows in prepared.rows)
@@ -360,13 +364,9 @@ def n_load_controlled(scene: Scene) -> int:
 
 
 def _names(bodies: Sequence[PlacedBody]) -> str:
-    return bodies[0].name if len(bodies) == 1 else f"{bodies[0].name} and {len(bodies) - 1} copies"
+    return bodies[0].name if len(bodies) == 1 else f"{bodies[0].name} and {len(bodies) - 1} like it"
 
 
 def _body_line(body: PlacedBody) -> str:
     method, mesh = body.scene.discretisation.method, body.own_mesh
     return f"{mesh.n_elements} elements, {body.space.n_dofs} displacements ({method})"
-
-
-def _count(number: int, name: str) -> str:
-    return f"{number} {name}" if number == 1 else f"{number} {name}s"

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from bemkit.contact.certificate import Certificate
+from bemkit.errors import counted
 from bemkit.geometry.shapes import Shape
 from bemkit.results.between_nodes import BetweenNodes
 from bemkit.results.solution import Solution
@@ -58,7 +59,7 @@ def summary_rows(solution: Solution) -> Iterator[tuple[str, str]]:
         yield "transitions", "\n".join(_transition_lines(solution))
         drivers = drivers_at_work(solution.scene.solver, (record.message for record in solution.history))
         words = ", ".join(dict.fromkeys(map(SOLVERS.name_of, drivers)))
-        yield "linear solves", f"{solution.linear_solves} in {solution.outer_steps} steps ({words})"
+        yield "linear solves", f"{solution.linear_solves} in {counted(solution.outer_steps, 'step')} ({words})"
     yield from _violation_rows(solution)
     yield "time", _time(solution)
 

@@ -11,7 +11,7 @@ import numpy as np
 from bemkit.arrays import BoolArray, FloatArray
 from bemkit.contact.laws import FrictionLaw, LawOfCoefficients
 from bemkit.contact.obstacle import Gap, RigidHalfPlane
-from bemkit.errors import ResultWarning, first_of_each_kind, format_point
+from bemkit.errors import ResultWarning, counted, first_of_each_kind, format_point
 from bemkit.formulas import has_fields
 from bemkit.geometry.local_values import values_on_elements
 from bemkit.geometry.mesh import BoundaryMesh
@@ -189,12 +189,11 @@ def _without_estimate(body: SolvedBody) -> Iterator[ResultWarning]:
     for part in body.scene.parts:
         elements = body.mesh.part(part.name)
         if isinstance(part.condition, Clamped | Roller | PrescribedDisplacement) and is_blind[elements].any():
-            count = "1 element" if elements.size == 1 else f"{elements.size} elements"
             yield ResultWarning(
                 "held part with few elements",
                 part.name,
-                f"Part {part.name!r} has {count}, too few to estimate the error of its reactions: "
-                "use more elements there.",
+                f"Part {part.name!r} has {counted(elements.size, 'element')}, too few to estimate the error of its "
+                "reactions: use more elements there.",
                 elements.size,
             )
 
@@ -357,8 +356,8 @@ def _enclosed(contact: ContactTable, chosen: BoolArray) -> BoolArray:
 
 
 def _narrow(part: str, kind: str, middle: float, sizes: Sequence[int], remedy: str) -> ResultWarning:
-    nodes, n_more = "1 node" if sizes[0] == 1 else f"{sizes[0]} nodes", len(sizes) - 1
-    more = f", and {n_more} more {'zone' if n_more == 1 else 'zones'} like it" if n_more else ""
+    more = f", and {counted(len(sizes) - 1, 'more zone')} like it" if len(sizes) > 1 else ""
+    nodes = counted(sizes[0], "node")
     text = f"A {kind} zone of part {part!r} at s = {middle:.4g} has only {nodes}{more}: {_there(remedy)}."
     return ResultWarning(f"narrow {kind} zone", part, text, sizes[0])
 

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray, IntArray
-from bemkit.errors import GeometryError, InputError
+from bemkit.errors import GeometryError, InputError, format_point
 from bemkit.geometry.local_values import element_degrees
 from bemkit.geometry.meshing.layers import (
     FACTOR,
@@ -114,9 +114,9 @@ class LayeredMeshes:
         member, share = max(zip(members, shares, strict=True), key=lambda pair: float(pair[1].max()))
         mesh, worst = member.bodies[0].mesh, int(np.argmax(share))
         if mesh.lengths[worst] < 2.0 / FACTOR * shortest_length(mesh):
-            x, y = mesh.centres[worst]
+            place = format_point(mesh.centres[worst], mesh.diameter, digits=6)
             raise GeometryError(
-                f"the largest error is at ({x:.6g}, {y:.6g}), where an element of the length "
+                f"the largest error is at {place}, where an element of the length "
                 f"{mesh.lengths[worst]:.1e} is about as short as coordinates hold"
             )
 

@@ -9,6 +9,7 @@ from bemkit.arrays import FloatArray
 from bemkit.contact.body import ContactState
 from bemkit.contact.certificate import Scales
 from bemkit.contact.problem import ContactProblem
+from bemkit.errors import counted
 from bemkit.solvers.active_sets import ProjectionEquations
 from bemkit.solvers.base import Iterate, Status, check_max_steps, check_rho
 from bemkit.solvers.newton import negligible
@@ -50,7 +51,7 @@ class InnerNewton:
             before, iterate = iterate, newton_step(equations, iterate)
             if _solves(equations, before, iterate):
                 return iterate
-        message = f"inner Newton iteration unfinished after {iterate.linear_solves} linear solves"
+        message = f"inner Newton iteration unfinished after {counted(iterate.linear_solves, 'linear solve')}"
         return replace(iterate, ended=Status.INNER_FAILED, message=message)
 
 

@@ -13,7 +13,7 @@ from bemkit.contact.body import ClosedVolume, ContactState, SingularResponse
 from bemkit.contact.certificate import Certificate, certify
 from bemkit.contact.problem import ContactProblem
 from bemkit.contact.solvability import find_long_motion, find_unsolvable_load, needs_contact
-from bemkit.errors import InputError, NoResultError
+from bemkit.errors import InputError, NoResultError, counted
 from bemkit.interrupts import interruptible, raise_missed_interrupt
 from bemkit.solvers.active_sets import ActiveSets, NodeStatus, contact_sets
 from bemkit.solvers.newton import FloatingResponse, consistent_state, contact_free_response, with_least_slip
@@ -363,7 +363,7 @@ class _Run:
     def _solution(
         self, iterate: Iterate, status: Status, sets: ActiveSets, certificate: Certificate, history: list[StepRecord]
     ) -> ContactSolution:
-        worst = f"worst certificate entry {certificate.worst:.1e} after {history[-1].step} steps"
+        worst = f"worst certificate entry {certificate.worst:.1e} after {counted(history[-1].step, 'step')}"
         return ContactSolution(
             state=iterate.state,
             status=status,

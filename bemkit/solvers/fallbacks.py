@@ -7,7 +7,7 @@ import numpy as np
 
 from bemkit.contact.body import ContactState
 from bemkit.contact.problem import ContactProblem
-from bemkit.errors import InputError
+from bemkit.errors import InputError, counted
 from bemkit.solvers.active_sets import ActiveSets, ProjectionEquations, Residual, contact_sets
 from bemkit.solvers.base import ContactSolver, Iterate, Status, check_max_steps
 from bemkit.solvers.newton import merit, negligible
@@ -292,7 +292,7 @@ class Fallbacks:
             inner = replace(
                 inner,
                 ended=Status.STALLED,
-                message=f"no solution after {n_steps} {'step' if n_steps == 1 else 'steps'}",
+                message=f"no solution after {counted(n_steps, 'step')}",
             )
         following = replace(
             iterate,

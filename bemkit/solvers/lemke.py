@@ -13,6 +13,7 @@ from bemkit.contact.body import ClosedVolume, ContactState, stick
 from bemkit.contact.further_laws import law_name
 from bemkit.contact.laws import LawError
 from bemkit.contact.problem import ContactProblem
+from bemkit.errors import counted
 from bemkit.operators.rigid_modes import as_dense
 from bemkit.solvers.base import Iterate, Status, check_max_steps
 from bemkit.solvers.newton import spring_stiffness
@@ -93,7 +94,7 @@ class LemkePivoting:
         solution, n_pivots = lemke(matrix[np.ix_(exists, exists)], vector[exists])
         spent = iterate.linear_solves + linear_solves + 1
         if solution is None:
-            message = f"Lemke's algorithm ended on a ray after {n_pivots} pivots"
+            message = f"Lemke's algorithm ended on a ray after {counted(n_pivots, 'pivot')}"
             return replace(iterate, linear_solves=spent, ended=Status.STALLED, message=message)
         unknowns[exists] = solution
         pressed, backward, forward, _ = unit_force * unknowns.reshape(4, -1)
@@ -104,7 +105,7 @@ class LemkePivoting:
         displacement = (displacement + compliance @ residual).reshape(-1, 2)
         displacement = problem.respond(stick(*displacement.T)).displacement  # with the tangents that follow
         state = ContactState(displacement, force / problem.body.weights[:, None])
-        return Iterate(state=state, linear_solves=spent, message=f"{n_pivots} pivots")
+        return Iterate(state=state, linear_solves=spent, message=counted(n_pivots, "pivot"))
 
 
 def lemke(matrix: FloatArray, vector: FloatArray) -> tuple[FloatArray | None, int]:

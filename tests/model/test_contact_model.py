@@ -140,7 +140,7 @@ def test_an_impossible_scene_among_others_fails_alone() -> None:
         assert first.result().is_converged
         with pytest.raises(bk.BemkitError, match="the load"):
             second.result()
-        with pytest.raises(NoResultError, match="after 1 steps of GMRES"):
+        with pytest.raises(NoResultError, match="after 1 step of GMRES"):
             third.result()
         assert fourth.result().is_converged
 

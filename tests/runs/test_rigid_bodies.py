@@ -452,7 +452,7 @@ def test_every_output_tells_of_rigid_bodies(tmp_path: Path, capsys: pytest.Captu
     assert '"rigid": {' in to_json(solution)
     assert solution.summary()["rigid"]["punch"]["y"] == solution.rigid["punch"].y
     items = {item.name: item.reason for item in solution.plan.items}
-    assert items["rigid bodies"] == "1 in 1 contacts, 2 motions driven by loads"
+    assert items["rigid bodies"] == "1 in 1 contact, 2 motions driven by loads"
     print_summary(solution)
     assert "moved by (0, " in " ".join(capsys.readouterr().out.split())
     axes = draw_deformation(solution)

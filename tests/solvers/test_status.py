@@ -184,7 +184,7 @@ def test_every_status_has_a_case():
         ("singular at the start", "the sockets are empty"),
         ("unsolvable load", "the load pushes the body away from the obstacle"),
         ("too far", "times the deformation"),
-        ("inner failed, augmented", "inner Newton iteration unfinished after 1 linear solves"),
+        ("inner failed, augmented", "inner Newton iteration unfinished after 1 linear solve"),
         ("inner failed, fixed point", "Tresca problem of this step: MAX_STEPS"),
         ("singular stiffness, lemke", "motions that are not listed as rigid"),
     ],

@@ -14,7 +14,7 @@ from typing import TypeAlias
 import numpy as np
 
 from bemkit.arrays import FloatArray, IntArray
-from bemkit.errors import GeometryError, format_point
+from bemkit.errors import GeometryError, counted, format_point
 from bemkit.formulas import closest
 from bemkit.geometry.free_form.drawn import ArcTo, LineTo, Loop, NurbsTo, Point, SplineTo
 from bemkit.geometry.free_form.nurbs import conic_arc
@@ -137,8 +137,7 @@ def join_strokes(strokes: Sequence[Stroke], tolerance: float) -> tuple[list[list
     gaps = norms(ends - vertices[place_of_end])
     if gaps.max() > _ROUND_OFF * np.abs(ends).max():
         count = int(np.count_nonzero(np.bincount(place_of_end, weights=gaps) > _ROUND_OFF * np.abs(ends).max()))
-        which = "1 gap" if count == 1 else f"{count} gaps"
-        notes.append(f"closed: {which} between ends of lines, of up to {2.0 * gaps.max():.2g}")
+        notes.append(f"closed: {counted(count, 'gap')} between ends of lines, of up to {2.0 * gaps.max():.2g}")
     _check_degrees(vertices, place_of_end.reshape(-1, 2), [stroke.side.group for stroke in strokes], tolerance)
     strokes = [
         _with_ends(stroke, *vertices[pair]) for stroke, pair in zip(strokes, place_of_end.reshape(-1, 2), strict=True)

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable
 import numpy as np
 
 from bemkit.arrays import FloatArray, IntArray
-from bemkit.errors import InputError, NoResultError
+from bemkit.errors import InputError, NoResultError, counted
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.proximity.cluster_tree import ClusterTree
 from bemkit.operators.collocation.equations import CollocationEquations, collocation_border
@@ -183,7 +183,7 @@ class IterativeFactor:
     def _not_converged(self, n_steps: int, residual: float) -> NotConvergedError:
         is_cut = n_steps >= self._options.max_steps
         return NotConvergedError(
-            f"the relative residual is {residual:.1e} after {n_steps} steps of GMRES, above the tolerance "
+            f"the relative residual is {residual:.1e} after {counted(n_steps, 'step')} of GMRES, above the tolerance "
             f"{self._options.tolerance:.3g}: "
             + ("increase max_steps" if is_cut else "more steps do not help, increase the tolerance")
             + ", or choose the linear solver 'hierarchical'"

@@ -91,7 +91,7 @@ def test_a_scene_that_does_not_allow_an_element_type_is_a_row_among_others() -> 
     runs = (*runs, *all_runs(free, [LINEAR], [uniform((20,))], [NEWTON]))
     rows = list(compute(error_tasks(runs, reference(), 1)))
     assert [row.status for row in rows] == ["refused", "converged"]
-    assert "after 1 steps of GMRES" in rows[0].message
+    assert "after 1 step of GMRES" in rows[0].message
 
 
 @pytest.mark.slow
