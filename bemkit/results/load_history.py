@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import astuple, dataclass, field
 from typing import TYPE_CHECKING, Protocol
 
@@ -9,6 +10,7 @@ import numpy as np
 
 from bemkit.arrays import FloatArray
 from bemkit.contact.body import ContactState, SlipHistory
+from bemkit.errors import ResultWarning
 from bemkit.results.contact_table import ContactTable
 
 if TYPE_CHECKING:
@@ -37,6 +39,10 @@ class StepEnd(Protocol):
 
 _COARSE = 0.01
 """Share of the external work that increments may lose without a warning."""
+_MISSED = 0.05
+"""Share of the dissipation that increments may miss without a warning."""
+_LITTLE = 1e-3
+"""Share of the external work below which missed dissipation does not matter."""
 
 
 @dataclass(frozen=True)
@@ -57,6 +63,10 @@ class StepWork:
     friction_gain : float [J/m]
         Work of friction where it acts along the slip of an increment at its end; round-off wherever friction opposes
         slip. It is no part of the balance.
+    missed_dissipation : float [J/m]
+        Estimate of what the trapezoidal rule misses in `dissipation` at nodes that begin to slip, or slip the other
+        way, within an increment: it takes the mean of the friction at both ends, but they slip under that of the end.
+        It is no part of the balance.
 
     Notes
     -----
@@ -68,6 +78,7 @@ class StepWork:
     dissipation: float = 0.0
     increment_work: float = 0.0
     friction_gain: float = 0.0
+    missed_dissipation: float = 0.0
 
     def __add__(self, other: StepWork) -> StepWork:
         """Return the work in both."""
@@ -200,6 +211,18 @@ class LoadHistory:
         """Whether the size of the increments leaves more than a hundredth of the external work unexplained."""
         work = self.total()
         return abs(work.increment_work) > _COARSE * abs(work.external_work)
+
+    def warnings(self) -> Iterator[ResultWarning]:
+        """Warn of increments in which so much slip begins or turns that the dissipation is too small."""
+        work = self.total()
+        missed = work.missed_dissipation
+        if self.is_complete and missed > max(_MISSED * (work.dissipation + missed), _LITTLE * abs(work.external_work)):
+            share = 100.0 * missed / (work.dissipation + missed)
+            text = (
+                f"Slip begins or turns inside increments: the dissipation is about {share:.2g} % too small. "
+                "Use more increments."
+            )
+            yield ResultWarning("coarse increments", "", text, missed)
 
     def where(self) -> str:
         """Describe how far the history has come."""

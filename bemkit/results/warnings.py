@@ -76,6 +76,7 @@ def find_warnings(solution: Solution) -> tuple[ResultWarning, ...]:
         _law_jumps(solution.contact, laws),
         _gap_jumps(solution),
         _no_load(solution),
+        () if solution.loading is None else solution.loading.warnings(),
         facing_away(solution.contact),
         _narrow_zones(solution.contact, smooth, remedy),
         _hidden_overlaps(solution.contacts_between_nodes, solution.contact, solution.units, remedy),

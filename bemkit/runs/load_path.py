@@ -30,6 +30,8 @@ MOST_LAWS = 60
 _SETTLED = 1e-10
 """Change of a converged law, relative to the largest bound."""
 
+_RESTED = 1e-6
+"""Slip of a node that rested, relative to its slip in the next increment."""
 _FAST, _SLOW = 10, 20
 """The next increment is twice as large after at most this number of steps of the solver, and half as large after more
 than the second number."""
@@ -107,6 +109,10 @@ class IncrementEnd:
         slip = moved[:, 1] - self.obstacle_slip
         of_friction = -sigma[:, 1] * slip
         dissipation = max(float(of_friction[is_held].sum()), 0.0)
+        # a node that rested, or slipped the other way, slips under the friction of the end only
+        turns = before.state.traction[:, 1] * self.state.traction[:, 1] <= 0.0
+        turns |= before.motion.last_slip <= _RESTED * units.displacement * np.abs(slip)
+        of_turns = weights * (self.state.traction - before.state.traction)[:, 1] * slip
         along_slip = 2.0 * weights * self.state.traction[:, 1] * slip
         (forces_before, displacements_before), (forces, displacements) = before.acting, self.acting
         of_forces = 0.5 * model.depth * float((forces_before + forces) @ (displacements - displacements_before))
@@ -115,6 +121,7 @@ class IncrementEnd:
             dissipation=dissipation,
             increment_work=float(sigma[:, 0] @ (approached - moved[:, 0])) + float(of_friction.sum()) - dissipation,
             friction_gain=float(np.maximum(along_slip, 0.0).sum()),
+            missed_dissipation=float(np.abs(of_turns[is_held & turns]).sum()),
         )
 
 

@@ -349,3 +349,33 @@ def test_laws_that_depend_on_slip_share_what_does_not_depend_on_the_law(monkeypa
     n_solves = sum(step.linear_solves for step in loading.steps)
     assert n_solves > 2 * len(loading.steps)
     assert n_responses <= 1.3 * n_solves
+
+
+def slider(n_increments: int) -> LoadHistory:
+    """Push a half-plane to and fro on a rigid floor: a spring of the compliance 1 / (pi E') that slips as a whole."""
+    scene = bk.Scene(
+        title="slider",
+        shape=bk.PeriodicHalfPlane(1.0),
+        material=bk.Material(100.0, 0.0),
+        law=bk.Coulomb(0.4),
+        far=bk.FarField(x=0.0, force_y=2.0),
+        parts=(bk.Part("floor", bk.Contact(bk.Gap())),),
+        steps=(bk.Step(5.0, {"far.x": "0.01 * sin(pi / 2 * t)"}, increments=5 * n_increments),),
+        mesh=bk.MeshOptions(8),
+    )
+    solution = bk.run(scene)
+    assert solution.loading is not None
+    names = [warning.kind for warning in solution.warnings]
+    assert ("coarse increments" in names) == (n_increments < 4)
+    return solution.loading
+
+
+@pytest.mark.parametrize(("n_increments", "tolerance"), [(1, 0.1), (2, 0.1), (8, 0.01)])
+def test_the_dissipation_that_coarse_increments_miss_is_estimated(n_increments: int, tolerance: float) -> None:
+    """A closed cycle of a slider of the friction F and the compliance c takes 4 F (A - c F)."""
+    friction, compliance = 0.8, 1.0 / (100.0 * np.pi)
+    cycle = slider(n_increments).total(n_increments)
+    exact = 4.0 * friction * (0.01 - compliance * friction)
+    assert cycle.dissipation + cycle.missed_dissipation == pytest.approx(exact, rel=tolerance)
+    if n_increments == 1:
+        assert cycle.dissipation < 0.8 * exact
