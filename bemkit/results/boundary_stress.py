@@ -208,9 +208,25 @@ def stress_at(boundary: BoundaryStress, points: FloatArray, part: str | None = N
         at, element, xi = at[is_of_part], element[is_of_part], xi[is_of_part]
     counts = np.bincount(at, minlength=len(points))
     _require(~location.is_on_boundary | (counts > 0), points, f"on the boundary, off part {part!r}", part)
-    # at a node the mean of the elements that meet there
-    np.add.at(stress, at, boundary.at(element, xi[:, None])[:, 0] / counts[at, None, None])
+    if at.size:  # at a node the mean of the elements that meet there
+        np.add.at(stress, at, boundary.at(element, xi[:, None])[:, 0] / counts[at, None, None])
     return stress
+
+
+def displacement_at(boundary: BoundaryStress, points: FloatArray) -> FloatArray:
+    """Evaluate the displacement inside a body and on its boundary; see `SolvedBody.displacement`."""
+    points = np.atleast_2d(np.asarray(points, float))
+    location = Locator(boundary.mesh).locate(points)
+    is_known = location.is_on_boundary | boundary.interior.is_inside(points)
+    _require(is_known, points, "outside of the body", None)
+    displacement = np.zeros((len(points), 2))
+    inside, on_it = np.flatnonzero(~location.is_on_boundary), np.flatnonzero(location.is_on_boundary)
+    if inside.size:
+        displacement[inside] = boundary.interior.displacement(points[inside])
+    if on_it.size:
+        places = location.element[on_it], location.xi[on_it, None]
+        displacement[on_it] = boundary.displacement_at(*places)[:, 0]
+    return displacement
 
 
 def _places(mesh: BoundaryMesh, location: Location) -> tuple[IntArray, IntArray, FloatArray]:

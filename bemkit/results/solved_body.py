@@ -177,6 +177,18 @@ class SolvedBody:
 
         return stress_at(self.boundary_stress, points, part)
 
+    def displacement(self, points: FloatArray) -> FloatArray:
+        """Evaluate the displacement (n, 2) [m] inside the body and on its boundary, at points (n, 2) [m].
+
+        Raises
+        ------
+        PointNotInsideError
+            If a point lies outside of the body.
+        """
+        from bemkit.results.boundary_stress import displacement_at
+
+        return displacement_at(self.boundary_stress, points)
+
     def side_stress(self, part: str) -> Table:
         """Return the stress along a part: ``s``, ``x``, ``y``, ``sigma_n``, ``sigma_t``, ``hoop``, ``von_mises``.
 

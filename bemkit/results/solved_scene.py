@@ -100,6 +100,10 @@ class SolvedScene:
         """Evaluate the stress (n, 2, 2) [Pa] inside the only body and on its boundary; see `SolvedBody.stress`."""
         return self.body.stress(points, part)
 
+    def displacement(self, points: FloatArray) -> FloatArray:
+        """Evaluate the displacement (n, 2) [m] inside the only body and on its boundary, at points (n, 2) [m]."""
+        return self.body.displacement(points)
+
     def side_stress(self, part: str) -> Table:
         """Return the stress along a part of the only body; see `SolvedBody.side_stress`."""
         return self.body.side_stress(part)

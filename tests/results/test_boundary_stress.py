@@ -106,6 +106,22 @@ def test_the_table_along_a_side_goes_from_its_start(uniaxial: bk.Solution) -> No
     assert {column.unit for column in table.columns} == {"m", "Pa"}
 
 
+def test_points_may_all_lie_inside(uniaxial: bk.Solution) -> None:
+    inside = (0.0, 1.5)
+    alone = uniaxial.stress([inside])
+    np.testing.assert_allclose(alone[0], uniaxial.stress(np.array([inside, TOP[0]]))[0], rtol=1e-12)
+    assert bk.run(bk.load_scene("paper-1")).stress([(0.5, 0.5)]).shape == (1, 2, 2)
+
+
+def test_displacements_inside_reach_those_on_the_boundary(uniaxial: bk.Solution) -> None:
+    nodes = uniaxial.boundary.points[:4]
+    on_boundary, near = uniaxial.displacement(nodes), uniaxial.displacement(0.999 * nodes)
+    np.testing.assert_allclose(on_boundary, uniaxial.boundary.displacement[:4], rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(near, on_boundary, atol=0.01 * np.abs(on_boundary).max())
+    with pytest.raises(ValueError, match="lies outside of the body"):
+        uniaxial.displacement([(100.0, 100.0)])
+
+
 def test_points_that_have_no_stress_are_refused(uniaxial: bk.Solution) -> None:
     with pytest.raises(PointNotInsideError, match=r"point 1 at \(0, 0\) lies outside of the body \(1 of 2 points\)"):
         uniaxial.stress(np.array([[0.0, 2.0], [0.0, 0.0]]))
