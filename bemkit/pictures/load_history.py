@@ -91,11 +91,11 @@ def draw_work(solution: Result, axes: Axes | None = None) -> Axes:
     taken = np.cumsum([0.0, *(step.work.dissipation for step in loading.steps)])
     energy = np.array([0.0, *(step.elastic_energy for step in loading.steps)])
     axes.plot(times, external, color=BLUE, label="external work")
-    axes.plot(times, taken, color=VERMILION, linestyle="--", label="taken by friction")
+    axes.plot(times, taken, color=VERMILION, linestyle="--", label="dissipation")
     axes.plot(times, energy, color=GREEN, linestyle="-.", label="elastic energy")
     if loading.has_coarse_increments:
         left = np.cumsum([0.0, *(step.work.increment_work for step in loading.steps)])
-        axes.plot(times, left, color=GREY, linestyle=":", label="left by increments")
+        axes.plot(times, left, color=GREY, linestyle=":", label="increment error")
     axes.set_xlabel("time $t$")
     axes.set_ylabel(with_unit("work and energy", "energy", units))
     axes.set_title(f"Work and energy\n{solution.title}", parse_math=False, fontsize=11)

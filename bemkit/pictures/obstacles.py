@@ -163,8 +163,7 @@ def outline_of(obstacle: object, frame: FloatArray) -> list[FloatArray]:
             surface = np.array([centre - reach * along, centre + reach * along])
             return [np.concatenate([surface, surface[::-1] + reach * inward])]
         case RigidCircle(centre=centre, radius=radius) | RigidCavity(centre=centre, radius=radius):
-            angle = np.linspace(0.0, 2.0 * np.pi, _POINTS_OF_CIRCLE)
-            return [np.array(centre) + radius * np.stack([np.cos(angle), np.sin(angle)], axis=1)]
+            return [_circle(np.array(centre), radius, frame)]
         case RigidPolygon(vertices=vertices):
             return [np.array(vertices, dtype=float)]
         case RigidSpline(is_closed=True):
@@ -180,6 +179,17 @@ def outline_of(obstacle: object, frame: FloatArray) -> list[FloatArray]:
         case SignedDistance(distance=distance):
             return _where_negative(distance, frame)
     return []
+
+
+def _circle(centre: FloatArray, radius: float, frame: FloatArray) -> FloatArray:
+    """Return a circle (n, 2) [m], with more points where a small frame shows a part of it."""
+    angle = np.linspace(0.0, 2.0 * np.pi, _POINTS_OF_CIRCLE)
+    across, up = frame.mean(axis=1) - centre
+    spread = float(np.hypot(*np.ptp(frame, axis=1))) / radius
+    if spread < 1.0:
+        near = np.arctan2(up, across) + np.linspace(-spread, spread, _POINTS_OF_CIRCLE)
+        angle = np.unique(np.concatenate([angle, near % (2.0 * np.pi)]))
+    return centre + radius * np.stack([np.cos(angle), np.sin(angle)], axis=1)
 
 
 def _where_negative(distance: Any, frame: FloatArray) -> list[FloatArray]:

@@ -59,6 +59,14 @@ def test_outlines_lie_on_the_surface(obstacle: bk.Obstacle, accuracy: float) -> 
     np.testing.assert_allclose(obstacle.gap(inside, np.zeros_like(inside)), 0.0, atol=accuracy)
 
 
+def test_a_small_part_of_a_large_circle_is_round() -> None:
+    (loop,) = outline_of(bk.RigidCircle((0.0, 1000.0), 1000.0), np.array([[-0.5, 0.5], [-0.5, 0.5]]))
+    near = loop[np.abs(loop[:, 0]) < 0.5]
+    assert np.ptp(near[:, 1]) > 0.0
+    assert np.hypot(*np.diff(loop, axis=0).T).min() > 0.0
+    assert np.diff(np.sort(near[:, 0])).max() < 0.02
+
+
 @pytest.mark.parametrize("obstacle", [bk.Gap(0.1), bk.SignedDistance(bk.Expression("y - sqrt(x)"))])
 def test_what_has_no_outline_in_the_frame_is_told(obstacle: bk.Obstacle) -> None:
     assert outline_of(obstacle, FRAME) == []
