@@ -30,7 +30,7 @@ class Explorable(ShownInNotebooks):
         text: str = import_module("bemkit.results.summary_rows").summary_text(self)
         return text
 
-    def plot(self, what: str, part: str | None = None) -> Any:
+    def plot(self, what: str = "deformation", part: str | None = None) -> Any:
         """Draw a picture.
 
         Parameters

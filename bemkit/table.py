@@ -67,6 +67,14 @@ class Table:
     columns: tuple[Column, ...]
     rows: tuple[tuple[Any, ...], ...]
 
+    def __repr__(self) -> str:
+        """Return one line; the rows may be thousands."""
+        return f"Table({len(self.rows)} rows: {', '.join(self.names)})"
+
+    def __str__(self) -> str:
+        """Return the table as Markdown."""
+        return self.to_markdown()
+
     @classmethod
     def from_records(cls, record: type, records: Iterable[Any]) -> Self:
         """Return the table of instances of a dataclass; see `column`."""

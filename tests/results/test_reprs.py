@@ -18,6 +18,12 @@ def test_results_show_themselves_in_a_line() -> None:
     assert repr(solution.contact) == f"ContactTable(10 nodes: {', '.join(f'{n} {w}' for w, n in counts.items())})"
 
 
+def test_a_table_shows_its_size_and_prints_its_rows() -> None:
+    solution = bk.run(dataclasses.replace(bk.load_scene("paper-1"), mesh=bk.MeshOptions(elements=40)))
+    assert repr(solution.forces) == "Table(4 rows: name, force_x, force_y, moment)"
+    assert str(solution.forces).splitlines()[2].startswith("| foundation | 0.0")
+
+
 def test_without_contact_nothing_is_said_of_it() -> None:
     solution = bk.run(dataclasses.replace(bk.load_scene("bending"), mesh=bk.MeshOptions(elements=20)))
     assert "contact nodes" not in repr(solution)
