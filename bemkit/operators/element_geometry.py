@@ -61,10 +61,13 @@ class ElementGeometry:
         return self.curved.about_centre[:, elements]
 
     def point(self, elements: IntArray, xi: float) -> ComplexArray:
-        """Return the points of some elements at one local coordinate in [-1, 1]."""
-        if self.curved is None:
-            return self.centre[elements] + (xi * self.half * self.tangent)[elements]
-        return self.centre[elements] + (self.half * self.tangent)[elements] * self.curved.at(elements, xi)
+        """Return the points (n,) of some elements at one local coordinate in [-1, 1]."""
+        return np.asarray(self.centre[elements] + self.from_centre(elements, xi))
+
+    def from_centre(self, elements: IntArray, xi: FloatArray | float) -> ComplexArray:
+        """Return points (n,) of elements (n,) relative to their centres, at one local coordinate or one for each."""
+        along = xi if self.curved is None else self.curved.at(elements, xi)
+        return np.asarray((self.half * self.tangent)[elements] * along)
 
     def offset(self, elements: IntArray, fraction: FloatArray, at_start: BoolArray) -> ComplexArray:
         """Return points relative to one end node, with full relative accuracy at any distance from it.

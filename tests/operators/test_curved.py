@@ -33,7 +33,7 @@ from bemkit.geometry.neighbours import corner_nodes
 from bemkit.geometry.placement import Placement
 from bemkit.operators.boundary import SteklovPoincareOperator
 from bemkit.operators.element_geometry import ElementGeometry
-from bemkit.operators.integrals.inner import inner_integrals, inner_on_element
+from bemkit.operators.integrals.inner import inner_integrals
 from bemkit.operators.integrals.pairs import Degrees, PairIntegrals
 from bemkit.operators.integrals.sweep import PairSweep
 from bemkit.operators.material import Material
@@ -125,21 +125,6 @@ def test_inner_integrals_against_extended_precision(n_elements: int) -> None:
                 assert inner.log[b][0] == pytest.approx(float(log), abs=tolerance)
                 assert inner.quotient[b][0] == pytest.approx(complex(quotient), abs=tolerance)
                 assert inner.double[b][0] == pytest.approx(float(angle), abs=tolerance)
-
-
-def test_principal_values_on_the_element_itself() -> None:
-    # on a circle k is the constant -1 / (4 pi R), and log|x - y| = log(2 R |sin|)
-    geometry = ElementGeometry(discretise(Disk(1.3).outline(), n_elements=8))
-    bend = np.pi / 8
-    for xi in (0.0, 0.6, -0.9):
-        inner = inner_on_element(geometry, Degrees(log=(0, 1), double=(0, 2)), np.array([2]), xi)
-        assert inner.double[0][0] == pytest.approx(-bend, abs=1e-14)  # 2 pi k times the length 2 R bend / half
-        assert inner.double[1][0] == pytest.approx(0.0, abs=1e-14)
-        distance, weight = graded(60)
-        pieces = [
-            np.sum(weight * side * np.log(2 * np.sin(bend * side * distance / 2) / bend)) for side in (1 - xi, 1 + xi)
-        ]
-        assert inner.log[0][0] == pytest.approx(sum(pieces), abs=4e-14)  # the rule of the reference
 
 
 # --- pairs of elements against rules that know nothing of the method ---

@@ -1,13 +1,16 @@
-"""Displacements of constant and linear densities on elements of any shape, by quadrature.
+"""Displacements of constant and linear densities on elements of any shape.
 
-Far from an element a Gauss rule on its arc is used, with fewer points at a large distance; near it the integrals are
-closed forms (`exact_factors`). With y on the arc, rho = x - y, the density f and dy = tangent ds:
+Straight elements have closed forms (`layers`); curved elements take Gauss rules on their arcs, with fewer points at a
+large distance, and on pieces near a point. With y on the arc, rho = x - y, the density f and dy = tangent ds:
 
     U f p = A sum f [(1/2 - kappa log|rho / r0|) p + (rho / conj(rho)) conj(p) / 2] ds,      A = 1 / (8 pi mu (1 - nu))
     T f v = B sum [(2 - 2 nu) Im - i (1 - 2 nu) Re](f dy / rho) v + B sum (rho / conj(rho)) Im(dy / rho) conj(f v),
 
 where B = 1 / (4 pi (1 - nu)), and f is real in the first equation. A slope s is the density s p(t) with the polynomial
 p of the element (`bemkit.operators.integrals.curved_geometry`).
+
+At the midpoint of an element, t = 0, a rule with an even number of points gives the principal value of 1 / t, and
+log|rho| is the smooth log|rho / t| plus log|t|, whose integral is -2.
 """
 
 from __future__ import annotations
@@ -18,24 +21,23 @@ import numpy as np
 
 from bemkit.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from bemkit.geometry.quadrature import gauss_legendre
-from bemkit.operators import kernels
-from bemkit.operators.collocation.layers import Constants
+from bemkit.operators.collocation.layers import Constants, straight_factors
 from bemkit.operators.element_geometry import ElementGeometry
 from bemkit.operators.integrals import curved_geometry
-from bemkit.operators.integrals.inner import inner_integrals, inner_on_element, store
-from bemkit.operators.integrals.pairs import Degrees, Inner
+from bemkit.operators.integrals.splitting import SEPARATION, split_until
 from bemkit.operators.material import Material
 
-CURVED_DISTANCE = 4.5
-"""Distance in the parameter (`ElementGeometry.distance_at`) from which on curved elements take a Gauss rule."""
-CURVED_POINTS = 8
-"""Points of that rule, with an error of about (4.5 + sqrt(4.5^2 - 1))^-16, below 1e-15."""
+_NEAR, _NEAR_POINTS = 4.5, 16
+"""Distance in the parameter (`ElementGeometry.distance_at`) below which elements are divided into pieces, and the
+points of each piece, which must be even."""
+_POINTS = 8
+"""Points beyond that distance, with an error of about (4.5 + sqrt(4.5^2 - 1))^-16, below 1e-15."""
 _FAR, _FEW_POINTS = 30.0, 4
 """Distance from which on a smaller rule is used, with an error of about (2 * 30)^-8, below 1e-14."""
 
 
 class _Rule(NamedTuple):
-    """Points y, steps dy and values of p on all elements, (n_elements, n_points) complex arrays."""
+    """Points y, steps dy and values of p on elements, (n_points, n_elements) complex arrays."""
 
     y: ComplexArray
     dy: ComplexArray
@@ -57,11 +59,9 @@ class CurvedElements:
 
     def __init__(self, geometry: ElementGeometry, material: Material, order: IntArray, log_length: float) -> None:
         self.constants, self.order, self.geometry = Constants.of(material, log_length), order, geometry
-        # distances below which closed forms are used, and above which the smaller rule is used
-        self.near, self.far = (
-            (geometry.half * geometry.distance_at(distance))[order] for distance in (CURVED_DISTANCE, _FAR)
-        )
-        self.rule, self.small_rule = (_rule(geometry, order, n_points) for n_points in (CURVED_POINTS, _FEW_POINTS))
+        self.near, self.far = ((geometry.half * geometry.distance_at(distance))[order] for distance in (_NEAR, _FAR))
+        rules = (_rule(geometry, order, n_points) for n_points in (_POINTS, _FEW_POINTS))
+        self.rule, self.small_rule = (rule._replace(y=rule.y + geometry.centre[order]) for rule in rules)
 
     def factors(self, is_double: bool, x: ComplexArray, centred_on: IntArray, elements: IntArray) -> ComplexArray:
         """Return the factors (n, 2 or 4, n_points) of densities on some elements; see `layers.straight_factors`.
@@ -71,43 +71,77 @@ class CurvedElements:
         is_double : bool
         x : (n_points,) complex array
         centred_on : (n_points,) array
-            The element whose midpoint is x, where T is a principal value; otherwise any other number.
+            Index among `elements` of the one whose midpoint is x, where T is a principal value; otherwise -1.
         elements : (n,) array
         """
         geometry, mesh_elements = self.geometry, self.order[elements]
-        distance = np.abs(x - geometry.centre[mesh_elements][:, None])
-        is_far = distance.min(axis=1, initial=np.inf) > self.far[elements]
         result = np.empty((elements.size, 4 if is_double else 2, x.size), complex)
-        for chosen, rule in ((np.flatnonzero(~is_far), self.rule), (np.flatnonzero(is_far), self.small_rule)):
+        is_straight, index = geometry.is_straight[mesh_elements], np.full(elements.size + 1, -1)
+        straight, curved = np.flatnonzero(is_straight), np.flatnonzero(~is_straight)
+        if straight.size:
+            index[straight] = np.arange(straight.size)
+            ends = geometry.start[mesh_elements[straight]], geometry.end[mesh_elements[straight]]
+            result[straight] = straight_factors(self.constants, is_double, x, index[centred_on], *ends)
+        distance = np.abs(x - geometry.centre[mesh_elements[curved]][:, None])
+        is_far = distance.min(axis=1, initial=np.inf) > self.far[elements[curved]]
+        for chosen, rule in ((curved[~is_far], self.rule), (curved[is_far], self.small_rule)):
             with np.errstate(all="ignore"):  # near pairs may overflow here; they are replaced
-                arcs = _Rule(*(values[elements[chosen]] for values in rule))
+                arcs = _Rule(*(values[:, elements[chosen]] for values in rule))
                 result[chosen] = _gauss_layer(self.constants, is_double, x, arcs)
-        element, point = np.nonzero(distance < self.near[elements][:, None])
-        if element.size:
-            is_midpoint = centred_on[point] == elements[element]
-            exact = exact_factors(geometry, self.constants, x[point], mesh_elements[element], is_midpoint)
-            result[element, :, point] = (exact[[2, 4, 3, 5]] if is_double else exact[:2]).T
+        row, point = np.nonzero(distance < self.near[elements[curved]][:, None])
+        if row.size:
+            element = curved[row]
+            is_midpoint = centred_on[point] == element
+            result[element, :, point] = self._near(is_double, x[point], mesh_elements[element], is_midpoint)
+        return result
+
+    def _near(self, is_double: bool, x: ComplexArray, elements: IntArray, is_midpoint: BoolArray) -> ComplexArray:
+        """Return the factors (n, 2 or 4) of curved elements (n,) of the mesh, each at one near point."""
+        geometry, constants = self.geometry, self.constants
+        least_distance = (geometry.half * geometry.distance_at(SEPARATION))[elements]
+        # relative to the centre, where the midpoint of a polynomial has no round-off
+        x = np.where(is_midpoint, geometry.from_centre(elements, 0.0), x - geometry.centre[elements])
+
+        def is_away(pair: IntArray, low: FloatArray, high: FloatArray) -> BoolArray:
+            middle = geometry.from_centre(elements[pair], 0.5 * (low + high))
+            away: BoolArray = np.abs(x[pair] - middle) >= 0.5 * (high - low) * least_distance[pair]
+            return away | is_midpoint[pair]
+
+        pair, low, high = split_until(is_away, x.size, -1.0, 1.0)
+        order = np.argsort(pair, kind="stable")
+        pair, low, high = pair[order], low[order], high[order]
+        rule = _rule(geometry, elements[pair], _NEAR_POINTS, low, high)
+        on_pieces = _gauss_layer(constants, is_double, x[pair, None], rule)[:, :, 0]
+        result = np.add.reduceat(on_pieces, np.searchsorted(pair, np.arange(x.size)))
+        if not is_double:
+            t, weights = gauss_legendre(_NEAR_POINTS)
+            kappa, missing = 3.0 - 4.0 * constants.poisson_ratio, -2.0 - weights @ np.log(np.abs(t))
+            result[is_midpoint, 0] -= (constants.single * kappa * missing) * geometry.half[elements[is_midpoint]]
         return result
 
 
-def _rule(geometry: ElementGeometry, order: IntArray, n_points: int) -> _Rule:
-    """Return the Gauss rule on the arcs of all elements."""
-    polynomials, scale = geometry.polynomials(order), (geometry.half * geometry.tangent)[order]
-    slopes = curved_geometry.derivative(polynomials)
-    y, dy, p = np.empty((3, order.size, n_points), complex)
-    for k, (t, weight) in enumerate(zip(*gauss_legendre(n_points), strict=True)):
-        parameter = np.full(order.size, t + 0j)
-        p[:, k] = curved_geometry.evaluate(polynomials, parameter)
-        y[:, k] = geometry.centre[order] + scale * p[:, k]
-        dy[:, k] = weight * scale * curved_geometry.evaluate(slopes, parameter)
-    return _Rule(y, dy, p)
+def _rule(
+    geometry: ElementGeometry,
+    elements: IntArray,
+    n_points: int,
+    low: FloatArray | float = -1.0,
+    high: FloatArray | float = 1.0,
+) -> _Rule:
+    """Return the Gauss rule on elements, or on pieces between two local coordinates; y is relative to the centre."""
+    polynomials, scale = geometry.polynomials(elements), (geometry.half * geometry.tangent)[elements]
+    xi, weights = gauss_legendre(n_points)
+    half = np.broadcast_to(0.5 * (np.asarray(high) - low), elements.shape)
+    t = (0.5 * (np.asarray(high) + low) + half * xi[:, None]).astype(complex)
+    p = curved_geometry.evaluate(polynomials, t)
+    slope = curved_geometry.evaluate(curved_geometry.derivative(polynomials), t)
+    return _Rule(scale * p, weights[:, None] * half * scale * slope, p)
 
 
 def _gauss_layer(constants: Constants, is_double: bool, x: ComplexArray, rule: _Rule) -> ComplexArray:
-    """Return the factors of densities from a Gauss rule."""
+    """Return the factors of densities at points (n_points,) or (n_elements, n_points) from a Gauss rule."""
     nu = constants.poisson_ratio
-    result = np.zeros((len(rule.y), 4 if is_double else 2, x.size), complex)
-    for y, dy, p in zip(rule.y.T[:, :, None], rule.dy.T[:, :, None], rule.p.T[:, :, None], strict=True):
+    result = np.zeros((rule.y.shape[1], 4 if is_double else 2, x.shape[-1]), complex)
+    for y, dy, p in zip(*(values[:, :, None] for values in rule), strict=True):
         rho = x - y
         squared = np.square(rho.real) + np.square(rho.imag)
         turn = rho * rho / squared
@@ -124,82 +158,3 @@ def _gauss_layer(constants: Constants, is_double: bool, x: ComplexArray, rule: _
         result[:, 2] += of_conjugate
         result[:, 3] += p.conj() * of_conjugate
     return result
-
-
-def exact_factors(
-    geometry: ElementGeometry, constants: Constants, x: ComplexArray, elements: IntArray, is_midpoint: BoolArray
-) -> ComplexArray:
-    """Return the factors (6, n) of p, conj(p), v, conj(v), s and conj(s) in closed form, exact at any distance.
-
-    Parameters
-    ----------
-    geometry : ElementGeometry
-    constants : Constants
-    x : (n,) complex array
-    elements : (n,) array
-        The element of each point.
-    is_midpoint : (n,) bool array
-        Whether the point is the midpoint of the element.
-    """
-    result = np.zeros((6, elements.size), complex)
-    is_straight = geometry.is_straight[elements]
-    for chosen in (np.flatnonzero(is_straight), np.flatnonzero(~is_straight)):
-        if chosen.size:
-            result[:, chosen] = _of_one_kind(geometry, constants, x[chosen], elements[chosen], is_midpoint[chosen])
-    return result
-
-
-def _of_one_kind(
-    geometry: ElementGeometry, constants: Constants, x: ComplexArray, elements: IntArray, is_midpoint: BoolArray
-) -> ComplexArray:
-    """Return the factors of pairs whose elements are all straight or all curved."""
-    from_start, from_end = x - geometry.start[elements], x - geometry.end[elements]
-    plus, minus = from_start * geometry.to_local[elements], from_end * geometry.to_local[elements]
-    is_straight = bool(geometry.is_straight[elements[0]])
-    polynomials = geometry.polynomials(elements)[: 2 if is_straight else None]
-    highest = len(polynomials) - 1
-    degrees = Degrees(log=(0, highest - 1), double=(0, highest))
-    inner = inner_integrals(geometry, degrees, elements, from_start, from_end)
-    if is_midpoint.any():
-        store(inner, is_midpoint, inner_on_element(geometry, degrees, elements[is_midpoint], 0.0))
-        if is_straight:
-            plus[is_midpoint], minus[is_midpoint] = 1.0, -1.0
-    # eta is more accurate if measured from the nearer end
-    eta = np.where(np.abs(plus) < np.abs(minus), plus.imag, minus.imag)
-    log_ratio = np.log(np.abs(plus)) - np.log(np.abs(minus))
-    # difference of rho / conj(rho) between the ends, without cancellation
-    quotient_change = (plus - minus).real * eta / (plus * minus).conj()
-    half, b = geometry.half[elements], -constants.double
-    a, kappa = constants.single * half, 3.0 - 4.0 * constants.poisson_ratio
-    turn, angle, ratio = geometry.tangent[elements] ** 2, 0.5 / np.pi, b * (1.0 - 2.0 * constants.poisson_ratio)
-    double, log_moment, quotient_moment = _moments_by_parts(inner, polynomials, plus, minus)
-    return np.array(
-        [
-            a * (1.0 - 2.0 * kappa * np.log(half / constants.log_length)) - a * kappa * inner.log[0],
-            a * turn * (0.5 * inner.quotient[0]),
-            angle * inner.double[0] + 1j * ratio * log_ratio,
-            b * turn * quotient_change,
-            angle * double + 1j * ratio * log_moment,
-            b * turn * quotient_moment,
-        ]
-    )
-
-
-def _moments_by_parts(
-    inner: Inner, polynomials: ComplexArray, plus: ComplexArray, minus: ComplexArray
-) -> tuple[FloatArray | ComplexArray, FloatArray | ComplexArray, ComplexArray]:
-    """Return the moments of the linear density by partial integration.
-
-    `plus` and `minus` are the local coordinates of the point relative to start and end of the element.
-    """
-    coefficients = kernels.legendre_of_monomials(len(polynomials) - 1).T @ polynomials
-    slopes = np.polynomial.legendre.legder(coefficients)
-    signs = (-1.0) ** np.arange(len(coefficients))  # P_k at the start; it is one at the end
-    at_start, at_end = signs @ coefficients, coefficients.sum(axis=0)
-    double = sum(factor * value for factor, value in zip(coefficients, inner.double, strict=False))
-    log_ratio = at_start * np.log(np.abs(plus)) - at_end * np.log(np.abs(minus))
-    quotient_change = at_end.conj() * (minus / minus.conj()) - at_start.conj() * (plus / plus.conj())
-    for slope, log, quotient in zip(slopes, inner.log, inner.quotient, strict=False):
-        log_ratio = log_ratio + slope * log
-        quotient_change -= slope.conj() * quotient
-    return double, log_ratio, -0.5j * quotient_change

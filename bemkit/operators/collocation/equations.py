@@ -181,7 +181,7 @@ class CollocationEquations:
         self, is_double: bool, x: ComplexArray, centred_on: IntArray, elements: IntArray, unknowns: Unknowns
     ) -> ComplexArray:
         """Return the displacements (n_columns, n_points) of unknowns on some elements, ascending; see `Layer`."""
-        curved = self.curved
+        curved, centred_on = self.curved, positions_of(centred_on, elements)
         if curved is not None:
             return combined(
                 lambda points: curved.factors(is_double, x[points], centred_on[points], elements),
@@ -189,7 +189,7 @@ class CollocationEquations:
                 unknowns,
             )
         ends = self.start[elements], self.end[elements]
-        return self.layer(self.constants, is_double, x, positions_of(centred_on, elements), ends, unknowns)
+        return self.layer(self.constants, is_double, x, centred_on, ends, unknowns)
 
     def _unknowns(self, elements: IntArray, columns: IntArray, is_double: bool) -> tuple[IntArray, Unknowns]:
         """Return the elements on which unknowns of one kind act, ascending, and the unknowns on these.

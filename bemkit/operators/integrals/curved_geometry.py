@@ -59,9 +59,9 @@ class CurvedGeometry:
     about_end: ComplexArray
     bend: FloatArray
 
-    def at(self, elements: IntArray, t: float) -> ComplexArray:
-        """Return p(t) of some elements (n,) at one local coordinate."""
-        return evaluate(self.about_centre[:, elements], np.full(elements.size, t + 0j))
+    def at(self, elements: IntArray, t: FloatArray | float) -> ComplexArray:
+        """Return p(t) (n,) of elements (n,) at local coordinates, one for all or one for each."""
+        return evaluate(self.about_centre[:, elements], np.full(elements.size, t, complex))
 
     def slopes_from_end(self, elements: IntArray, shift: FloatArray, at_start: BoolArray) -> ComplexArray:
         """Return (p(end + shift) - p(end)) / shift (n,) of some elements from their start or their other end node."""

@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from bemkit.arrays import BoolArray, ComplexArray, FloatArray, IntArray
+from bemkit.arrays import ComplexArray, FloatArray, IntArray
 from bemkit.geometry.quadrature import gauss_legendre
 from bemkit.operators import kernels
 from bemkit.operators.element_geometry import ElementGeometry
@@ -48,11 +48,13 @@ def inner_integrals(
     near = np.flatnonzero(np.abs(zeta) < geometry.distance_at(curved_geometry.ELLIPSE)[trial])
     t_plus, t_minus, is_found = curved_geometry.find_parameters(geometry.curved, trial[near], plus[near], minus[near])
     near = near[is_found]
-    store(result, near, near_inner(degrees, geometry.polynomials(trial[near]), t_plus[is_found], t_minus[is_found]))
+    _store(result, near, near_inner(degrees, geometry.polynomials(trial[near]), t_plus[is_found], t_minus[is_found]))
     is_far = np.ones(trial.size, bool)
     is_far[near] = False
     far = np.flatnonzero(is_far)
-    store(result, far, far_inner(degrees, geometry.polynomials(trial[far]), zeta[far], N_SMOOTH + degrees.extra_points))
+    _store(
+        result, far, far_inner(degrees, geometry.polynomials(trial[far]), zeta[far], N_SMOOTH + degrees.extra_points)
+    )
     return result
 
 
@@ -62,18 +64,7 @@ def local_coordinates(geometry: ElementGeometry, trial: IntArray, from_start: Co
     return zeta
 
 
-def inner_on_element(geometry: ElementGeometry, degrees: Degrees, elements: IntArray, xi: float) -> Inner:
-    """Integrate over elements for their own points at the local coordinate `xi`; k is a principal value."""
-    end: ComplexArray = np.full(elements.size, 1.0 + 0j)
-    integrals, log_product = kernels.near_integrals(xi + end, xi - end, degrees.highest_integral)
-    principal = integrals.real.astype(complex)
-    straight = Inner.straight(degrees, principal, log_product, np.zeros(elements.size))
-    if geometry.curved is None or bool(geometry.is_straight[elements].all()):
-        return straight
-    return _sum(straight, bending(degrees, geometry.polynomials(elements), np.full(elements.size, xi + 0j)))
-
-
-def store(result: Inner, chosen: IntArray | BoolArray, values: Inner) -> None:
+def _store(result: Inner, chosen: IntArray, values: Inner) -> None:
     """Write the integrals of chosen points."""
     result.log[:, chosen] = values.log
     result.quotient[:, chosen] = values.quotient

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from bemkit.arrays import ComplexArray, IntArray
-from bemkit.geometry import BoundaryMesh, PlateWithHole, Rectangle, discretise
+from bemkit.geometry import BoundaryMesh, Disk, PlateWithHole, Rectangle, discretise
 from bemkit.geometry.symmetry.lines import Symmetry
 from bemkit.operators.collocation import compiled
 from bemkit.operators.collocation.curved_elements import CurvedElements
@@ -146,6 +146,22 @@ def test_fields_anywhere_are_integrals_of_the_kernel(backend: str) -> None:
     np.testing.assert_allclose(double, expected, atol=1e-14)
 
 
+def test_midpoints_of_arcs_have_principal_values() -> None:
+    mesh, bend = discretise(Disk(1.3).outline(), n_elements=8), np.pi / 8
+    elements = CurvedElements(ElementGeometry(mesh), MATERIAL, np.arange(8), 1.0)
+    constants, nu = elements.constants, MATERIAL.effective_poisson_ratio
+    x, own, element = mesh.centres[2:3] @ [1.0, 1j], np.array([0]), np.array([2])
+    v = elements.factors(True, x, own, element)[0, 0, 0]
+    # chords from the midpoint turn by half of the angle of the arc
+    assert v == pytest.approx(-2.0 * (1.0 - nu) * bend * constants.double, abs=1e-15)
+    # log|x - y| = log(2.6 sin(angle / 2))
+    distance, weights = np.polynomial.legendre.leggauss(40)
+    angle, measure = bend * (0.5 * (distance + 1.0)) ** 4, 2.0 * bend * (0.5 * (distance + 1.0)) ** 3 * weights
+    log = 2.0 * 1.3 * np.sum(measure * np.log(2.6 * np.sin(0.5 * angle)))
+    p = elements.factors(False, x, own, element)[0, 0, 0]
+    assert p == pytest.approx(constants.single * (1.3 * bend - (3.0 - 4.0 * nu) * log), rel=1e-13)
+
+
 def test_quadrature_gives_the_closed_forms_where_elements_are_straight(backend: str) -> None:
     mesh, order = straight(Rectangle(1.0, 1.0), 48), np.random.default_rng(2).permutation(48)
     geometry, constants = ElementGeometry(mesh), Constants.of(MATERIAL, mesh.diameter)
@@ -156,7 +172,7 @@ def test_quadrature_gives_the_closed_forms_where_elements_are_straight(backend: 
     x = np.append(centre[0] + np.array([1e-3, 0.03j, 0.06, 0.07j, 0.3 + 0.2j, 2.0]), centre[2])
     places = np.append(np.full(6, NOWHERE), 47)
     expected = fields_of(backend, constants, x, np.where(places == 47, 2, NOWHERE), start, end)
-    layers = (elements.factors(is_double, x, places, chosen) for is_double in (False, True))
+    layers = (elements.factors(is_double, x, np.where(places == 47, 2, -1), chosen) for is_double in (False, True))
     np.testing.assert_allclose(stacked(*layers), expected, atol=1e-14)
 
 
