@@ -9,44 +9,42 @@ import click
 
 from bemkit.cli import options
 from bemkit.cli.options import shown_progress
-from bemkit.cli.outputs import Outputs, TextFile
+from bemkit.cli.outputs import Outputs, json_of
 from bemkit.errors import InputError, concerning
 from bemkit.scene.unit_names import unit_of
-from bemkit.table import json_text
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Callable, Mapping
 
     from matplotlib.figure import Figure
 
     from bemkit.contact.coulomb_limit import CoulombLimit
     from bemkit.model.rigid_blocks import JointForces
+    from bemkit.scene.scene import Scene
 
 
 @click.command()
 @click.argument("scene")
 @click.option("--thrust", "contact", metavar="CONTACT", help="Find the smallest and largest thrust at a contact.")
 @click.option("--along", type=float, nargs=2, metavar="X Y", default=(1.0, 0.0), help="Direction of the thrust (1 0).")
-@options.settings_option
+@options.changes_scene("settings")
 @options.json_option
 @options.plot_option
 def collapse(
     scene: str,
     contact: str | None,
     along: tuple[float, float],
-    settings: tuple[str, ...],
     json_file: str | None,
     folder: str | None,
+    load: Callable[[str], Scene],
 ) -> None:
     """Find the load factors at which the bodies of SCENE, as rigid blocks, collapse, or the thrust at a contact."""
     if folder is not None and contact is None:
         raise click.UsageError("--plot draws the line of thrust: add --thrust CONTACT")
     with shown_progress(quiet=False), concerning(scene):
         from bemkit.runs.collapse import coulomb_load_factor, thrust
-        from bemkit.scene.keys import with_settings
-        from bemkit.scene.toml import load_scene
 
-        chosen = with_settings(load_scene(scene), settings)
+        chosen = load(scene)
         if not chosen.bodies:
             raise InputError("the scene is a single body: give one with tables [bodies.NAME]")
 
@@ -57,8 +55,7 @@ def collapse(
             drawn: list[Any] = [draw_thrust(chosen, state).get_figure(root=True) for state in states]
             return dict(zip(names, drawn, strict=True))
 
-        texts = (TextFile[dict[str, Any]](json_file, json_text),)
-        outputs = Outputs(texts)
+        outputs: Outputs[dict[str, Any]] = Outputs((json_of(json_file, dict),))
         figures = Outputs((), folder, pictures, "smallest-thrust")
         figures.check(outputs.check())
         unit, per = unit_of("force", chosen.result_units), "" if chosen.thickness else "  per unit thickness"

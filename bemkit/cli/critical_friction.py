@@ -3,37 +3,37 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from bemkit.cli import options
 from bemkit.cli.options import shown_progress
-from bemkit.cli.outputs import Outputs, TextFile
+from bemkit.cli.outputs import Outputs, json_of
 from bemkit.errors import concerning
-from bemkit.table import json_text
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from bemkit.runs.critical_friction import CriticalFriction
+    from bemkit.scene.scene import Scene
 
 
 @click.command("critical-friction")
 @click.argument("scene")
-@options.elements_option
-@options.accuracy_option
+@options.changes_scene("elements", "accuracy")
 @options.json_option
-def critical_friction(scene: str, elements: int | None, accuracy: float | None, json_file: str | None) -> None:
+def critical_friction(scene: str, json_file: str | None, load: Callable[[str], Scene]) -> None:
     """Find the friction coefficients at which sliding states of SCENE lose uniqueness."""
     with shown_progress(quiet=False), concerning(scene):
         from bemkit.runs.critical_friction import critical_friction as critical_friction_of
-        from bemkit.scene.toml import load_scene, with_overrides
 
-        chosen = with_overrides(load_scene(scene), elements=elements, accuracy=accuracy)
+        chosen = load(scene)
 
-        def as_json(found: CriticalFriction) -> str:
-            return json_text({"title": chosen.title, **found.as_dict()})
+        def entries(found: CriticalFriction) -> dict[str, Any]:
+            return {"title": chosen.title, **found.as_dict()}
 
-        outputs = Outputs((TextFile(json_file, as_json),))
+        outputs = Outputs((json_of(json_file, entries),))
         outputs.check()
         found = critical_friction_of(chosen)
     outputs.write(found)

@@ -5,9 +5,10 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, ExitStack, nullcontext
-from functools import partial
+from functools import partial, wraps
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, Literal
 
 import click
 
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from bemkit.results.solution import Solution
+    from bemkit.scene.scene import Scene
     from bemkit.solvers.base import StepRecord
     from bemkit.studies.engine import Task
     from bemkit.studies.row_file import R
@@ -66,19 +68,62 @@ def file_of(ending: str) -> Callable[[click.Context, click.Parameter, str | None
     return checked
 
 
-elements_option = click.option("--elements", type=int, metavar="N", help="Number of boundary elements.")
-accuracy_option = click.option(
-    "--accuracy", type=float, metavar="E", help="Refine until the estimated relative error is below E."
+_CHANGES = MappingProxyType(
+    {
+        "settings": click.option(
+            "--set",
+            "settings",
+            multiple=True,
+            metavar="KEY=VALUE",
+            help="Change the scene at a key of its file; repeatable.",
+        ),
+        "elements": click.option("--elements", type=int, metavar="N", help="Number of boundary elements."),
+        "accuracy": click.option(
+            "--accuracy", type=float, metavar="E", help="Refine until the estimated relative error is below E."
+        ),
+        "discretisation": click.option(
+            "--discretisation", metavar="NAME", help="Elements: hp, quadratic, linear or constant."
+        ),
+        "degree": click.option(
+            "--degree", metavar="P|hp", callback=degree_of, help="Galerkin elements of degree P, or hp refinement."
+        ),
+        "solver": click.option("--solver", metavar="NAME", help="Such as augmented-lagrangian."),
+        "rho": click.option("--rho", type=float, metavar="R", help="Penalty of the solver [E'/L]."),
+    }
 )
-discretisation_option = click.option(
-    "--discretisation", metavar="NAME", help="Elements: hp, quadratic, linear or constant."
-)
-degree_option = click.option(
-    "--degree", metavar="P|hp", callback=degree_of, help="Galerkin elements of degree P, or hp refinement."
-)
-settings_option = click.option(
-    "--set", "settings", multiple=True, metavar="KEY=VALUE", help="Change the scene at a key of its file; repeatable."
-)
+"""Options that change a scene, by the names of `with_overrides`, and settings."""
+
+
+def changes_scene(*names: str) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+    """Give a command options that change its scene, by their names in `_CHANGES`.
+
+    In place of their values the command has an argument ``load``: the name of a scene or its file -> the changed scene.
+    """
+
+    def decorated(command: Callable[..., Any]) -> Callable[..., Any]:
+        @wraps(command)
+        def changed(**given: Any) -> Any:
+            changes = {name: given.pop(name) for name in names}
+            return command(load=partial(_loaded, changes), **given)
+
+        for name in reversed(names):
+            changed = _CHANGES[name](changed)
+        return changed
+
+    return decorated
+
+
+def _loaded(changes: Mapping[str, Any], scene: str) -> Scene:
+    from bemkit.scene.toml import load_scene, with_overrides
+
+    chosen, overrides = load_scene(scene), dict(changes)
+    if settings := overrides.pop("settings", ()):
+        from bemkit.scene.keys import with_settings
+
+        chosen = with_settings(chosen, settings)
+    return with_overrides(chosen, **overrides)
+
+
 rows_option = click.option(
     "-o", "--output", metavar="FILE", help="Write the rows: .csv, .json, .md, .h5, or .jsonl, which resumes."
 )

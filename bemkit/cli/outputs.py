@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Generic, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from bemkit.cli.process import print_data
 
@@ -71,6 +71,17 @@ class TextFile(Generic[Content]):
 def csv_of(target: str | None, table: Callable[[Content], Table]) -> TextFile[Content]:
     """Return a table to write as comma-separated values, or nothing."""
     return TextFile(target, lambda content: table(content).to_csv())
+
+
+def json_of(target: str | None, entries: Callable[[Content], Mapping[str, Any]]) -> TextFile[Content]:
+    """Return the entries of some content to write as JSON, or nothing."""
+
+    def text(content: Content) -> str:
+        from bemkit.table import json_text
+
+        return json_text(entries(content))
+
+    return TextFile(target, text)
 
 
 @dataclass(frozen=True)

@@ -2,52 +2,32 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from bemkit.cli import options
 from bemkit.cli.options import shown_progress
-from bemkit.cli.outputs import STDOUT, TextFile
+from bemkit.cli.outputs import STDOUT, json_of
 from bemkit.errors import concerning
-from bemkit.table import json_text
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from bemkit.plan.plan import Plan
     from bemkit.scene.scene import Scene
 
 
 @click.command()
 @click.argument("scene")
-@options.settings_option
-@options.elements_option
-@options.accuracy_option
-@options.discretisation_option
-@options.degree_option
+@options.changes_scene("settings", "elements", "accuracy", "discretisation", "degree")
 @options.json_option
-def plan(
-    scene: str,
-    settings: tuple[str, ...],
-    elements: int | None,
-    accuracy: float | None,
-    discretisation: str | None,
-    degree: int | Literal["hp"] | None,
-    json_file: str | None,
-) -> None:
+def plan(scene: str, json_file: str | None, load: Callable[[str], Scene]) -> None:
     """List what SCENE needs, what is skipped and why, without solving it."""
     with shown_progress(json_file is not None):
-        from bemkit.scene.keys import with_settings
-        from bemkit.scene.toml import load_scene, with_overrides
-
-        text = TextFile(json_file, _as_json)
+        text = json_of(json_file, _entries)
         text.check()
-        chosen = with_overrides(
-            with_settings(load_scene(scene), settings),
-            elements=elements,
-            accuracy=accuracy,
-            discretisation=discretisation,
-            degree=degree,
-        )
+        chosen = load(scene)
         with concerning(scene):
             made = _planned(chosen)
     text.write(made)
@@ -57,8 +37,8 @@ def plan(
         print_plan(chosen.title, made)
 
 
-def _as_json(made: Plan) -> str:
-    return json_text(made.as_dict())
+def _entries(made: Plan) -> dict[str, Any]:
+    return made.as_dict()
 
 
 def _planned(scene: Scene) -> Plan:

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 import click
 
@@ -31,7 +31,7 @@ _COARSEST = 40
 class _Run:
     """How a scene is solved, and where its result goes."""
 
-    changed: Callable[[Scene], Scene]
+    load: Callable[[str], Scene]
     output: str | None
     inside: int
     outputs: Outputs[Solution]
@@ -49,13 +49,7 @@ class _Run:
 @options.csv_option
 @options.plot_option
 @options.what_option
-@options.settings_option
-@options.elements_option
-@options.accuracy_option
-@options.discretisation_option
-@options.degree_option
-@click.option("--solver", metavar="NAME", help="Such as augmented-lagrangian.")
-@click.option("--rho", type=float, metavar="R", help="Penalty of the solver [E'/L].")
+@options.changes_scene("settings", "elements", "accuracy", "discretisation", "degree", "solver", "rho")
 @click.option("--cascade", is_flag=True, help="Solve on coarser meshes first and start from there.")
 @click.option("--explain", is_flag=True, help="Print planned and measured time and memory, and what was skipped.")
 @options.quiet_option
@@ -67,47 +61,23 @@ def run(
     csv_file: str | None,
     folder: str | None,
     what: tuple[str, ...] | None,
-    settings: tuple[str, ...],
-    elements: int | None,
-    accuracy: float | None,
-    discretisation: str | None,
-    degree: int | Literal["hp"] | None,
-    solver: str | None,
-    rho: float | None,
     cascade: bool,
     explain: bool,
     quiet: bool,
+    load: Callable[[str], Scene],
 ) -> int:
     """Solve each SCENE, a TOML file or the name of a shipped scene.
 
     With several scenes the names of files and folders end with that of the scene, and an error of one does not stop
     the others; the exit code is the most serious one.
     """
-
-    def changed(scene: Scene) -> Scene:
-        from bemkit.scene.toml import with_overrides
-
-        if settings:
-            from bemkit.scene.keys import with_settings
-
-            scene = with_settings(scene, settings)
-        return with_overrides(
-            scene,
-            elements=elements,
-            accuracy=accuracy,
-            discretisation=discretisation,
-            degree=degree,
-            solver=solver,
-            rho=rho,
-        )
-
     names = options.names_of_scenes(scenes, writes=any((output, json_file, csv_file, folder)))
     runs = []
     for name in names:
         place = place_of(output, name)
         outputs = outputs_of(place_of(json_file, name), place_of(csv_file, name), place_of(folder, name), what=what)
         reserve(outputs.check(result_target(place, inside)))
-        runs.append(_Run(changed, place, inside, outputs, what, cascade, explain, quiet))
+        runs.append(_Run(load, place, inside, outputs, what, cascade, explain, quiet))
     if len(scenes) == 1:
         return _solve_and_write(scenes[0], runs[0])
     codes = []
@@ -124,9 +94,7 @@ def _solve_and_write(scene: str, own: _Run) -> int:
     """Solve a scene, write and print its result, and return the exit code."""
     with ExitStack() as stack:
         callback = stack.enter_context(shown_progress(own.quiet))  # shown before anything is loaded
-        from bemkit.scene.toml import load_scene
-
-        chosen = own.changed(load_scene(scene))
+        chosen = own.load(scene)
         with concerning(scene):
             history_file = _history_file(chosen, own.output)
             if own.explain:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -13,6 +13,7 @@ from bemkit.cli.options import StudyProgress, reserve, study_output
 from bemkit.cli.outputs import Outputs, TextFile, csv_of
 
 if TYPE_CHECKING:
+    from bemkit.scene.scene import Scene
     from bemkit.studies.engine import Task
     from bemkit.studies.stability.records import StabilityRecord
 
@@ -24,8 +25,7 @@ if TYPE_CHECKING:
 @options.csv_option
 @options.markdown_option
 @options.plot_option
-@options.elements_option
-@options.discretisation_option
+@options.changes_scene("elements", "discretisation")
 @options.quiet_option
 def stability(
     scene: str | None,
@@ -34,9 +34,8 @@ def stability(
     csv_file: str | None,
     markdown: str | None,
     folder: str | None,
-    elements: int | None,
-    discretisation: str | None,
     quiet: bool,
+    load: Callable[[str], Scene],
 ) -> int:
     """Solve extreme variants of SCENE (paper-1 by default) and check every result independently.
 
@@ -44,13 +43,13 @@ def stability(
     """
     with StudyProgress(quiet) as progress:
         from bemkit.cli.printed_stability import print_axis, print_left_out, print_verdicts
-        from bemkit.scene.toml import load_scene, scene_to_toml, with_overrides
+        from bemkit.scene.toml import scene_to_toml
         from bemkit.studies.stability.axes import axes_of, find_axes
         from bemkit.studies.stability.figures import draw_axes, figure_name
         from bemkit.studies.stability.records import FILE, table_of, to_markdown
         from bemkit.studies.stability.sweep import sweep
 
-        chosen = with_overrides(load_scene(scene or "paper-1"), elements=elements, discretisation=discretisation)
+        chosen = load(scene or "paper-1")
         every = find_axes(axis)
         # an axis that is asked for by its name is refused by the sweep
         axes = every if axis else axes_of(chosen)

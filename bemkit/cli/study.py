@@ -3,23 +3,22 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
-from dataclasses import asdict
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from bemkit.cli import options
 from bemkit.cli.options import StudyProgress, reserve, shown_progress, study_output
-from bemkit.cli.outputs import STDOUT, Outputs, TextFile, csv_of, plain_table, stdout_console
+from bemkit.cli.outputs import STDOUT, Outputs, csv_of, json_of, plain_table, stdout_console
 from bemkit.cli.process import NOT_CONVERGED
 from bemkit.errors import concerning
-from bemkit.table import json_text
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from bemkit.results.solution import Solution
+    from bemkit.scene.scene import Scene
     from bemkit.studies.accuracy.records import ErrorRecord
 
 DEFAULT_COMMAND = "errors"
@@ -63,15 +62,6 @@ def study() -> None:
 @options.quiet_option
 def errors(
     scene: str,
-    sizes: str,
-    accuracies: str,
-    discretisations: str | None,
-    degrees: str | None,
-    solvers: str,
-    meshes: str,
-    exponent: float,
-    most_elements: int,
-    over_resolve: int | None,
     repeat: int | None,
     jobs: int,
     measures: str,
@@ -79,6 +69,7 @@ def errors(
     csv_file: str | None,
     folder: str | None,
     quiet: bool,
+    **chosen: Any,
 ) -> int:
     """Measure errors and run times of SCENE over element types, meshes and solvers.
 
@@ -106,18 +97,7 @@ def errors(
         # sharp at the width of a page, and a small file
         outputs = Outputs(texts, folder, figures, FIGURE, dots_per_inch=110)
         reserve(outputs.check(FILE.check(rows)))
-        asked = StudyOptions(
-            sizes=sizes,
-            accuracies=accuracies,
-            discretisations=discretisations,
-            degrees=degrees,
-            meshes=meshes,
-            solvers=solvers,
-            exponent=exponent,
-            most_elements=most_elements,
-            over_resolve=over_resolve,
-            repeat=None if jobs > 1 else repeat or DEFAULT_REPEAT,
-        )
+        asked = StudyOptions(**chosen, repeat=None if jobs > 1 else repeat or DEFAULT_REPEAT)
         runs = asked.runs(problem)
         shows_tables = not quiet and not outputs.uses_stdout
         with concerning(scene):
@@ -139,20 +119,20 @@ def errors(
 @study.command()
 @click.argument("scene")
 @click.option("--starts", type=click.IntRange(min=0), default=8, metavar="N", help="Number of starts (8).")
-@options.elements_option
+@options.changes_scene("elements")
 @options.json_option
-def solutions(scene: str, starts: int, elements: int | None, json_file: str | None) -> int:
+def solutions(scene: str, starts: int, json_file: str | None, load: Callable[[str], Scene]) -> int:
     """Look for several solutions of SCENE from several starts."""
     with shown_progress(quiet=False):
         from bemkit.runs.distinct_solutions import distinct_solutions
-        from bemkit.scene.toml import load_single_body, with_overrides
+        from bemkit.scene.toml import single_body
 
-        def as_json(found: Sequence[Solution]) -> str:
-            return json_text({"starts": starts, "solutions": [solution.summary() for solution in found]})
+        def entries(found: Sequence[Solution]) -> dict[str, Any]:
+            return {"starts": starts, "solutions": [solution.summary() for solution in found]}
 
-        summaries = TextFile(json_file, as_json)
+        summaries = json_of(json_file, entries)
         summaries.check()
-        chosen = with_overrides(load_single_body(scene), elements=elements)
+        chosen = single_body(load(scene), scene)
         with concerning(scene):
             found = distinct_solutions(chosen, n_starts=starts)
     summaries.write(found)
@@ -163,21 +143,16 @@ def solutions(scene: str, starts: int, elements: int | None, json_file: str | No
 
 @study.command()
 @click.argument("scene")
-@options.elements_option
+@options.changes_scene("elements")
 @options.json_option
-def increments(scene: str, elements: int | None, json_file: str | None) -> None:
+def increments(scene: str, json_file: str | None, load: Callable[[str], Scene]) -> None:
     """Solve the load history of SCENE with every increment halved, and compare."""
     with shown_progress(quiet=False), concerning(scene):
-        from bemkit.scene.toml import load_scene, with_overrides
-        from bemkit.studies.increments import IncrementErrors, increment_errors
+        from bemkit.studies.increments import increment_errors
 
-        def as_json(errors: IncrementErrors) -> str:
-            return json_text(asdict(errors))
-
-        output = TextFile(json_file, as_json)
+        output = json_of(json_file, vars)
         output.check()
-        chosen: Any = load_scene(scene)
-        errors = increment_errors(with_overrides(chosen, elements=elements))
+        errors = increment_errors(load(scene))
     output.write(errors)
     if json_file != STDOUT:
         print(f"{errors.n_increments} increments; halving all of them changes")

@@ -17,6 +17,7 @@ from bemkit.errors import concerning
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from bemkit.scene.scene import Scene
     from bemkit.studies.sweep.table import Sweep
 
 DEFAULT_SHOWN = "force_tangential"
@@ -24,7 +25,6 @@ DEFAULT_SHOWN = "force_tangential"
 
 @click.command()
 @click.argument("scene")
-@options.settings_option
 @click.option(
     "--vary", multiple=True, required=True, metavar="KEY=...", help="Values A:B:N or A,B,...; repeat it for a grid."
 )
@@ -40,16 +40,13 @@ DEFAULT_SHOWN = "force_tangential"
     callback=options.names_of,
     help=f"Results to draw ({DEFAULT_SHOWN}).",
 )
-@options.elements_option
-@options.accuracy_option
-@options.discretisation_option
+@options.changes_scene("settings", "elements", "accuracy", "discretisation")
 @click.option("--cold", is_flag=True, help="Start each row from zero, not from the row before.")
 @click.option("--jobs", type=click.IntRange(1), metavar="N", help="Number of processes (1).")
 @click.option("--on", "cluster", metavar="ADDRESS", help="Scheduler of a dask cluster, such as tcp://10.0.0.1:8786.")
 @options.quiet_option
 def sweep(
     scene: str,
-    settings: tuple[str, ...],
     vary: tuple[str, ...],
     output: str | None,
     csv_file: str | None,
@@ -57,13 +54,11 @@ def sweep(
     folder: str | None,
     over: str | None,
     show: tuple[str, ...],
-    elements: int | None,
-    accuracy: float | None,
-    discretisation: str | None,
     cold: bool,
     jobs: int | None,
     cluster: str | None,
     quiet: bool,
+    load: Callable[[str], Scene],
 ) -> int:
     """Solve SCENE for several values of its numbers, such as --vary law.friction_coefficient=0:1:11.
 
@@ -74,8 +69,6 @@ def sweep(
     if folder is None and (over is not None or show):
         raise click.UsageError("--over and --show go with figures: add --plot DIR")
     with StudyProgress(quiet) as progress:
-        from bemkit.scene.keys import with_settings
-        from bemkit.scene.toml import load_scene, with_overrides
         from bemkit.studies.sweep.grid import read_variations
         from bemkit.studies.sweep.records import FILE
         from bemkit.studies.sweep.sweep import run_sweep
@@ -87,8 +80,7 @@ def sweep(
         outputs = Outputs(texts, folder, *_figures(tuple(values), over, show or (DEFAULT_SHOWN,)))
         own = FILE.check(rows)  # reserved by the sweep itself
         reserve(path for path in outputs.check(own) if path not in own)
-        base = with_settings(load_scene(scene), settings)
-        chosen = with_overrides(base, elements=elements, accuracy=accuracy, discretisation=discretisation)
+        chosen = load(scene)
         computed = partial(progress.compute, name="sweep", processes=jobs or 1, cluster=cluster)
         with concerning(scene):
             found = run_sweep(chosen, values, computed, file=rows, cold=cold)
