@@ -237,9 +237,9 @@ def contact_facts(solution: SolvedScene) -> list[dict[str, Any]]:
     ]
 
 
-def place_in(solution: SolvedScene, point: FloatArray | tuple[float, float]) -> str:
+def place_in(solution: SolvedScene, point: FloatArray | tuple[float, float], digits: int = 4) -> str:
     """Write a point (2,) [m] of a solution for a message."""
-    return format_point(point, max(body.mesh.diameter for body in solution.bodies.values()), digits=4)
+    return format_point(point, max(body.mesh.diameter for body in solution.bodies.values()), digits)
 
 
 def _peak(table: ContactTable, part: str) -> dict[str, float]:

@@ -13,7 +13,7 @@ from bemkit.errors import counted
 from bemkit.geometry.shapes import Shape
 from bemkit.results.between_nodes import BetweenNodes
 from bemkit.results.solution import Solution
-from bemkit.results.solved_scene import contact_facts, part_facts
+from bemkit.results.solved_scene import contact_facts, part_facts, place_in
 from bemkit.scene.registry import DISCRETISATIONS, SOLVERS
 from bemkit.scene.unit_names import UnitNames, amount, unit_of
 from bemkit.solvers.fallbacks import drivers_at_work
@@ -93,7 +93,8 @@ def _notes(shape: Shape) -> str:
 def _force_rows(solution: Solution) -> Iterator[tuple[str, str]]:
     """Yield the forces of all contacts together, then those of each, the largest first."""
     units = solution.units
-    total, friction = solution.force_normal, solution.force_tangential
+    total, least = solution.force_normal, _force_of_round_off(solution)
+    friction = _without_round_off(solution.force_tangential, least)
     per = "" if solution.scene.thickness else ", per unit thickness"
     yield "normal force", f"{_amount(total, 'force', units)}  pressing{per}"
     direction = _TOWARDS[solution.contact.common_direction]
@@ -102,15 +103,16 @@ def _force_rows(solution: Solution) -> Iterator[tuple[str, str]]:
     if len(facts) == 1:
         (fact,) = facts
         yield "contact length", _length(fact, units)
-        yield "peak pressure", _peak(fact, units)
+        yield "peak pressure", _peak(fact, solution)
         yield "largest slip", _amount(fact["largest_slip"], "length", units)
         return
     for fact in facts[:_MANY_CONTACTS]:
         yield (
             fact["name"],
             f"normal force {_amount(fact['force_normal'], 'force', units)}, "
-            f"friction {_amount(fact['force_tangential'], 'force', units)}, length {_length(fact, units)}, "
-            f"peak pressure {_peak(fact, units)}, slip up to {_amount(fact['largest_slip'], 'length', units)}",
+            f"friction {_amount(_without_round_off(fact['force_tangential'], least), 'force', units)}, "
+            f"length {_length(fact, units)}, "
+            f"peak pressure {_peak(fact, solution)}, slip up to {_amount(fact['largest_slip'], 'length', units)}",
         )
     yield from _more(len(facts), "contacts")
 
@@ -124,9 +126,14 @@ def _length(fact: Mapping[str, Any], units: UnitNames | None) -> str:
     return f"{_amount(fact['contact_length'], 'length', units)} ({100.0 * fact['contact_fraction']:.4g} %)"
 
 
-def _peak(fact: Mapping[str, Any], units: UnitNames | None) -> str:
-    size = _amount(fact["peak_pressure"], "stress", units)
-    return f"{size} at {_vector(fact['peak_x'], fact['peak_y'], 'length', units)}" if fact["peak_pressure"] else size
+def _peak(fact: Mapping[str, Any], solution: Solution) -> str:
+    size = _amount(fact["peak_pressure"], "stress", solution.units)
+    return f"{size} at {_place(fact['peak_x'], fact['peak_y'], solution)}" if fact["peak_pressure"] else size
+
+
+def _place(x: float, y: float, solution: Solution) -> str:
+    """Write a point with its unit; coordinates that are round-off beside the bodies are zero."""
+    return f"{place_in(solution, (x, y), DIGITS)} {unit_of('length', solution.units)}".rstrip()
 
 
 def _vector(x: float, y: float, quantity: str, units: UnitNames | None) -> str:
@@ -136,21 +143,43 @@ def _vector(x: float, y: float, quantity: str, units: UnitNames | None) -> str:
 def _part_rows(solution: Solution) -> Iterator[tuple[str, str]]:
     """Yield the resultants on the parts of the bodies, and the motions and forces of rigid bodies."""
     units = solution.units
-    forces = part_facts(solution)
+    forces, least = part_facts(solution), _force_of_round_off(solution)
+    if len(forces) > _MANY_CONTACTS:
+        forces.sort(key=lambda fact: _rank(fact, solution))
     for fact in forces[:_MANY_CONTACTS]:
         moment = _amount(fact["moment"], "energy", units)
         name = f"{fact['body']}.{fact['name']}" if "body" in fact else fact["name"]
-        yield f"force on {name}", f"{_vector(fact['force_x'], fact['force_y'], 'force', units)}, moment {moment}"
+        yield f"force on {name}", f"{_force(fact['force_x'], fact['force_y'], least, units)}, moment {moment}"
     yield from _more(len(forces), "parts")
     rigid = list(solution.rigid.values())
     for body in rigid[:_MANY_CONTACTS]:
         yield (
             body.name,
             f"moved by {_vector(body.x, body.y, 'length', units)}, turned by {body.turn:.8g} rad; "
-            f"force {_vector(body.force_x, body.force_y, 'force', units)}, "
+            f"force {_force(body.force_x, body.force_y, least, units)}, "
             f"moment {_amount(body.moment, 'energy', units)} on it",
         )
     yield from _more(len(rigid), "rigid bodies")
+
+
+def _rank(fact: Mapping[str, Any], solution: Solution) -> tuple[bool, bool, float]:
+    """Rank supports and loads before contacts, which have rows of their own, and free sides last."""
+    size = float(np.hypot(fact["force_x"], fact["force_y"]))
+    return size == 0.0, fact["name"] in solution.bodies[fact.get("body", "")].contact_forces, -size
+
+
+def _force_of_round_off(solution: Solution) -> float:
+    """Return the size of forces [N/m] that may be round-off."""
+    sizes = [abs(fact[key]) for fact in part_facts(solution) for key in ("force_x", "force_y")]
+    return solution.certificate.round_off * max(sizes, default=0.0)
+
+
+def _without_round_off(force: float, least: float) -> float:
+    return 0.0 if abs(force) <= least else force
+
+
+def _force(x: float, y: float, least: float, units: UnitNames | None) -> str:
+    return _vector(_without_round_off(x, least), _without_round_off(y, least), "force", units)
 
 
 def _traction_errors(solution: Solution) -> str:
@@ -211,7 +240,7 @@ def _worst_entry(measured: Certificate | BetweenNodes) -> str:
 def _transition_lines(solution: Solution) -> list[str]:
     units = solution.units
     lines = [
-        f"{item.part}: {item.from_status} to {item.to_status} at {_vector(item.x, item.y, 'length', units)}, "
+        f"{item.part}: {item.from_status} to {item.to_status} at {_place(item.x, item.y, solution)}, "
         f"s = {_amount(item.s, 'length', units)}"
         for item in solution.transitions[:_MANY_TRANSITIONS]
     ]
