@@ -220,7 +220,7 @@ def shorten(text: str, length: int = 60) -> str:
 
 def _parse(text: str) -> ast.expr:
     if not isinstance(text, str):
-        raise ExpressionError(f"an expression is a text such as 'x > 0.5', not {shorten(str(text))}")
+        raise ExpressionError(f"an expression is a text such as 'x**2 * (1 - y)', not {shorten(str(text))}")
     if len(text) > MAX_LENGTH:
         raise ExpressionError(f"expression {shorten(text)}: {len(text)} characters; at most {MAX_LENGTH} are allowed")
     try:

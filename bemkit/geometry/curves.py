@@ -330,7 +330,7 @@ def require_positive(owner: str, **lengths: float) -> None:
     """Raise unless every named length is finite and positive."""
     for name, value in lengths.items():
         if not (isinstance(value, Real) and 0.0 < value < np.inf):
-            raise GeometryError(f"{owner}: {name} is {value}: give a positive finite length")
+            raise GeometryError(f"{owner}: {name} is {value!r}: give a positive finite length")
 
 
 def _checked_values(name: str, values: FloatArray, s: FloatArray) -> FloatArray:

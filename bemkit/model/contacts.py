@@ -157,8 +157,8 @@ def check_overlap(pair: ContactPair, overlap: float, deepest: FloatArray, size: 
     if overlap > pair.interference + OVERLAP_TOLERANCE * size:
         raise OverlapError(
             f"contact {pair.name!r}: the bodies overlap by {overlap:.4g} at {format_point(deepest, size, digits=6)}, "
-            f"and an interference of {pair.interference:g} is given: move them apart, or give the interference that is "
-            "meant"
+            f"and its interference is {pair.interference:g}: move them apart, give coordinates with more digits, or "
+            "list the contact with an interference"
         )
 
 

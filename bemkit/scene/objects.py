@@ -22,7 +22,7 @@ _EXAMPLES: Mapping[str, str] = MappingProxyType(
         "shape": "Rectangle(width=1.0, height=1.0)",
         "material": "Material(youngs_modulus=1e4, poisson_ratio=0.2)",
         "law": "Coulomb(friction_coefficient=0.5)",
-        "solver": "Fallbacks()",
+        "solver": "Fallbacks((SemismoothNewton(), SolutionPath()))",
         "discretisation": "Galerkin(2)",
         "linear_solver": "Automatic()",
         "mesh": "MeshOptions(elements=320)",
@@ -72,7 +72,7 @@ def check_objects(owner: Any, name: str = "") -> None:
     begin = f"{name}: " if name else ""
     for attribute, example in _EXAMPLES.items():
         value = getattr(owner, attribute, None)
-        if isinstance(value, str | int | float | type | Mapping):
+        if isinstance(value, str | int | float | type | Mapping | list | tuple):
             shown = f"the class {value.__name__}" if isinstance(value, type) else repr(value)
             raise InputError(f"{begin}{attribute} is {shown}: give an object, such as {example}")
     obstacle = getattr(owner, "obstacle", None)
@@ -85,6 +85,8 @@ def check_objects(owner: Any, name: str = "") -> None:
         value = getattr(owner, attribute, ())
         if isinstance(value, str) or not isinstance(value, Iterable):
             raise InputError(f"{begin}{attribute} is {value!r}: give a tuple, such as ({value!r},)")
+        if isinstance(value, list):  # equal to the same scene from a file
+            object.__setattr__(owner, attribute, tuple(value))
 
 
 def check_names(owner: str, names: Iterable[str], kind: str) -> None:

@@ -255,9 +255,13 @@ class Fallbacks:
     )
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "drivers", tuple(self.drivers))
-        if not self.drivers:
+        drivers = tuple(self.drivers) if isinstance(self.drivers, Iterable) else (self.drivers,)
+        object.__setattr__(self, "drivers", drivers)
+        if not drivers:
             raise InputError("drivers is empty; give at least one solver, such as SemismoothNewton()")
+        for driver in drivers:
+            if isinstance(driver, type) or not callable(getattr(driver, "step", None)):
+                raise InputError(f"drivers contains {driver!r}; give solvers, such as SemismoothNewton()")
 
     @property
     def max_steps(self) -> int:

@@ -26,6 +26,10 @@ PAIR = bk.ContactPair(("upper.bottom", "lower.top"))
         (lambda: replace(SCENE, law=0.3), r"^law is 0.3: give an object, such as Coulomb\("),
         (lambda: replace(SCENE, law=bk.Coulomb), "^law is the class Coulomb: give an object"),
         (lambda: replace(SCENE, solver="lemke"), r"^solver is 'lemke': give an object, such as Fallbacks\("),
+        (
+            lambda: replace(SCENE, solver=(bk.SemismoothNewton(),)),
+            r"^solver is \(SemismoothNewton.*such as Fallbacks\(\(",
+        ),
         (lambda: replace(SCENE, discretisation="linear"), "^discretisation is 'linear': give an object"),
         (lambda: replace(SCENE, linear_solver="automatic"), "^linear_solver is 'automatic': give an object"),
         (lambda: replace(SCENE, mesh=100), r"^mesh is 100: give an object, such as MeshOptions\(elements=320\)"),
@@ -62,3 +66,9 @@ PAIR = bk.ContactPair(("upper.bottom", "lower.top"))
 def test_what_is_no_object_is_named(make: Callable[[], object], message: str) -> None:
     with pytest.raises(InputError, match=message):
         make()
+
+
+def test_lists_become_tuples() -> None:
+    wall = replace(WALL, sides=list(WALL.sides))
+    assert wall == WALL
+    assert replace(SCENE, parts=[*SCENE.parts], load_factors=[1.0]) == SCENE

@@ -242,6 +242,10 @@ def test_errors_inside_a_law_surface_with_its_name(driver):
     [
         (lambda: SemismoothNewton(rho=0.0), "rho = 0.0; give a positive number"),
         (lambda: SemismoothNewton(max_steps=0), "max_steps = 0; give at least 1"),
+        (
+            lambda: Fallbacks((SemismoothNewton,)),
+            r"drivers contains <class .*>; give solvers, such as SemismoothNewton\(\)",
+        ),
         (lambda: Fallbacks(()), r"drivers is empty; give at least one solver, such as SemismoothNewton\(\)"),
         (lambda: SolutionPath(max_steps=0), "max_steps = 0"),
         (lambda: Springs(max_steps=0), "max_steps = 0"),
