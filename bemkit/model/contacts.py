@@ -162,15 +162,16 @@ def check_overlap(pair: ContactPair, overlap: float, deepest: FloatArray, size: 
         )
 
 
-def candidates_of(scene: Scene, body: PlacedBody) -> ContactData:
-    """Return the nodes of a body that may touch an obstacle or a rigid body, held by supports or not."""
-    own = [pair for pair in scene.contacts if pair.rigid_body is not None and pair.elastic_parts[0][0] == body.name]
+def candidates_of(scene: Scene, bodies: Sequence[PlacedBody]) -> list[ContactData]:
+    """Return the nodes of each body that may touch an obstacle or a rigid body, held by supports or not."""
+    facing: dict[str, list[FacingPart]] = {body.name: [] for body in bodies}
     obstacles = {each.name: each.obstacle for each in scene.rigid}
-    facing = [
-        FacingPart(pair.name, _part(pair), obstacles[str(pair.rigid_body)], scene.law_of(pair).is_frictionless)
-        for pair in own
-    ]
-    return find_contact(body.scene, body.mesh, body.space_in_place, facing)
+    for pair in scene.contacts:
+        if pair.rigid_body is not None:
+            ((name, part),) = pair.elastic_parts
+            is_frictionless = scene.law_of(pair).is_frictionless
+            facing[name].append(FacingPart(pair.name, part, obstacles[pair.rigid_body], is_frictionless))
+    return [find_contact(body.scene, body.mesh, body.space_in_place, facing[body.name]) for body in bodies]
 
 
 def obstacle_rows(

@@ -365,7 +365,7 @@ def _prepared(scene: Scene, bodies: Sequence[PlacedBody], units: Units, before: 
         supports.append(held if far_motion is None else replace(held, load_controlled=far_motion.load_controlled))
         in_place = body.units(units.modulus, force_unit, body.mesh)
         forces.append(body.turn.turned_back(nodal_forces(body.scene, body.mesh, body.space_in_place, in_place)))
-    candidates = [candidates_of(scene, body) for body in bodies]
+    candidates = candidates_of(scene, bodies)
     with_obstacles = tuple(obstacle_rows(scene, bodies, candidates, supports))
     between = None if before is None else before.rows_under(scene)
     if between is None:

@@ -13,7 +13,7 @@ from bemkit.arrays import FloatArray, IntArray
 from bemkit.contact.body import SlipHistory
 from bemkit.geometry.local_values import element_degrees
 from bemkit.geometry.mesh import BoundaryMesh
-from bemkit.geometry.neighbours import along_boundary, at_arc_lengths
+from bemkit.geometry.neighbours import at_arc_lengths
 from bemkit.geometry.vectors import angles_between, norms
 from bemkit.results.contact_table import ContactTable
 from bemkit.results.transitions import (
@@ -66,6 +66,13 @@ class ContactPlaces:
 
         The zones of a part of a half-plane, which may be any strip, are compared to half of the contact length.
         """
+        return self._sides[contact]
+
+    @cached_property
+    def _sides(self) -> dict[str, list[Side]]:
+        return {contact: self._sides_of(contact) for contact in self.solution.contact_sides}
+
+    def _sides_of(self, contact: str) -> list[Side]:
         bodies, table = self.solution.bodies, self.solution.contact
         sides = []
         for body, part in self.solution.contact_sides[contact]:
@@ -79,11 +86,12 @@ class ContactPlaces:
     def elements(self, name: str) -> IntArray:
         """Return the elements of a body that may touch others or obstacles, without those near `singular_points`."""
         mesh, elements = self.solution.bodies[name].mesh, self._touching(name)
-        is_near = np.zeros(elements.size, bool)
-        for point, reach in self.singular_points:
-            for ends in (mesh.start, mesh.end):
-                is_near |= norms(ends[elements] - point) < (1.0 - LYING_AT) * reach
-        return elements[~is_near]
+        if not self.singular_points:
+            return elements
+        points, reaches = map(np.array, zip(*self.singular_points, strict=True))
+        ends = np.stack([mesh.start[elements], mesh.end[elements]])
+        is_near = norms(ends[:, :, None] - points) < (1.0 - LYING_AT) * reaches
+        return elements[~is_near.any(axis=(0, 2))]
 
     def _touching(self, name: str) -> IntArray:
         body = self.solution.bodies[name]
@@ -226,7 +234,7 @@ class ContactPlaces:
                 continue
             if self.solution.n_sides(contact) > 1:  # the other side may end there, and none goes on beyond its nodes
                 continue
-            lengths = side.mesh.lengths[along_boundary(side.mesh, side.mesh.part(side.part))]
+            lengths = side.mesh.lengths[side.elements]
             for order, distances, length in (
                 (slice(None), s, lengths[0]),
                 (slice(None, None, -1), (side.length - s)[::-1], lengths[-1]),
@@ -258,9 +266,10 @@ class ContactPlaces:
 
         At the far end of an excluded element the second difference takes nodes nearer to the singular point.
         """
-        elements = along_boundary(side.mesh, side.mesh.part(side.part))
-        is_excluded, margin = ~np.isin(elements, self._counted[side.body]), LYING_AT * side.length
-        before, after = (is_excluded[at_arc_lengths(side.mesh, elements, s + step)[0]] for step in (-margin, margin))
+        is_excluded, margin = ~np.isin(side.elements, self._counted[side.body]), LYING_AT * side.length
+        before, after = (
+            is_excluded[at_arc_lengths(side.mesh, side.elements, s + step)[0]] for step in (-margin, margin)
+        )
         return np.where(before & after, 0.0, np.where(before | after, far_end_share, 1.0))
 
     def _squared_error_on(self, name: str, part: str) -> float:

@@ -151,7 +151,7 @@ class ContactTable:
 
     def renamed(self, names: Mapping[str, str]) -> ContactTable:
         """Return the rows of some parts, by their names, under other names."""
-        rows = [row for row, part in enumerate(self.part) if part in names]
+        rows = sorted(row for part in names for row in self._nodes.get(part, ()))
         columns: dict[str, Any] = {key: column[rows] for key, column in self.columns().items()}
         return ContactTable(part=tuple(names[self.part[row]] for row in rows), **columns)
 

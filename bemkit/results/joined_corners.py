@@ -9,7 +9,6 @@ import numpy as np
 
 from bemkit.arrays import FloatArray
 from bemkit.contact.laws import FrictionLaw
-from bemkit.geometry.neighbours import along_boundary
 from bemkit.operators.material import Material
 from bemkit.results.contact_table import ContactTable
 from bemkit.results.singular_corners import (
@@ -66,9 +65,9 @@ def joined_corners(
         By the name of the body.
     """
     law_at_nodes, every_node = law.at(table.points), np.arange(table.n_contact)
-    points = [(one, two, point) for point in one.ends()]
+    points = [(one, two, point) for point in one.ends]
     same = LYING_AT * min(one.length, two.length)
-    points += [(two, one, point) for point in two.ends() if all(np.abs(point - p).max() > same for _, _, p in points)]
+    points += [(two, one, point) for point in two.ends if all(np.abs(point - p).max() > same for _, _, p in points)]
     for side, other, point in points:
         end, foot = _end_of(side, point), _foot_of(other, point, LYING_ON * min(one.length, two.length))
         if foot is None or end.before == end.after:
@@ -98,9 +97,9 @@ def joined_corners(
 
 def _end_of(side: Side, point: FloatArray) -> _Place:
     """Return the place of an end of a side."""
-    elements = along_boundary(side.mesh, side.mesh.part(side.part))
-    is_start = np.array_equal(side.mesh.start[elements[0]], point)
-    return _at_node(side, int(side.mesh.elements[elements[0], 0] if is_start else side.mesh.elements[elements[-1], 1]))
+    first, last = side.elements[[0, -1]].tolist()
+    is_start = np.array_equal(side.mesh.start[first], point)
+    return _at_node(side, int(side.mesh.elements[first, 0] if is_start else side.mesh.elements[last, 1]))
 
 
 def _foot_of(side: Side, point: FloatArray, near: float) -> _Place | None:

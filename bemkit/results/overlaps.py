@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator
+from itertools import permutations
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -41,15 +42,14 @@ def overlap_warnings(solution: Solution) -> Iterator[ResultWarning]:
 
 def _of_bodies(solution: Solution, outlines: dict[str, Polyline]) -> Iterator[ResultWarning]:
     names, lines = list(outlines), list(outlines.values())
+    parts, listed = _parts_in_contact(solution), _contacts_of_bodies(solution)
     for k, m in near_pairs(lines):
         one, two = names[k], names[m]
         beside = [
-            _is_beside(solution, own, _parts_in_contact(solution, own, other))[outline.elements]
+            _is_beside(solution, own, parts.get((own, other), ()))[outline.elements]
             for own, other, outline in ((one, two, lines[k]), (two, one, lines[m]))
         ]
-        pairs = [
-            pair for pair in solution.scene.elastic_contacts if {body for body, _ in pair.elastic_parts} == {one, two}
-        ]
+        pairs = listed.get(frozenset((one, two)), ())
         least = lines[k].tolerance + lines[m].tolerance + _least_overlap(solution, (one, two), pairs)
         depth, place = deepest_overlap(lines[k], lines[m], least, beside)
         if depth > 0.0:
@@ -136,7 +136,18 @@ def _is_beside(solution: Solution, name: str, parts: Collection[str]) -> BoolArr
     return is_beside
 
 
-def _parts_in_contact(solution: Solution, name: str, other: str) -> set[str]:
-    """Return the parts of a body that are in contact with another elastic body."""
-    pairs = (sides for sides in solution.contact_sides.values() if {side.body for side in sides} == {name, other})
-    return {side.part for sides in pairs for side in sides if side.body == name}
+def _parts_in_contact(solution: Solution) -> dict[tuple[str, str], set[str]]:
+    """Return the parts of a body that are in contact with another elastic body, by the names of both."""
+    parts: dict[tuple[str, str], set[str]] = {}
+    for sides in solution.contact_sides.values():
+        for own, other in permutations(sides, 2):
+            parts.setdefault((own.body, other.body), set()).add(own.part)
+    return parts
+
+
+def _contacts_of_bodies(solution: Solution) -> dict[frozenset[str], list[ContactPair]]:
+    """Return the contacts between two elastic bodies, by the names of both."""
+    pairs: dict[frozenset[str], list[ContactPair]] = {}
+    for pair in solution.scene.elastic_contacts:
+        pairs.setdefault(frozenset(body for body, _ in pair.elastic_parts), []).append(pair)
+    return pairs

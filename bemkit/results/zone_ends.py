@@ -90,19 +90,24 @@ class Side:
         zone_length = self.length if self.zone_length is None else self.zone_length
         return ZoneEnd(self.mesh, zone_length, *_nearest(self.mesh, self.mesh.part(self.part), point), self.body)
 
+    @cached_property
+    def elements(self) -> IntArray:
+        """The elements, in order along the boundary."""
+        return along_boundary(self.mesh, self.mesh.part(self.part))
+
+    @cached_property
     def ends(self) -> list[FloatArray]:
-        """Return the points (2,) where the side ends; none of a closed one."""
-        elements = along_boundary(self.mesh, self.mesh.part(self.part))
-        start, end = self.mesh.start[elements[0]], self.mesh.end[elements[-1]]
+        """The points (2,) where the side ends; none of a closed one."""
+        start, end = self.mesh.start[self.elements[0]], self.mesh.end[self.elements[-1]]
         return [] if np.array_equal(start, end) else [start, end]
 
     def edges(self, other: Side) -> Iterator[tuple[FloatArray, ZoneEnd]]:
         """Yield the points where another side that lies on this one ends inside it, and where they are on this one."""
-        for point in other.ends():
+        for point in other.ends:
             place = self.near(point)
             foot = self.mesh.points(np.array([place.element]), np.array([2.0 * place.fraction - 1.0]))[0, 0]
             near = LYING_ON * min(self.length, other.length)
-            is_inside = all(np.linalg.norm(end - foot) > near for end in self.ends())
+            is_inside = all(np.linalg.norm(end - foot) > near for end in self.ends)
             if is_inside and np.linalg.norm(point - foot) <= near:
                 yield point, place
 

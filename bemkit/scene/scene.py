@@ -285,7 +285,7 @@ class Scene(ShownInNotebooks):
             check_symmetry(scene, mesh)
         return mesh
 
-    @property
+    @cached_property
     def elastic_contacts(self) -> tuple[ContactPair, ...]:
         """The contacts that no rigid body takes part in."""
         return tuple(pair for pair in self.contacts if pair.rigid_body is None)
