@@ -382,11 +382,13 @@ class BoundaryMesh:
         if not self.curves:
             return straight
         curve = self._curve_index[elements]
-        if (curve >= 0).any():
-            span = self._span[elements]
-            s = span[:, :1] * (0.5 - 0.5 * xi) + span[:, 1:] * (0.5 + 0.5 * xi)
-            straight[curve >= 0] = evaluate_curves(self.curves, curve, s, derivative=derivative)[curve >= 0]
-        return straight
+        is_curved = curve >= 0
+        if not is_curved.any():
+            return straight
+        span = self._span[elements]
+        s = span[:, :1] * (0.5 - 0.5 * xi) + span[:, 1:] * (0.5 + 0.5 * xi)
+        values = evaluate_curves(self.curves, curve, s, derivative=derivative)
+        return values if is_curved.all() else np.where(is_curved[:, None, None], values, straight)
 
 
 def unchecked_mesh(*content: Any) -> BoundaryMesh:

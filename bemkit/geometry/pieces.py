@@ -211,7 +211,7 @@ def evaluate_curves(
     (m, q, 2) array [m]
     """
     values = np.zeros((*s.shape, 2))
-    for index in np.unique(curve[curve >= 0]):
+    for index in np.flatnonzero(np.bincount(curve[curve >= 0])):
         rows = np.flatnonzero(curve == index)
         evaluate = curves[index].derivative if derivative else curves[index].point
         values[rows] = evaluate(s[rows].ravel()).reshape(len(rows), s.shape[1], 2)

@@ -123,8 +123,10 @@ class _Facing:
     def values(self, bodies: tuple[SolvedBody, SolvedBody], placement: Placement, gap: AddedGap) -> PointsBetween:
         """Return clearance and tractions at points of the sides, first with those of one side, then of the other."""
         n = self.segments.row.size
+        known: dict[bytes, _FacingPoints] = {}
         one_sided = [
-            with_least_clearances(partial(self._sample, side, bodies, placement, gap), n, self.xi) for side in (0, 1)
+            with_least_clearances(partial(self._sample, side, bodies, placement, gap, known), n, self.xi)
+            for side in (0, 1)
         ]
         return PointsBetween(*(np.concatenate(columns) for columns in zip(*one_sided, strict=True)))
 
@@ -134,13 +136,21 @@ class _Facing:
         bodies: tuple[SolvedBody, SolvedBody],
         placement: Placement,
         gap: AddedGap,
+        known: dict[bytes, _FacingPoints],
         pieces: IntArray,
         low: FloatArray,
         high: FloatArray,
     ) -> PointsBetween:
-        """Return clearance at points of intervals of pieces, and the tractions of one of the sides, 0 or 1."""
-        is_whole = bool(np.all(high - low == 2.0))
-        at = self._whole if is_whole else self.at(pieces, low, high)
+        """Return clearance at points of intervals of pieces, and the tractions of one of the sides, 0 or 1.
+
+        Intervals that are searched for one side are known when the other one is searched.
+        """
+        if np.all(high - low == 2.0):
+            at = self._whole
+        elif (key := b"".join(each.tobytes() for each in (pieces, low, high))) in known:
+            at = known[key]
+        else:
+            at = known[key] = self.at(pieces, low, high)
         points = placement.forward(self.placement.back(at.points))
         directions, gaps = (
             placement.turned(self.placement.turned_back(vectors)) for vectors in (at.directions, at.gap)
