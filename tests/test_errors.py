@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-import ast
-import builtins
 import importlib
 import pickle
 import pkgutil
 from importlib.util import find_spec
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -17,10 +14,6 @@ import bemkit
 import bemkit.runs.run
 from bemkit.cli.main import main
 from bemkit.errors import BemkitError, InputError, NoResultError, concerning, counted, format_point, one_line
-from tests.statements import statements
-
-MISTAKES_OF_THE_CALLER = {"TypeError", "AttributeError", "AssertionError", "NotImplementedError"}
-"""Built-in errors that tell a programmer of a wrong call; no input of the command line leads to them."""
 
 COMPILED = "bemkit.operators.collocation.compiled_"
 
@@ -42,19 +35,6 @@ def test_every_error_class_derives_from_the_one_base() -> None:
     classes = error_classes()
     assert len(classes) > 30
     assert {value.__name__ for value in classes if not issubclass(value, BemkitError)} == set()
-
-
-def test_no_module_raises_a_bare_built_in_error() -> None:
-    raised = set()
-    for name in all_modules():
-        file = importlib.import_module(name).__file__
-        assert file is not None
-        raises = (node.exc for node in statements(Path(file)) if isinstance(node, ast.Raise))
-        errors = (each.func if isinstance(each, ast.Call) else each for each in raises)
-        raised |= {(name, error.id) for error in errors if isinstance(error, ast.Name)}
-    built_in = {(name, word) for name, word in raised if hasattr(builtins, word)}
-    left = {pair for pair in built_in if pair[1] not in MISTAKES_OF_THE_CALLER}
-    assert left == {("bemkit.interrupts", "KeyboardInterrupt")}
 
 
 @pytest.mark.parametrize("kind", [InputError, NoResultError])

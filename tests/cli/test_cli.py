@@ -497,27 +497,6 @@ def test_a_full_disk_behind_standard_output_is_one_line(arguments: str) -> None:
     assert done.stderr.count("\n") == 1
 
 
-def test_nothing_is_imported_without_need() -> None:
-    code = """
-import sys
-from bemkit.cli.main import main
-try:
-    main(["run", "paper-1", "--elements", "40", "--json", "-"])
-except SystemExit as end:
-    assert end.code == 0
-wanted = {"matplotlib", "meshio", "h5py", "rich", "pyamg", "distributed", "scipy.sparse"}
-names = ("operators.somigliana.fields", "operators.somigliana.moments", "operators.matrix_free.factor",
-    "results.boundary_stress", "pictures.files", "results.result_file", "hdf5", "cli.console",
-    "runs.adaptive", "contact.mortar", "geometry.free_form.drawn", "operators.forms", "solvers.homotopy")
-wanted |= {f"bemkit.{name}" for name in names}
-print(sorted(wanted & set(sys.modules)), file=sys.stderr)
-from importlib.util import find_spec
-assert all(find_spec(name) for name in wanted if name.startswith("bemkit."))
-"""
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stderr.strip() == "[]"
-
-
 def test_the_list_of_commands_loads_none_of_them() -> None:
     code = """
 import sys

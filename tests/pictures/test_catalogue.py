@@ -118,7 +118,7 @@ def test_matplotlib_that_is_missing_is_told(solution: Solution, tmp_path: Path, 
         save_pictures(solution, tmp_path)
 
 
-@pytest.mark.usefixtures("here")
+@pytest.mark.usefixtures("here", "undrawn")
 def test_the_command_draws_results_and_scenes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert call("run", "paper-1", "--elements", "40", "-q", "-o", "r.h5", "--plot", "p", "--what", "traction") == 0
     assert [path.name for path in Path("p").iterdir()] == ["traction.png"]

@@ -39,6 +39,7 @@ def test_results_scenes_and_plans_show_a_table_and_a_picture() -> None:
     assert not plan.of("img")
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_load_steps_show_a_table_of_the_first_and_last_and_the_friction_loop(without: Callable[..., None]) -> None:
     scene = dataclasses.replace(with_overrides(bk.load_scene("paper-1"), elements=24), load_factors=(0.5, 1.0))
     steps = bk.run([scene])

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import base64
 import dataclasses
+import io
 import shutil
 import subprocess
 from collections.abc import Callable
@@ -19,6 +21,7 @@ from bemkit.cli.main import main
 from bemkit.errors import ResultWarning
 from bemkit.report.page import report, save_report
 from bemkit.scene.toml import with_overrides
+from tests.blank_pictures import blank_pictures
 from tests.slow import slow_except
 
 SECTIONS = "Summary, Warnings, Pictures, Forces, Certificate, Convergence, Plan, Scene, Run times, Versions".split(", ")
@@ -62,7 +65,8 @@ def solution() -> bk.Solution:
 
 @pytest.fixture(scope="module")
 def text(solution: bk.Solution) -> str:
-    return report(solution)
+    with blank_pictures():
+        return report(solution)
 
 
 @pytest.fixture(scope="module")
@@ -130,9 +134,15 @@ def test_scenes_with_functions_and_without_contact_have_reports() -> None:
     scene = with_overrides(bk.load_scene("bending"), elements=20)
     load = dataclasses.replace(scene.parts[1], condition=bk.Traction(x=lambda x, y: 1.0 - 2.0 * y))
     solution = bk.run(dataclasses.replace(scene, parts=(scene.parts[0], load)))
-    texts = " ".join(Page(report(solution)).texts)
+    page = Page(report(solution))
+    texts = " ".join(page.texts)
     assert "The scene cannot be written as text" in texts
     assert "Tractions along the whole boundary" in texts
+    for picture in page.of("img"):
+        data = base64.b64decode(picture["src"].removeprefix("data:image/png;base64,"))
+        drawn = matplotlib.image.imread(io.BytesIO(data))[..., :3]
+        assert min(drawn.shape[:2]) > 230
+        assert drawn.std() > 0.03  # not blank
 
 
 def test_histories_and_several_bodies_have_reports(page: Page, without: Callable[..., None]) -> None:
@@ -173,9 +183,9 @@ QUIET = (
 @pytest.mark.slow
 @pytest.mark.skipif(CHROMIUM is None, reason="Chromium is not installed")
 @pytest.mark.parametrize("width", slow_except((500, 1200), 500), ids=["narrow", "wide"])
-def test_a_browser_shows_it_in_light_and_dark(width: int, tmp_path: Path, text: str) -> None:
+def test_a_browser_shows_it_in_light_and_dark(width: int, tmp_path: Path, solution: bk.Solution) -> None:
     place = tmp_path / "report.html"
-    place.write_text(text, encoding="utf-8")
+    place.write_text(report(solution), encoding="utf-8")
     pictures = {}
     for scheme, number in (("light", 1), ("dark", 0)):
         target = tmp_path / f"{scheme}.png"
