@@ -40,6 +40,7 @@ def test_result_files_with_the_long_ending_are_cited(capsys) -> None:
     assert "Hinterm" in capsys.readouterr().out
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_report_and_plot_have_the_exit_code_of_run(without: Callable[..., None]) -> None:
     solution = bk.run(dataclasses.replace(bk.load_scene("paper-1"), mesh=bk.MeshOptions(elements=24)))
     bk.write_result("good.h5", solution)

@@ -144,7 +144,7 @@ def test_the_plan_foresees_the_counts_and_says_what_is_left_out(arch: Solution) 
     assert items["rigid obstacles"].is_needed
 
 
-@pytest.mark.usefixtures("here")
+@pytest.mark.usefixtures("here", "undrawn")
 def test_the_command_line_takes_assemblies(capsys: pytest.CaptureFixture[str]) -> None:
     files = ("-o", "r.h5", "--json", "r.json", "--csv", "c.csv", "--plot", "p", "--what", "contacts")
     assert call("run", "two-cylinders", *SMALL, *files) == 0

@@ -117,9 +117,9 @@ def test_stress_inside_goes_with_the_lines(tmp_path: Path) -> None:
 @pytest.mark.parametrize("is_biaxial", slow_only([True, False], True))
 def test_triangles_end_at_the_boundary_and_hold_the_largest_stress(is_biaxial: bool, tmp_path: Path) -> None:
     meshio = pytest.importorskip("meshio")
-    scene = plate(is_biaxial=is_biaxial, mesh=bk.MeshOptions(elements=32), discretisation=bk.Galerkin(6))
+    scene = plate(is_biaxial=is_biaxial, mesh=bk.MeshOptions(elements=24), discretisation=bk.Galerkin(6))
     solution = bk.run(scene)
-    export_result(tmp_path / "r.vtu", solution, inside=25)
+    export_result(tmp_path / "r.vtu", solution, inside=13)
     mesh = meshio.read(tmp_path / "r.vtu")
     for name, values in mesh.point_data.items():
         assert np.isfinite(values).all(), name
@@ -127,7 +127,7 @@ def test_triangles_end_at_the_boundary_and_hold_the_largest_stress(is_biaxial: b
     assert mesh.point_data["von_mises"].max() == pytest.approx(largest, rel=1e-4)
     # the picture draws the same triangles and values
     size = np.ptp(solution.mesh.whole.nodes, axis=0).max()
-    drawn = stress_mesh(solution.body, float(size) / 24, shown(solution).frame)
+    drawn = stress_mesh(solution.body, float(size) / 12, shown(solution).frame)
     assert draw_stress(solution).get_title().startswith(f"Stress up to {amount(largest, 'stress', None)}\n")
     if find_spec("pyvista"):
         import pyvista

@@ -74,6 +74,7 @@ def test_the_papers_collocation_keeps_its_promises() -> None:
     check_discretisation(bk.ConstantCollocation(slopes=False))
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_one_of_ones_own_goes_all_the_way(plugin: None, capsys: pytest.CaptureFixture[str]) -> None:
     """From a scene file to the plan, the result file, the tables and the pictures."""
     text = bk.scene_to_toml(replace(bk.load_scene("paper-1"), mesh=bk.MeshOptions(elements=24)))
