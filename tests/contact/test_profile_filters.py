@@ -1,4 +1,4 @@
-"""Levelling, Gaussian filters and statistics of profiles, against closed forms; files of instruments."""
+"""Levelling, Gaussian filters and statistics of profiles, against closed forms."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 import bemkit as bk
-from bemkit.contact.profile_file import ProfileError, read_profile
 from bemkit.contact.profile_filters import Levelling, filtered, levelled, rms_height, rms_slope
 
 X = np.arange(1000) / 1000.0
@@ -84,39 +83,3 @@ def test_a_profile_from_a_file_has_the_statistics_of_its_waves(tmp_path: Path) -
     assert profile.rms_height == pytest.approx(2e-3, rel=2e-3)
     assert profile.rms_slope == pytest.approx(surface.rms_slope, rel=2e-3)
     assert bk.Profile(str(tmp_path / "p.txt"), period=1.0, longest_wavelength=0.1).rms_height < 0.5 * 2e-3
-
-
-@pytest.mark.slow
-def test_an_instrument_file_is_read_in_metres(tmp_path: Path) -> None:
-    topography = pytest.importorskip("SurfaceTopography")
-    scan = topography.UniformLineScan(wave(0.25), 1000.0, unit="um")
-    scan.to_netcdf(str(tmp_path / "scan.nc"))
-    read = read_profile(tmp_path / "scan.nc")
-    assert read.unit == "m"
-    np.testing.assert_allclose(read.x, 1e-3 * X, rtol=1e-12)
-    np.testing.assert_allclose(read.heights, 1e-6 * wave(0.25), atol=1e-12 * 1e-6)
-    with pytest.raises(ProfileError, match="row is 0, but the file is one profile"):
-        read_profile(tmp_path / "scan.nc", row=0)
-
-
-def test_a_row_of_a_map_of_an_instrument_is_a_profile(tmp_path: Path) -> None:
-    topography = pytest.importorskip("SurfaceTopography")
-    heights = np.random.default_rng(2).random((8, 5))
-    topography.Topography(heights, (2.0, 1.0), unit="mm").to_netcdf(str(tmp_path / "map.nc"))
-    read = read_profile(tmp_path / "map.nc", row=3)
-    np.testing.assert_allclose(read.x, 1e-3 * 2.0 / 8 * np.arange(8), rtol=1e-12)
-    np.testing.assert_allclose(read.heights, 1e-3 * heights[:, 3], rtol=1e-12)
-    for row in (None, 5):
-        with pytest.raises(ProfileError, match=f"row is {row}: the file is a map of 8 x 5 heights: give the row"):
-            read_profile(tmp_path / "map.nc", row)
-
-
-def test_instrument_files_that_cannot_be_read_are_named(tmp_path: Path) -> None:
-    topography = pytest.importorskip("SurfaceTopography")
-    (tmp_path / "none.sur").write_bytes(b"\xff\x00\x01nothing")
-    with pytest.raises(ProfileError, match=r"none\.sur: SurfaceTopography cannot read it .*: export it as text"):
-        read_profile(tmp_path / "none.sur")
-    heights = np.ma.masked_less(wave(0.25), -0.9)
-    topography.UniformLineScan(heights, 1.0, unit="mm").to_netcdf(str(tmp_path / "holes.nc"))
-    with pytest.raises(ProfileError, match=f"{np.count_nonzero(heights.mask)} of 1000 heights are unknown"):
-        read_profile(tmp_path / "holes.nc")

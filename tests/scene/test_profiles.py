@@ -65,22 +65,3 @@ def test_the_jump_at_the_seam_is_warned_of_before_the_run(tmp_path: Path) -> Non
     assert make_plan(bk.scene_from_toml(smooth, folder=tmp_path)).warnings == (warning,)
     write(tmp_path)
     assert make_plan(bk.scene_from_toml(SCENE, folder=tmp_path)).warnings == ()
-
-
-def test_the_unit_of_an_instrument_must_be_that_of_the_scene(tmp_path: Path) -> None:
-    topography = pytest.importorskip("SurfaceTopography")
-    heights = 1e-3 * np.cos(2.0 * np.pi * np.arange(64) / 64)
-    topography.UniformLineScan(heights, 1.0, unit="mm").to_netcdf(str(tmp_path / "scan.nc"))
-    text = SCENE.replace("profile.txt", "scan.nc")
-    with pytest.raises(bk.InputError, match=r"up to its period, 1\.0: .*; the file is in 'm', and scale converts it"):
-        bk.scene_from_toml(text, folder=tmp_path)
-    text = text.replace(", period = 1.0 } }", " } }")
-    with pytest.raises(
-        bk.InputError, match=r"is 'mm', but the file of the profile of part 'zone' is in 'm': give it scale = 1000"
-    ):
-        bk.scene_from_toml(text, folder=tmp_path)
-    scaled = bk.scene_from_toml(text.replace('"scan.nc"', '"scan.nc", scale = 1000.0'), folder=tmp_path)
-    (part,) = scaled.only.contact_parts
-    assert isinstance(part.condition, bk.Contact)
-    assert isinstance(part.condition.obstacle, Profile)
-    np.testing.assert_allclose(part.condition.obstacle.heights(np.arange(4) / 4), [1e-3, 0.0, -1e-3, 0.0], atol=1e-12)
