@@ -6,7 +6,7 @@ import dataclasses
 import itertools
 import json
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -46,6 +46,10 @@ class Perforated:
 
     def outline(self) -> Outline:
         """Return the sides and two arcs for each hole."""
+        return self._checked
+
+    @cached_property
+    def _checked(self) -> Outline:
         corners = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)]
         names = ("bottom", "right", "top", "left")
         sides = [Side(name, Segment(corners[k - 4], corners[k - 3])) for k, name in enumerate(names)]
