@@ -80,9 +80,8 @@ def expanded(scalar: np.ndarray) -> np.ndarray:  # type: ignore[type-arg]
     return (2 * scalar[:, None] + np.arange(2)).ravel()
 
 
-@pytest.mark.slow
 @given(seed=st.integers(0, 1000))
-@settings(max_examples=10)
+@settings(max_examples=settings.default.max_examples // 4)
 def test_results_do_not_depend_on_numbering(seed: int) -> None:
     rng = np.random.default_rng(seed)
     mesh = l_shape(24)

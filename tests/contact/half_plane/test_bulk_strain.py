@@ -9,6 +9,7 @@ import pytest
 
 import bemkit as bk
 from bemkit.testing import check_solution
+from tests.slow import slow_only
 
 # incompressible on a rigid cylinder: pressures do not shear
 MATERIAL, FRICTION, RADIUS, HALF_WIDTH = bk.Material(1.0, 0.5), 0.4, 1.0, 0.05
@@ -34,8 +35,7 @@ def specimen(strain: float, n_elements: int = 500, **changes: object) -> bk.Scen
     return replace(scene, **changes)  # type: ignore[arg-type]
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("share", [0.1, -0.2])
+@pytest.mark.parametrize("share", slow_only([0.1, -0.2], 0.1))
 def test_the_stick_zone_is_shifted_by_bulk_stress(share: float) -> None:
     """By a sigma / (2 s p0); its half-width is that without bulk stress, a sqrt(1 - Q / (s P))."""
     stress = 2.0 * share * FRICTION * PRESSURE
