@@ -243,8 +243,9 @@ def with_least_clearances(sample: Sample, n_pieces: int, xi: FloatArray) -> Poin
         clearance, size = values.clearance.reshape(pieces.size, xi.size), high - low
         row, nearest = np.nonzero(_least(clearance) | ((is_free & (size == 2.0))[:, None] & _minima(clearance)))
         least = clearance[row, nearest]
-        beside, first = nearest[:, None] + np.arange(-2, 3), np.clip(nearest - 1, 0, xi.size - 3)
-        bound = 2.0 * least - clearance[row[:, None], np.clip(beside, 0, xi.size - 1)].max(axis=1)
+        first = np.minimum(np.maximum(nearest - 1, 0), xi.size - 3)
+        beside = np.minimum(np.maximum(nearest[:, None] + np.arange(-2, 3), 0), xi.size - 1)
+        bound = 2.0 * least - clearance[row[:, None], beside].max(axis=1)
         goal = np.where(is_free[row], 0.0, least.min(initial=0.0))
         chosen = (bound < np.minimum(-least_overlap, goal)) & (size[row] > 2.0 * _SHORTEST)
         row, first = row[chosen], first[chosen]
@@ -271,8 +272,9 @@ def _least(clearance: FloatArray) -> BoolArray:
 
 def _minima(clearance: FloatArray) -> BoolArray:
     """Mark the minima (m, q) of each row of clearances, those at the ends included."""
-    beside = np.pad(clearance, ((0, 0), (1, 1)), constant_values=np.inf)
-    return np.asarray((clearance < beside[:, :-2]) & (clearance <= beside[:, 2:]))
+    is_minimum = np.concatenate([clearance[:, :1] < np.inf, clearance[:, 1:] < clearance[:, :-1]], axis=1)
+    is_minimum[:, :-1] &= clearance[:, :-1] <= clearance[:, 1:]
+    return is_minimum
 
 
 def deepest(values: PointsBetween) -> tuple[float, FloatArray]:
