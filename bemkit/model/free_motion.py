@@ -5,9 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from bemkit.arrays import FloatArray
+from bemkit.contact.polygon import RigidPolygon
 from bemkit.contact.solvability import UnsolvableLoad
 from bemkit.errors import InputError, format_point
 from bemkit.geometry.spaces import dof_points
+from bemkit.geometry.vectors import norms
 from bemkit.model.prepared import Prepared
 from bemkit.model.units import Units
 from bemkit.operators.rigid_modes import rigid_motions
@@ -20,6 +22,8 @@ _DIRECTIONS = (
 _REMEDY = ": change the load or hold the body"
 _STRAIGHT = 1e-6
 """Largest rotation that counts as none, relative to the translation over the size of the body."""
+_MET = 1e-3
+"""Distance of a node from a corner that meets it, relative to the largest distance of nodes."""
 _ROUND_OFF = 1e-9
 """Round-off of a mode, and of coordinates relative to the size of the body."""
 
@@ -99,7 +103,7 @@ def describe(prepared: Prepared, load: UnsolvableLoad) -> str:
         from bemkit.model.turning import turned_by_load
 
         words = f"{load.description}: hold what moves by a support, raise the friction, or change the loads"
-        return turned_by_load(prepared) or words
+        return turned_by_load(prepared) or words + ("" if load.is_sliding else _corner_between_nodes(prepared))
     units, scene = prepared.units, prepared.scene
     force = prepared.force_unit * scene.depth
     mode = _rigid_mode(prepared, load)
@@ -115,7 +119,30 @@ def describe(prepared: Prepared, load: UnsolvableLoad) -> str:
     moment = amount(load.work / abs(turn) * force * units.length, "energy", scene.result_units)
     sense = "anticlockwise" if turn > 0.0 else "clockwise"
     words = f"the load turns the body {sense} {_pivot(mode, units)} with {moment}"
-    return f"{words}; contact cannot hold it{_REMEDY}"
+    return f"{words}; contact cannot hold it{_REMEDY}{_corner_between_nodes(prepared)}"
+
+
+def _corner_between_nodes(prepared: Prepared) -> str:
+    """Name a corner of a polygon beside its side that no node meets, so that contact ends before it; else empty."""
+    n_bodies = len(prepared.bodies)
+    for rows in prepared.rows:
+        if rows.couplings is not None or rows.n_contact < 2:
+            continue
+        is_fixed = rows.other < 0
+        scene = prepared.bodies[rows.body].scene
+        obstacle = scene.obstacles[rows.part] if is_fixed else prepared.scene.rigid[rows.other - n_bodies].obstacle
+        if not isinstance(obstacle, RigidPolygon):
+            continue
+        corners = np.array(obstacle.vertices)
+        distances = norms(corners[:, None] - rows.points).min(axis=1)
+        spacing = float(np.diff(np.sort(rows.arc_length)).max())
+        beside = np.flatnonzero((distances > _MET * spacing) & (distances < spacing))
+        if beside.size:
+            return (
+                f". The corner {format_point(corners[beside[0]], digits=6)} of the polygon lies between nodes, where "
+                "contact does not act: let a part end there, or use more elements"
+            )
+    return ""
 
 
 def _rigid_mode(prepared: Prepared, load: UnsolvableLoad) -> FloatArray:

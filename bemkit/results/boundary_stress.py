@@ -19,7 +19,7 @@ from bemkit.geometry.symmetry.images import reflected_to_whole
 from bemkit.geometry.vectors import turned_right
 from bemkit.operators.material import Material
 from bemkit.operators.somigliana.fields import InteriorFields
-from bemkit.operators.somigliana.potentials import PotentialFields
+from bemkit.operators.somigliana.potentials import PotentialFields, as_points
 from bemkit.scene.discretisation import on_whole_body
 
 if TYPE_CHECKING:
@@ -191,7 +191,7 @@ _END = 1e-9
 
 def stress_at(boundary: BoundaryStress, points: FloatArray, part: str | None = None) -> FloatArray:
     """Evaluate the stress inside a body and on its boundary; see `SolvedBody.stress`."""
-    points = np.atleast_2d(np.asarray(points, float))
+    points = as_points(np.atleast_2d(np.asarray(points, float)))
     mesh = boundary.mesh
     location = Locator(mesh).locate(points)
     is_known = location.is_on_boundary | (boundary.interior.is_inside(points) & (part is None))
@@ -215,7 +215,7 @@ def stress_at(boundary: BoundaryStress, points: FloatArray, part: str | None = N
 
 def displacement_at(boundary: BoundaryStress, points: FloatArray) -> FloatArray:
     """Evaluate the displacement inside a body and on its boundary; see `SolvedBody.displacement`."""
-    points = np.atleast_2d(np.asarray(points, float))
+    points = as_points(np.atleast_2d(np.asarray(points, float)))
     location = Locator(boundary.mesh).locate(points)
     is_known = location.is_on_boundary | boundary.interior.is_inside(points)
     _require(is_known, points, "outside of the body", None)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -220,6 +221,8 @@ class SolvedBody:
 
     def stress_concentration(self, nominal: float, measure: str = "hoop", part: str | None = None) -> float:
         """Return the largest stress on the boundary over a nominal stress [Pa]; see `largest_stress`."""
+        if not (math.isfinite(nominal) and nominal):
+            raise InputError(f"nominal is {nominal}: give a stress other than zero, such as the one far from a hole")
         return self.largest_stress(measure, part).value / nominal
 
     @cached_property

@@ -357,6 +357,9 @@ def guess_from(scene: Scene, start: Any) -> Callable[[Model], ContactState] | No
         return None
     if not scene.has_contact:
         raise NoContactError("start is given, but no part is in contact: remove it; nothing is iterated")
+    from bemkit.results.solution import Solution
     from bemkit.runs.warm_start import state_on
 
+    if not isinstance(start, Solution):
+        raise InputError(f"start is a {type(start).__name__}: give a Solution, of bk.run or of bk.read_result")
     return lambda model: state_on(model, start)

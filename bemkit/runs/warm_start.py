@@ -65,9 +65,9 @@ def _carried(
     parts, places = np.array(model.prepared.names), model.prepared.column("arc_length")
     result = np.zeros((len(parts), 4))
     for part in dict.fromkeys(parts.tolist()):
-        known = np.flatnonzero(np.equal(names, part))
+        known = np.flatnonzero(np.array(names, dtype=str) == part)
         if not known.size:
-            raise InputError(f"the start has no contact {part!r}: it has {', '.join(dict.fromkeys(names))}")
+            raise InputError(f"the start has no contact {part!r}: it has {', '.join(dict.fromkeys(names)) or 'none'}")
         known = known[np.argsort(arc_length[known])]
         rows = np.flatnonzero(parts == part)
         for column in range(4):

@@ -113,5 +113,5 @@ class ListedCopies:
 
 
 def _check_count(name: str, count: int) -> None:
-    if not 1 <= count <= MOST_COPIES:
-        raise InputError(f"{name} is {count}: give a number from 1 to {MOST_COPIES}")
+    if not 1 <= count <= MOST_COPIES or count != int(count):
+        raise InputError(f"{name} is {count}: give a whole number from 1 to {MOST_COPIES}")

@@ -46,8 +46,8 @@ class Step:
     def __post_init__(self) -> None:
         if not (math.isfinite(self.time) and self.time > 0.0):
             raise InputError(f"time is {self.time}: give the time at the end of the step, a positive number")
-        if self.increments < 1:
-            raise InputError(f"increments is {self.increments}: give 1 or more")
+        if self.increments < 1 or self.increments != int(self.increments):
+            raise InputError(f"increments is {self.increments}: give a whole number, 1 or more")
         object.__setattr__(self, "changes", MappingProxyType(dict(self.changes)))
 
     def __reduce__(self) -> tuple[type[Step], tuple[object, ...]]:

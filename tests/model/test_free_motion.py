@@ -172,3 +172,28 @@ def test_a_torque_beyond_the_friction_of_a_shrunk_ring_is_named(share: float) ->
         "At the pressures of the last state the load turns the body anticlockwise about (0, 0)" in solution.message
     )
     assert (solution.is_converged, is_named) == ((True, False) if share < 1.0 else (False, True))
+
+
+@pytest.mark.parametrize("ends_at_corner", [False, True])
+def test_a_corner_that_no_node_meets_is_named(ends_at_corner: bool) -> None:
+    """A punch holds moments up to its force times its half width 0.487, where nodes meet its corners."""
+    corners = ((0.513, 1.0), (1.487, 1.0), (1.487, 1.5), (0.513, 1.5))
+    seat = bk.Part("seat", bk.Free(), ("top",), bk.Expression("x > 0.513 and x < 1.487" if ends_at_corner else "x > 0"))
+    base = bk.Part("base", bk.Clamped(), ("bottom",))
+    plate = bk.Body(
+        name="plate",
+        shape=bk.Rectangle(2.0, 1.0),
+        material=bk.Material(1.0, 0.3),
+        parts=(base, seat),
+        mesh=bk.MeshOptions(40),
+    )
+    moment = 1.2 * 0.487e-3
+    punch = bk.RigidBody(
+        name="punch", obstacle=bk.RigidPolygon(corners), centre=(1.0, 1.0), force_y=-1e-3, moment=moment
+    )
+    scene = bk.Scene(
+        title="punch", bodies=(plate,), rigid=(punch,), contacts=(bk.ContactPair(("plate.seat", "punch")),)
+    )
+    words = complaint(scene)
+    assert "tips body 'punch' away from body 'plate'" in words
+    assert ("The corner (0.513, 1) of the polygon lies between nodes" in words) != ends_at_corner

@@ -60,6 +60,9 @@ def test_a_uniform_stress_is_exact_on_sides_and_at_corners() -> None:
     points = np.array([[0.0, 0.0], [2.0, 1.0], [1.0, 1.0], [1.0, 0.5], [0.0, 0.3]])
     np.testing.assert_allclose(solution.stress(points), np.broadcast_to([[2.0, 0.0], [0.0, 0.0]], (5, 2, 2)), atol=1e-7)
     np.testing.assert_allclose(solution.stress(points[:1], part="left"), [[[2.0, 0.0], [0.0, 0.0]]], atol=1e-7)
+    inside = [[0.5, 0.5], [1.3, 0.8]]
+    np.testing.assert_allclose(solution.stress(inside), np.broadcast_to([[2.0, 0.0], [0.0, 0.0]], (2, 2, 2)), atol=1e-5)
+    assert solution.stress(np.zeros((0, 2))).shape == (0, 2, 2)
 
 
 def test_at_a_corner_each_side_has_its_own_stress() -> None:
@@ -129,8 +132,12 @@ def test_points_that_have_no_stress_are_refused(uniaxial: bk.Solution) -> None:
         uniaxial.stress(TOP, part="rim")
     with pytest.raises(PointNotInsideError, match="lies off the boundary"):
         uniaxial.stress(2.0 * TOP, part="hole")
+    with pytest.raises(InputError, match=r"give an \(n, 2\) array of finite coordinates"):
+        uniaxial.stress(np.array([[0.0, np.nan]]))
     with pytest.raises(UnknownPartError, match="there is no part 'edge'"):
         uniaxial.stress(TOP, part="edge")
+    with pytest.raises(InputError, match=r"nominal is 0\.0: give a stress other than zero"):
+        uniaxial.stress_concentration(0.0)
     with pytest.raises(InputError, match="measure is 'tresca': give one of hoop, von-mises"):
         uniaxial.largest_stress("tresca")
 

@@ -75,6 +75,10 @@ def test_starts_need_the_same_parts() -> None:
     solution = bk.run(example(1, "linear", 40))
     with pytest.raises(ValueError, match="the start has no contact 'floor': it has foundation"):
         bk.run(block(), start=solution)
+    with pytest.raises(ValueError, match="the start has no contact 'foundation': it has none"):
+        bk.run(solution.scene, start=bk.run(bk.load_scene("bending")))
+    with pytest.raises(ValueError, match="start is a Scene: give a Solution"):
+        bk.run(solution.scene, start=solution.scene)
 
 
 def test_a_mesh_that_fails_is_no_start() -> None:
