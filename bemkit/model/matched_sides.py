@@ -41,10 +41,10 @@ def matching_densities(
     -----
     Displacements that are linear on curved elements lie inside the curve between the nodes, by a share of the squared
     length of an element, on both sides alike if they are divided alike. Otherwise a uniform pressure varies, and its
-    mean is wrong. Only bodies of linear elements, with neither an accuracy nor grading nor density, are matched; the
-    rest of the boundary keeps at least half of its elements. Without friction bodies with a clearance would turn nearly
-    freely on alike meshes; bodies in contact by arcs about one point may turn freely, see
-    `bemkit.contact.mortar.coupling`.
+    mean is wrong. Constant elements have steps where those of the other side have none. Only bodies of constant or
+    linear elements, with neither an accuracy nor grading nor density, are matched; the rest of the boundary keeps at
+    least half of its elements. Without friction bodies with a clearance would turn nearly freely on alike meshes;
+    bodies in contact by arcs about one point may turn freely, see `bemkit.contact.mortar.coupling`.
     """
     densities: dict[str, dict[str, float]] = {}
     for pair in scene.elastic_contacts:
@@ -81,7 +81,7 @@ def _turns_nearly_freely(
 
 
 def _is_matched(body: BodyScene) -> bool:
-    """Whether a body has linear elements whose lengths are not given."""
+    """Whether a body has constant or linear elements whose lengths are not given."""
     mesh, discretisation = body.mesh, body.discretisation
-    is_linear = isinstance(discretisation, Galerkin) and discretisation.largest_degree == 1
-    return is_linear and mesh.elements is not None and not mesh.density and isinstance(mesh.grading, Uniform)
+    is_low = not isinstance(discretisation, Galerkin) or discretisation.largest_degree == 1
+    return is_low and mesh.elements is not None and not mesh.density and isinstance(mesh.grading, Uniform)

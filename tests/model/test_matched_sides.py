@@ -100,14 +100,39 @@ def shifted(scene: bk.Scene) -> bk.Scene:
         (rings(bk.Frictionless()), [52, 52]),
         (shifted(rings(bk.Frictionless())), [52, 28]),  # the inner ring would turn nearly freely
         (shifted(rings(bk.Coulomb(0.2))), [52, 52]),
+        (rings(bk.Coulomb(0.2), discretisation=bk.ConstantCollocation()), [52, 52]),
         (rings(bk.Coulomb(0.2), discretisation=bk.Galerkin(2)), [52, 28]),
         (rings(bk.Coulomb(0.2), radius=1.05), [52, 28]),  # a gap: the sides do not fit
         (rings(bk.Coulomb(0.2), mesh=bk.MeshOptions(elements=80, grading=bk.Algebraic(1.5))), [52, 28]),
         (rings(bk.Coulomb(0.2), mesh=bk.MeshOptions(elements=80, density={"outer": 1.0})), [52, 28]),
     ],
 )
-def test_lengths_are_matched_only_for_linear_elements_on_sides_that_fit(scene: bk.Scene, expected: list[int]) -> None:
+def test_lengths_are_matched_only_for_low_degrees_on_sides_that_fit(scene: bk.Scene, expected: list[int]) -> None:
     assert sizes(scene) == expected
+
+
+@pytest.mark.parametrize("mesh", [bk.MeshOptions(64), bk.MeshOptions(64, density={"outer": 1.0})])
+@pytest.mark.parametrize("law", [bk.Frictionless(), bk.Coulomb(0.4)])
+def test_constant_elements_carry_the_pressure_of_a_stiff_disc_in_a_soft_ring(
+    mesh: bk.MeshOptions, law: bk.FrictionLaw
+) -> None:
+    """Lame; elements of the ring are matched, or four times as long and carry the multipliers."""
+    disc = bk.Body(name="disc", shape=bk.Disk(0.5), material=bk.Material(10.0, 0.0))
+    ring = bk.Body(name="ring", shape=bk.Ring(0.5, 1.5), material=bk.Material(1.0, 0.45), mesh=mesh)
+    solution = bk.run(
+        bk.Scene(
+            title="press fit",
+            bodies=(disc, ring),
+            contacts=(bk.ContactPair(("disc.arc", "ring.inner"), gap=-1e-4),),
+            symmetry=bk.Symmetry(x=0.0, y=0.0),
+            law=law,
+            discretisation=bk.ConstantCollocation(),
+            mesh=bk.MeshOptions(64),
+        )
+    )
+    modulus, ratio = 1.0 / (1.0 - 0.45**2), 0.45 / (1.0 - 0.45)
+    pressure = 1e-4 / 0.5 / (1.0 / 10.0 + ((1.5**2 + 0.5**2) / (1.5**2 - 0.5**2) + ratio) / modulus)
+    np.testing.assert_allclose(solution.contact.sigma_n, -pressure, rtol=1e-2)  # 1.0 without either
 
 
 def test_meshes_that_are_given_are_kept() -> None:

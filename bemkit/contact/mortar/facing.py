@@ -126,8 +126,8 @@ def is_non_mortar(one: ContactSide, two: ContactSide, *, has_friction: bool = Fa
     -------
     bool
         True if only the first side is completely covered. If both or none are, true if the mean distance of nodes on
-        the first side is not larger than on the second one. Of curved linear sides that cover each other and have
-        friction or are arcs about one point, the coarser side carries the multipliers.
+        the first side is not larger than on the second one. Of curved constant or linear sides that cover each other
+        and have friction or are arcs about one point, the coarser side carries the multipliers.
 
     Notes
     -----
@@ -135,10 +135,11 @@ def is_non_mortar(one: ContactSide, two: ContactSide, *, has_friction: bool = Fa
     [Wohlmuth2000]. The choice ignores the stiffness of the bodies: if a stiff body with the finer mesh presses a soft
     body, the side of the soft body would be better.
 
-    Linear elements on conforming curved sides move too far inwards between their nodes. Multipliers of the finer side
-    resolve that error, those of the coarser side average over it: the pressure of a disc in a ring with three times
-    longer elements is uniform to 1e-5 instead of 2e-2. Without friction a disc with a clearance would rotate nearly
-    freely.
+    Linear elements on conforming curved sides move too far inwards between their nodes, and constant elements have
+    steps there. Multipliers of the finer side resolve that error, those of the coarser side average over it: the
+    pressure of a disc in a ring with three times longer linear elements is uniform to 1e-5 instead of 2e-2, that of a
+    stiff disc in a soft ring with four times longer constant elements to 1e-5 instead of 1. Without friction a disc
+    with a clearance would rotate nearly freely.
     """
     _, _, cover, _ = _facing_elements(_Elements.of([one, two], [0, 1]), np.inf)
     return _is_first_non_mortar(one, two, float(cover.sum()), has_friction=has_friction)
@@ -146,7 +147,7 @@ def is_non_mortar(one: ContactSide, two: ContactSide, *, has_friction: bool = Fa
 
 def _is_first_non_mortar(one: ContactSide, two: ContactSide, cover: float, *, has_friction: bool) -> bool:
     """Apply the rule of `is_non_mortar` to sides with a common length [m]."""
-    fits = not any(side.is_straight or side.space.degree != 1 for side in (one, two)) and (
+    fits = not any(side.is_straight or side.space.degree > 1 for side in (one, two)) and (
         has_friction or common_centre([(side.mesh, side.elements) for side in (one, two)]) is not None
     )
     share = _WHOLE_CURVED if fits else _WHOLE
