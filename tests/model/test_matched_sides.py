@@ -10,6 +10,8 @@ import pytest
 
 import bemkit as bk
 from bemkit.model.placed import place
+from bemkit.results.contact_table import ContactTable
+from bemkit.scene.discretisation import Discretisation
 from tests.slow import slow_except, slow_only
 
 MATERIAL = bk.Material(1.0, 0.3)
@@ -133,6 +135,27 @@ def test_constant_elements_carry_the_pressure_of_a_stiff_disc_in_a_soft_ring(
     modulus, ratio = 1.0 / (1.0 - 0.45**2), 0.45 / (1.0 - 0.45)
     pressure = 1e-4 / 0.5 / (1.0 / 10.0 + ((1.5**2 + 0.5**2) / (1.5**2 - 0.5**2) + ratio) / modulus)
     np.testing.assert_allclose(solution.contact.sigma_n, -pressure, rtol=1e-2)  # 1.0 without either
+
+
+def test_longer_constant_elements_carry_the_pressure_of_shorter_ones() -> None:
+    """A block on a wider one, against quadratic elements; multipliers of the shorter elements are wrong by 45 %."""
+    load = bk.Part("load", bk.Pressure(bk.Expression("1e-3 * (1 + 0.5 * x)")), ("top",))
+    upper = bk.Body(name="upper", shape=bk.Rectangle(2.0, 1.0, (-1.0, 0.0)), material=MATERIAL, parts=(load,))
+    base = bk.Part("base", bk.Clamped(), ("bottom",))
+    lower = bk.Body(name="lower", shape=bk.Rectangle(4.0, 1.0, (-2.0, -1.0)), material=MATERIAL, parts=(base,))
+    contacts = (bk.ContactPair(("upper.bottom", "lower.top")),)
+
+    def pressed(discretisation: Discretisation, n_lower: int) -> ContactTable:
+        bodies = (replace(upper, mesh=bk.MeshOptions(120)), replace(lower, mesh=bk.MeshOptions(n_lower)))
+        scene = bk.Scene(
+            title="p", bodies=bodies, contacts=contacts, law=bk.Coulomb(0.4), discretisation=discretisation
+        )
+        return bk.run(scene).contact
+
+    exact, table = pressed(bk.Galerkin(2), 200), pressed(bk.ConstantCollocation(), 60)
+    order, is_inside = np.argsort(exact.x), np.abs(table.x) < 0.8
+    expected = np.interp(table.x, exact.x[order], exact.sigma_n[order])
+    np.testing.assert_allclose(table.sigma_n[is_inside], expected[is_inside], atol=0.08 * np.abs(expected).mean())
 
 
 def test_meshes_that_are_given_are_kept() -> None:
