@@ -14,10 +14,11 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse.linalg import splu
 
-from bemkit.arrays import BoolArray, FloatArray, spread_fractions
+from bemkit.arrays import ComplexArray, FloatArray, IntArray, spread_fractions
 from bemkit.contact.body import ContactState, SingularResponse
 from bemkit.contact.joined.coupled_members import CoupledMembers
 from bemkit.contact.joined.member import blocks_of_members
+from bemkit.contact.reduced_conditions import ReducedConditions, as_pairs
 from bemkit.errors import printable
 from bemkit.operators.boundary_equations import LinearConditions
 from bemkit.operators.linear_solvers import SingularMatrixError
@@ -171,69 +172,40 @@ def sparse_response(joined: CoupledMembers, compliance: Compliance, conditions: 
     diagonal. A small penalty there lets the motions be eliminated first, which couples no more forces than the
     compliance C of their member does: half of the entries of a system of forces and displacements.
     """
-    n = joined.n_contact
-    given = _Given.by(conditions, joined.weights)
-    kept = np.flatnonzero(~given.is_given.ravel())
+    n, reduced = joined.n_contact, ReducedConditions.of(conditions)
+    node, weights = reduced.node, joined.weights
     on_displacement, on_force = (
-        _blocks(array)[kept]
-        for array in (conditions.on_displacement, conditions.on_traction / joined.weights[:, None, None])
+        _rows(node, numbers, n) for numbers in (reduced.on_displacement, reduced.on_traction / weights[node])
     )
-    at_rest = (
-        joined.prescribed + joined.gap_operator @ joined.deformation(joined.load) + compliance.by_force @ given.at_rest
-    )
+    by_unknown = sparse.csr_array(_rows(node, reduced.direction, n).T)
+    given = (weights[:, None] * as_pairs(reduced.given)).ravel()
+    at_rest = joined.prescribed + joined.gap_operator @ joined.deformation(joined.load) + compliance.by_force @ given
     # forces by the square root of the modulus on both sides, motions by its inverse: entries of size one
-    row, motion = np.sqrt(compliance.force_unit[kept]), np.sqrt(compliance.motion_unit)
+    is_tangential = np.abs(reduced.direction.real) > np.abs(reduced.direction.imag)
+    row, motion = np.sqrt(compliance.force_unit[2 * node + is_tangential]), np.sqrt(compliance.motion_unit)
     scaled = sparse.diags_array(row)
-    ties = scaled @ (on_displacement @ compliance.by_force + on_force) @ given.by_kept @ scaled
+    ties = scaled @ (on_displacement @ compliance.by_force + on_force) @ by_unknown @ scaled
     moved = scaled @ on_displacement @ compliance.by_motion @ sparse.diags_array(motion)
-    balance = sparse.diags_array(motion) @ compliance.by_motion.T @ given.by_kept @ scaled
+    balance = sparse.diags_array(motion) @ compliance.by_motion.T @ by_unknown @ scaled
     # all blocks in one format, also the empty one, are put together without sorting their entries anew
     blocks = [[ties, moved], [balance, sparse.csr_array((motion.size, motion.size))]]
     matrix = sparse.block_array([[sparse.csr_array(block) for block in row] for row in blocks], format="csr")
-    values = row * (conditions.value.ravel()[kept] - on_displacement @ at_rest - on_force @ given.at_rest)
-    work = motion * -(joined.motions.T @ joined.load + compliance.by_motion.T @ given.at_rest)
+    values = row * (reduced.value - on_displacement @ at_rest - on_force @ given)
+    work = motion * -(joined.motions.T @ joined.load + compliance.by_motion.T @ given)
     solution = _solved(matrix, np.append(values, work), n_motions=motion.size)
-    force = given.by_kept @ (row * solution[: kept.size])
-    displacement = at_rest + compliance.by_force @ force + compliance.by_motion @ (motion * solution[kept.size :])
-    traction = (force + given.at_rest).reshape(n, 2) / joined.weights[:, None]
+    force = by_unknown @ (row * solution[: node.size])
+    displacement = at_rest + compliance.by_force @ force + compliance.by_motion @ (motion * solution[node.size :])
+    traction = (force + given).reshape(n, 2) / joined.weights[:, None]
     displacement, traction = displacement.reshape(n, 2), conditions.with_given_tractions(traction)
     return ContactState(conditions.with_given_displacements(displacement), traction)
 
 
-class _Given:
-    """Nodal forces (2 n_contact,) that follow from conditions on tractions: ``by_kept @ y + at_rest``."""
-
-    def __init__(self, is_given: BoolArray, by_kept: sparse.csr_array, at_rest: FloatArray) -> None:
-        self.is_given, self.by_kept, self.at_rest = is_given, by_kept, at_rest
-
-    @classmethod
-    def by(cls, conditions: LinearConditions, weights: FloatArray) -> _Given:
-        is_given = ~np.any(conditions.on_displacement != 0.0, axis=2)
-        factor = np.einsum("nii->ni", conditions.on_traction)
-        other_factor = np.stack([conditions.on_traction[:, 0, 1], conditions.on_traction[:, 1, 0]], axis=1)
-        both, single = is_given.all(axis=1), is_given & ~is_given.all(axis=1, keepdims=True)
-        if np.any(single & (factor == 0.0)) or np.any(np.linalg.det(conditions.on_traction[both]) == 0.0):
-            raise SingularResponse("a condition at a contact node involves neither displacement nor traction")
-        at_rest = np.zeros_like(conditions.value)
-        at_rest[single] = conditions.value[single] / factor[single]
-        at_rest[both] = np.linalg.solve(conditions.on_traction[both], conditions.value[both][:, :, None])[:, :, 0]
-        number = (np.cumsum(~is_given) - 1).reshape(is_given.shape)
-        node, component = np.nonzero(single)
-        rows = np.append(np.flatnonzero(~is_given), 2 * node + component)
-        columns = np.append(number[~is_given], number[node, 1 - component])
-        factors = np.append(np.ones(np.count_nonzero(~is_given)), -other_factor[single] / factor[single])
-        shape = (is_given.size, np.count_nonzero(~is_given))
-        by_kept = sparse.csr_array((factors, (rows, columns)), shape)
-        by_kept.eliminate_zeros()
-        return cls(is_given, by_kept, (weights[:, None] * at_rest).ravel())
-
-
-def _blocks(blocks: FloatArray) -> sparse.csr_array:
-    """Return the sparse array with 2 x 2 blocks (n, 2, 2) on its diagonal."""
-    n = len(blocks)
-    array = sparse.csr_array(sparse.bsr_array((np.ascontiguousarray(blocks), np.arange(n), np.arange(n + 1))))
-    array.eliminate_zeros()
-    return array
+def _rows(node: IntArray, numbers: ComplexArray, n_contact: int) -> sparse.csr_array:
+    """Return rows (n_unknowns, 2 n_contact); products with pairs (n, t) are the real parts of ``conj(number) pair``."""
+    data, columns = as_pairs(numbers).ravel(), (2 * node[:, None] + np.arange(2)).ravel()
+    rows = sparse.csr_array((data, columns, np.arange(0, data.size + 1, 2)), (node.size, 2 * n_contact))
+    rows.eliminate_zeros()
+    return rows
 
 
 def _solved(matrix: sparse.csr_array, right_side: FloatArray, n_motions: int) -> FloatArray:
