@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, cast
+from typing import Any, cast
 
 import numpy as np
 
@@ -18,13 +18,10 @@ from bemkit.runs.density import DensityMeshes
 from bemkit.runs.hp import LayeredMeshes
 from bemkit.runs.mesh_sequence import Level, MeshSequence
 from bemkit.runs.step_errors import in_which_step
-from bemkit.runs.steps import guess_from, joined, run_on_mesh, solved_history
+from bemkit.runs.steps import RunOptions, guess_from, run_on_mesh
 from bemkit.scene.discretisation import MOST_ELEMENTS, MeshOptions
 from bemkit.scene.scene import Scene
-from bemkit.solvers.base import Status, StepRecord
-
-if TYPE_CHECKING:
-    from concurrent.futures import Executor
+from bemkit.solvers.base import Status
 
 _MOST_MISSED = 12
 """Largest number of meshes that miss contact; each has nodes where the one before missed it."""
@@ -32,15 +29,7 @@ _SAME = 1e-9
 """Relative difference of the lengths of equal elements, in the coordinates of the shape and in those of its place."""
 
 
-def run_adaptive(
-    scene: Scene,
-    *,
-    start: Any = None,
-    callback: Callable[[StepRecord], None] | None = None,
-    done: Any = None,
-    finished: Callable[[Any], None] | None = None,
-    executor: Executor | None = None,
-) -> tuple[Any, ...]:
+def run_adaptive(scene: Scene, options: RunOptions | None = None) -> tuple[Any, ...]:
     """Solve a scene on a sequence of meshes until the estimated error is below its accuracy.
 
     A load history is solved as a whole on each mesh, which follows the largest errors of all its steps, relative to the
@@ -55,14 +44,9 @@ def run_adaptive(
     ----------
     scene : Scene
         With `MeshOptions.accuracy`.
-    start : Solution, optional
-        Of the first mesh; as for `bemkit.run`.
-    callback : callable, optional
-        Receives a record of every step on every mesh.
-    done, finished : optional
-        Of a load history; see `EarlierSteps`.
-    executor : Executor, optional
-        As for `bemkit.run`.
+    options : RunOptions, optional
+        The guess is for the first mesh. Of an earlier run some steps on one of the meshes may be done; meshes before
+        that one are solved again, unheard.
 
     Returns
     -------
@@ -79,8 +63,7 @@ def run_adaptive(
         If the scene has no accuracy, degrees shall rise in a load history, or for the reasons of `bemkit.run`.
     """
     level: Level = Level.first(cast(Any, scene))
-    refinement = _Refinement(_rule(level), start, callback, EarlierSteps(done, finished), executor)
-    return _refined(level, refinement, scene.mesh)
+    return _refined(level, _Refinement(_rule(level), options or RunOptions()), scene.mesh)
 
 
 def _rule(level: Level) -> MeshSequence:
@@ -95,30 +78,6 @@ def _rule(level: Level) -> MeshSequence:
     return LayeredMeshes(accuracy) if level.is_layered else DensityMeshes(accuracy)
 
 
-@dataclass(frozen=True)
-class EarlierSteps:
-    """Solutions of earlier steps, and the callback for new ones.
-
-    Parameters
-    ----------
-    done : Solution, optional
-        Some steps on one of the meshes; meshes before that one are solved again, unheard.
-    finished : callable, optional
-        Receives the solution of each step on a mesh but the last; see `bemkit.runs.steps.History`.
-    """
-
-    done: Solution | None = None
-    finished: Callable[[Solution], None] | None = None
-
-    def on(self, level: Level) -> tuple[Solution | None, Callable[[Solution], None] | None]:
-        """Return the finished steps on the meshes of a level, and the callback for further ones."""
-        if self.done is None:
-            return None, self.finished
-        if _has_meshes(self.done, level.meshes):
-            return self.done, self.finished
-        return None, None if level.n_elements < self.done.n_elements else self.finished
-
-
 def _has_meshes(solution: Solution, meshes: Mapping[str, BoundaryMesh]) -> bool:
     """Return whether a solution is one on these meshes, wherever its bodies lie."""
     pairs = [(solution.bodies[name].mesh.lengths, mesh.lengths) for name, mesh in meshes.items()]
@@ -130,22 +89,27 @@ class _Refinement:
     """How the meshes of a level are solved, judged and refined."""
 
     meshes: MeshSequence
-    start: Any
-    callback: Callable[[StepRecord], None] | None
-    earlier: EarlierSteps
-    executor: Executor | None
+    options: RunOptions
 
     def solved(self, level: Level, start: Any) -> Any:
         """Solve a single load from the solution before, and if that fails, from the beginning."""
-        scene = level.scene
-        if start is not None and start.contact.n_contact and scene.n_steps == 1:
-            solution = run_on_mesh(scene, level.meshes, start, self.callback, self.executor)
-            if solution.is_converged:
-                return solution
-        earlier = self.earlier.on(level)
-        guess = guess_from(scene, self.start) if start is None else None
-        steps = solved_history([scene], level.meshes, self.callback, *earlier, guess=guess, executor=self.executor)
-        return joined(*steps)
+        scene, options = level.scene, self._options_on(level)
+        if start is not None:
+            if start.contact.n_contact and scene.n_steps == 1:
+                warm = replace(self.options, guess=guess_from(scene, start), done=None, finished=None)
+                solution = run_on_mesh(scene, level.meshes, warm)
+                if solution.is_converged:
+                    return solution
+            options = replace(options, guess=None)
+        return run_on_mesh(scene, level.meshes, options)
+
+    def _options_on(self, level: Level) -> RunOptions:
+        """Return the options on the meshes of a level; earlier steps are on those of one level only."""
+        options = self.options
+        if options.done is None or _has_meshes(options.done, level.meshes):
+            return options
+        is_before = level.n_elements < options.done.n_elements
+        return replace(options, done=None, finished=None if is_before else options.finished)
 
     def error(self, solution: Any) -> float:
         """Return the estimated error; infinite without an estimate."""

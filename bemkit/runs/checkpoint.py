@@ -2,29 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from bemkit.results.result_file import ResultWriter, check_result_target, read_result
 from bemkit.results.solution import Solution
 from bemkit.runs.adaptive import run_adaptive
 from bemkit.runs.mesh_sequence import with_sides_of
-from bemkit.runs.steps import joined, solved_history
+from bemkit.runs.steps import RunOptions, run_on_mesh
 from bemkit.scene.scene import Scene
 from bemkit.scene.toml import scene_to_toml
-from bemkit.solvers.base import Status, StepRecord
-
-if TYPE_CHECKING:
-    from concurrent.futures import Executor
+from bemkit.solvers.base import Status
 
 
-def run_to_file(
-    scene: Scene,
-    path: str | Path,
-    callback: Callable[[StepRecord], None] | None = None,
-    executor: Executor | None = None,
-) -> Any:
+def run_to_file(scene: Scene, path: str | Path, options: RunOptions) -> Any:
     """Solve a load history and write each finished step to a result file.
 
     A file that holds the beginning of the same history, because a run was killed, is continued; the numbers are those
@@ -37,10 +29,8 @@ def run_to_file(
         It is compared with that in the file by what a scene file says.
     path : str or Path
         The result file, ``.h5``. Until the last step is there its status is UNFINISHED.
-    callback : callable, optional
-        Receives a record of every step of the solver.
-    executor : Executor, optional
-        As for `bemkit.run`.
+    options : RunOptions
+        Without steps of an earlier run, which the file holds.
 
     Returns
     -------
@@ -62,10 +52,11 @@ def run_to_file(
     done: Any = known if known is not None and _is_begun(scene, known) else None
 
     with ResultWriter(target) as writer:
+        options = replace(options, done=done, finished=writer.append)
         if scene.mesh.accuracy is not None:
-            solution = run_adaptive(scene, callback=callback, done=done, finished=writer.append, executor=executor)[-1]
+            solution = run_adaptive(scene, options)[-1]
         else:
-            solution = joined(*solved_history([scene], None, callback, done, writer.append, None, executor))
+            solution = run_on_mesh(scene, options=options)
         writer.finish(solution)
     return solution
 

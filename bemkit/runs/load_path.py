@@ -173,10 +173,6 @@ class Path:
         At the end of the step.
     before : Model, optional
         Of the step before; without one there is a single increment.
-    between : callable
-        Share of the way -> the problem there.
-    drag : (n_contact,) array
-        How far obstacles travel along the tangents on the whole way, dimensionless.
     factors : (float, float), optional
         Load factors before and at the end of the step [-], where the scene states some.
     """
@@ -185,8 +181,6 @@ class Path:
     start: IncrementEnd
     time: float
     before: Model | None
-    between: Callable[[float], ContactProblem]
-    drag: FloatArray | float = 0.0
     factors: tuple[float, float] | None = None
 
     def time_at(self, share: float) -> float:
@@ -201,9 +195,22 @@ class Path:
         first, last = self.factors
         return f"load factor {first + share * (last - first):.6g}"
 
+    def problem_at(self, share: float) -> ContactProblem:
+        """Return the problem at a share of the way."""
+        return self.model.problem if self.before is None else self.model.between(self.before, share)
+
+    @cached_property
+    def _travel(self) -> FloatArray | float:
+        """(n_contact,) array: how far obstacles travel along the tangents on the whole way, dimensionless."""
+        if self.before is None:
+            return 0.0
+        from bemkit.model.obstacle_travel import obstacle_travel
+
+        return obstacle_travel(self.before.prepared, self.model.prepared) / self.model.units.displacement
+
     def obstacle_slip(self, start: IncrementEnd, share: float) -> FloatArray | float:
         """Return the travel of obstacles from the end of an increment to a share of the way."""
-        return self.drag * (share if start is self.start else share - start.share)
+        return self._travel * (share if start is self.start else share - start.share)
 
     def end_of(self, attempt: _Attempt, share: float, start: IncrementEnd) -> IncrementEnd:
         """Return the end of an increment that has begun at another end."""
@@ -307,7 +314,7 @@ class _Increments:
     def attempt(self, target: float, end: IncrementEnd, start: ContactState | None, *, is_last: bool) -> _Attempt:
         """Solve the increment to a share of the way; under a law that depends on its slip until slip and law agree."""
         path, n_before = self.path, len(self.records)
-        problem, time = path.between(target), path.time_at(target)
+        problem, time = path.problem_at(target), path.time_at(target)
         if path.before is not None:
             problem = replace(problem, reference_slip=end.state.u_t + path.obstacle_slip(end, target))
         words = "" if target == 1.0 and not n_before else f"increment to {path.name_of(target)}"

@@ -2,23 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass, field, replace
+from typing import Any
 
 from bemkit.contact.body import ContactState
 from bemkit.errors import BemkitError, InputError
 from bemkit.model.model import Model
 from bemkit.plan.plan import check_elements
 from bemkit.results.solution import Solution
-from bemkit.runs.steps import joined, solved_history
+from bemkit.runs.steps import RunOptions, run_on_mesh
 from bemkit.runs.warm_start import state_on, take_sticking_state
 from bemkit.scene.scene import Scene
 from bemkit.scene.toml import with_overrides
-from bemkit.solvers.base import StepRecord
-
-if TYPE_CHECKING:
-    from concurrent.futures import Executor
 
 
 class CascadeError(InputError):
@@ -30,8 +25,7 @@ def run_nested(
     *,
     coarsest: int = 40,
     ratio: int = 2,
-    callback: Callable[[StepRecord], None] | None = None,
-    executor: Executor | None = None,
+    options: RunOptions | None = None,
 ) -> tuple[Any, ...]:
     """Solve a scene on meshes of growing size, ending with its own.
 
@@ -46,10 +40,8 @@ def run_nested(
         The number of elements is halved as long as it stays at least this large.
     ratio : int
         Factor by which the number of elements is divided.
-    callback : callable, optional
-        Receives a record of every step on every mesh.
-    executor : Executor, optional
-        As for `bemkit.run`.
+    options : RunOptions, optional
+        Of each mesh; its guess is not used.
 
     Returns
     -------
@@ -77,11 +69,12 @@ def run_nested(
     while counts[-1] // ratio >= coarsest:
         counts.append(counts[-1] // ratio)
     levels, solutions = _Levels(), []
+    options = replace(options or RunOptions(), guess=levels.start)
     for count in reversed(counts):
         is_last = count == counts[0]
         level = scene if is_last else with_overrides(scene, elements=count)
         try:
-            solutions.append(joined(*solved_history([level], callback=callback, guess=levels.start, executor=executor)))
+            solutions.append(run_on_mesh(level, options=options))
         except BemkitError:
             if is_last:  # a coarse mesh may be too coarse for the scene
                 raise

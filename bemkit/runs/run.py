@@ -11,8 +11,8 @@ from bemkit.errors import InputError, NoResultError
 from bemkit.interrupts import interruptible
 from bemkit.model.placed import Meshes
 from bemkit.plan.plan import few_on, make_plan
+from bemkit.runs.steps import RunOptions, guess_from, run_on_mesh, solved_history
 from bemkit.runs.steps import UnsolvableSceneError as UnsolvableSceneError
-from bemkit.runs.steps import guess_from, run_on_mesh, solved_history
 from bemkit.scene.scene import Scene, check_scene
 from bemkit.solvers.base import StepRecord
 
@@ -107,17 +107,18 @@ def run(
     if coarsest is not None and (mesh is not None or start is not None):
         raise InputError("coarsest is given with a mesh or a start: nested meshes have their own; remove one")
     if not isinstance(scene, Scene):
-        return _in_turn(scene, mesh, start, coarsest, file, callback, executor)
+        return _in_turn(scene, mesh, start, coarsest, file, RunOptions(None, callback, executor))
+    options = RunOptions(guess_from(scene, start), callback, executor)
     if file is not None:
         from bemkit.runs.checkpoint import run_to_file
 
-        return run_to_file(scene, file, callback, executor)
+        return run_to_file(scene, file, options)
     if scene.mesh.accuracy is not None and mesh is None:
         from bemkit.runs.adaptive import run_adaptive  # only where it is asked for
 
         if coarsest is not None:
             raise InputError("an accuracy is given with coarsest: its meshes start from each other already; remove one")
-        return run_adaptive(scene, start=start, callback=callback, executor=executor)[-1]
+        return run_adaptive(scene, options)[-1]
     nested = None
     if mesh is None and start is None:
         nested = cascade_of(scene) if coarsest is None else (coarsest, 2)
@@ -125,9 +126,9 @@ def run(
         from bemkit.results.solved_steps import with_times
         from bemkit.runs.nested import run_nested
 
-        meshes = run_nested(scene, coarsest=nested[0], ratio=nested[1], callback=callback, executor=executor)
+        meshes = run_nested(scene, coarsest=nested[0], ratio=nested[1], options=options)
         return with_times(meshes[-1], meshes)
-    return run_on_mesh(scene, mesh, start, callback, executor)
+    return run_on_mesh(scene, mesh, options)
 
 
 def _in_turn(
@@ -136,8 +137,7 @@ def _in_turn(
     start: Any,
     coarsest: int | None,
     file: str | Path | None,
-    callback: Callable[[StepRecord], None] | None,
-    executor: Executor | None,
+    options: RunOptions,
 ) -> SolvedSteps:
     """Solve scenes that follow each other in time on one mesh of each body."""
     if isinstance(scenes, str) or not isinstance(scenes, Sequence):
@@ -152,8 +152,8 @@ def _in_turn(
         raise InputError("coarsest is given with a sequence of scenes: nested meshes take a single load")
     from bemkit.results.solved_steps import SolvedSteps
 
-    guess = guess_from(scenes[0], start)
-    return SolvedSteps(solved_history(scenes, mesh, callback, guess=guess, executor=executor)[1])
+    options = replace(options, guess=guess_from(scenes[0], start))
+    return SolvedSteps(solved_history(scenes, mesh, options)[1])
 
 
 def cascade_of(scene: Scene) -> tuple[int, int] | None:

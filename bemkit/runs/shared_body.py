@@ -11,7 +11,7 @@ from bemkit.errors import BemkitError
 from bemkit.model.model import build_model
 from bemkit.model.placed import find_units, with_found_contacts
 from bemkit.runs.run import run
-from bemkit.runs.steps import History, joined, planned, solve_steps
+from bemkit.runs.steps import History, RunOptions, joined, planned, solve_steps
 from bemkit.runs.warm_start import state_on
 from bemkit.scene.load_history import load_steps
 from bemkit.scene.scene import Scene
@@ -101,9 +101,9 @@ class _Bodies:
             steps = tuple(base.under(step, None if is_alike else units) for step in scenes)
             model = self._model.under(steps[0])
             clock = clock.closed(Stage.CONDENSE)
-            history: History = History.of(scene, scenes)
-            guess = None if is_cold or self.last is None else state_on(model, self.last)
-            solution = joined(history, solve_steps(model, steps, self._plan, history, clock=clock, guess=guess))
+            guess = None if is_cold or self.last is None else partial(state_on, solution=self.last)
+            history = History.of(scene, scenes, RunOptions(guess))
+            solution = joined(history, solve_steps(model, steps, self._plan, history, clock))
         if solution.is_converged and len(steps) == 1 and solution.contact.n_contact:
             self.last = solution
         return solution

@@ -8,9 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bemkit.arrays import FloatArray
 from bemkit.contact.body import ContactState
-from bemkit.contact.problem import ContactProblem
 from bemkit.contact.solvability import UnsolvableLoad, find_unsolvable_load
 from bemkit.errors import InputError
 from bemkit.model.model import Model, build_model
@@ -31,7 +29,6 @@ if TYPE_CHECKING:
 
     from bemkit.results.load_history import LoadHistory, LoadStep
     from bemkit.results.solution import Solution
-    from bemkit.solvers.base import StepRecord
 
 
 class NoContactError(InputError):
@@ -97,8 +94,33 @@ def explained(model: Model, load: UnsolvableLoad) -> str:
 
 
 @dataclass(frozen=True, eq=False)
+class RunOptions:
+    """Options of a run besides its scene and its meshes.
+
+    Parameters
+    ----------
+    guess : callable, optional
+        Model -> where to start the first step; see `guess_from`. By default every node sticks.
+    callback : callable, optional
+        Receives a record of every step of the solver as soon as it exists.
+    executor : Executor, optional
+        Where bodies are assembled and factored, copies once; by default in this process, in turn.
+    done : Solution, optional
+        Of an earlier run, up to some step, with its `loading`: that is where to go on.
+    finished : callable, optional
+        Receives the solution of each step but the last, with the steps up to it as its load history.
+    """
+
+    guess: Callable[[Model], ContactState | None] | None = None
+    callback: Callback = None
+    executor: Executor | None = None
+    done: Solution | None = None
+    finished: Callable[[Solution], None] | None = None
+
+
+@dataclass(frozen=True, eq=False)
 class History:
-    """Options of a load history, and its known data.
+    """A load history and how it is solved.
 
     Parameters
     ----------
@@ -107,26 +129,16 @@ class History:
         Of its steps.
     is_recorded : bool
         Whether results contain the steps.
-    done : Solution, optional
-        Up to some step, with its `loading`: that is where to go on.
-    finished : callable, optional
-        Receives the solution of each step but the last, with the steps up to it as its load history.
+    options : RunOptions
     """
 
     asked: Scene
     times: Sequence[float]
     is_recorded: bool
-    done: Solution | None = None
-    finished: Callable[[Solution], None] | None = None
+    options: RunOptions
 
     @classmethod
-    def of(
-        cls,
-        asked: Scene,
-        steps: Sequence[Scene],
-        done: Solution | None = None,
-        finished: Callable[[Solution], None] | None = None,
-    ) -> History:
+    def of(cls, asked: Scene, steps: Sequence[Scene], options: RunOptions) -> History:
         """Return the history of scenes with single loads; those that say no time follow each other at 1, 2, 3.
 
         Raises
@@ -140,17 +152,11 @@ class History:
             if times[number] <= times[number - 1]:
                 before, time = times[number - 1], times[number]
                 raise InputError(f"step {number + 1}: time is {time:g} after {before:g}: give times that increase")
-        return cls(asked, times, has_times or len(times) > 1, done, finished)
+        return cls(asked, times, has_times or len(times) > 1, options)
 
 
 def solved_history(
-    scenes: Sequence[Scene],
-    meshes: Meshes = None,
-    callback: Callback = None,
-    done: Solution | None = None,
-    finished: Callable[[Solution], None] | None = None,
-    guess: Callable[[Model], ContactState | None] | None = None,
-    executor: Executor | None = None,
+    scenes: Sequence[Scene], meshes: Meshes = None, options: RunOptions | None = None
 ) -> tuple[History, tuple[Solution, ...]]:
     """Solve scenes that follow each other in time on one mesh of each body.
 
@@ -160,14 +166,7 @@ def solved_history(
         One with several steps or load factors is as many.
     meshes : BoundaryMesh, or mapping of str to BoundaryMesh, optional
         As `bemkit.run` takes them.
-    callback : callable, optional
-        Receives a record of every step of the solver.
-    done, finished : optional
-        See `History`.
-    guess : callable, optional
-        Model -> where to start the first step.
-    executor : Executor, optional
-        Where bodies are assembled and factored.
+    options : RunOptions, optional
 
     Returns
     -------
@@ -175,12 +174,11 @@ def solved_history(
         See `solve_steps`.
     """
     steps = [step for each in scenes for step in _load_steps(each)]
-    history: History = History.of(scenes[-1], steps, done, finished)
+    history = History.of(scenes[-1], steps, options or RunOptions())
     prepared, plan, clock = planned(steps, meshes)
     with blas_threads_for(prepared[0].largest_matrix):
-        model, clock = built(prepared[0], clock, executor)
-        start = None if guess is None else guess(model)
-        return history, solve_steps(model, prepared, plan, history, clock=clock, guess=start, callback=callback)
+        model, clock = built(prepared[0], clock, history.options.executor)
+        return history, solve_steps(model, prepared, plan, history, clock)
 
 
 def _load_steps(scene: Scene) -> tuple[Scene, ...]:
@@ -192,14 +190,7 @@ def _load_steps(scene: Scene) -> tuple[Scene, ...]:
 
 
 def solve_steps(
-    model: Model,
-    steps: Sequence[Prepared],
-    plan: Plan,
-    history: History,
-    *,
-    clock: StageClock,
-    guess: ContactState | None = None,
-    callback: Callback = None,
+    model: Model, steps: Sequence[Prepared], plan: Plan, history: History, clock: StageClock
 ) -> tuple[Solution, ...]:
     """Solve the steps of a load history, up to the first that does not converge.
 
@@ -211,9 +202,6 @@ def solve_steps(
     plan : Plan
     history : History
     clock : StageClock
-    guess : ContactState, optional
-        Where to start the first step.
-    callback : callable, optional
 
     Returns
     -------
@@ -227,8 +215,10 @@ def solve_steps(
         If nothing can balance the first load.
     """
     solutions: list[Solution] = []
+    options = history.options
+    guess = None if options.guess is None else options.guess(model)
     before, end = None, IncrementEnd.at_rest(model)
-    done = None if history.done is None else history.done.loading
+    done = None if options.done is None else options.done.loading
     n_done = 0 if done is None else len(done.steps)
     for number, step in enumerate(steps):
         if number:
@@ -237,7 +227,7 @@ def solve_steps(
             end = IncrementEnd.under(model, done.steps[-1].state, done.motion) if number == n_done - 1 else end
             continue
         clock = clock.closed(Stage.CONDENSE)
-        reached = advance(_path(model, before, end, history, number), guess, callback)
+        reached = advance(_path(model, before, end, history, number), guess, options.callback)
         if before is None and not reached.result.history:
             raise UnsolvableSceneError(why_not(model, reached.result))
         model = replace(model, problem=reached.problem)
@@ -247,7 +237,7 @@ def solve_steps(
             words, why = result.message, why_not(model, result)
             if why != words:
                 words = f"{result.status.value} {why}."
-            former = solutions[-1] if solutions else history.done
+            former = solutions[-1] if solutions else options.done
             solutions.append(_not_reached(former, replace(result, message=words), clock))
             break
         with np.errstate(over="ignore", invalid="ignore"):  # the status says what is not finite
@@ -261,8 +251,8 @@ def solve_steps(
         clock, end = StageClock.start(), reached.end
         if not solution.is_converged:
             break
-        if history.finished is not None and number + 1 < len(steps):
-            history.finished(solution)
+        if options.finished is not None and number + 1 < len(steps):
+            options.finished(solution)
             clock = clock.closed(Stage.WRITE)
     return tuple(solutions)
 
@@ -273,7 +263,7 @@ def joined(history: History, solutions: Sequence[Solution]) -> Solution:
         return solutions[-1]
     from bemkit.results.solved_steps import following
 
-    whole = history.done
+    whole = history.options.done
     n_done = 0 if whole is None or whole.loading is None else len(whole.loading.steps)
     for number, solution in enumerate(solutions, start=n_done + 1):
         whole = following(whole, solution, history.asked, number, len(history.times))
@@ -283,18 +273,9 @@ def joined(history: History, solutions: Sequence[Solution]) -> Solution:
 
 
 def _path(model: Model, before: Model | None, end: IncrementEnd, history: History, number: int) -> Path:
-    def between(share: float) -> ContactProblem:
-        problem: ContactProblem = model.problem if before is None else model.between(before, share)
-        return problem
-
     factors = history.asked.load_factors
     ends = (factors[number - 1], factors[number]) if number and len(factors) == len(history.times) else None
-    drag: FloatArray | float = 0.0
-    if before is not None:
-        from bemkit.model.obstacle_travel import obstacle_travel
-
-        drag = obstacle_travel(before.prepared, model.prepared) / model.units.displacement
-    return Path(model, end, history.times[number], before, between, drag, ends)
+    return Path(model, end, history.times[number], before, ends)
 
 
 def _loading(
@@ -307,7 +288,7 @@ def _loading(
     """Return the history up to a step that is finished."""
     from bemkit.results.load_history import LoadHistory, LoadStep
 
-    former = solutions[-1] if solutions else history.done
+    former = solutions[-1] if solutions else history.options.done
     steps: tuple[LoadStep, ...] = () if former is None or former.loading is None else former.loading.steps
     work, end = reached.work, reached.end
     if model.has_body_forces:
@@ -340,15 +321,9 @@ def _not_reached(before: Solution | None, result: ContactSolution, clock: StageC
     ).with_warnings(before.plan.warnings)
 
 
-def run_on_mesh(
-    scene: Scene,
-    mesh: Meshes = None,
-    start: Any = None,
-    callback: Callable[[StepRecord], None] | None = None,
-    executor: Executor | None = None,
-) -> Any:
+def run_on_mesh(scene: Scene, mesh: Meshes = None, options: RunOptions | None = None) -> Any:
     """Solve a scene on one mesh of each body; of a load history return the last step with the records of all."""
-    return joined(*solved_history([scene], mesh, callback, guess=guess_from(scene, start), executor=executor))
+    return joined(*solved_history([scene], mesh, options))
 
 
 def guess_from(scene: Scene, start: Any) -> Callable[[Model], ContactState] | None:

@@ -20,6 +20,7 @@ from bemkit.plan.costs import ChosenLinearSolver
 from bemkit.plan.plan import check_elements
 from bemkit.results.solved_steps import with_times
 from bemkit.runs.nested import run_nested
+from bemkit.runs.steps import RunOptions
 from tests.scenes import Perforated, paper, squeezed
 
 run = importlib.import_module("bemkit.runs.run")
@@ -157,7 +158,7 @@ def test_large_compressed_scenes_begin_on_coarser_meshes() -> None:
 
 def test_each_mesh_of_a_cascade_starts_from_the_one_before() -> None:
     scene, records = scene_of(500, linear_solver=bk.Hierarchical()), []
-    meshes = run_nested(scene, coarsest=60, ratio=8, callback=records.append)
+    meshes = run_nested(scene, coarsest=60, ratio=8, options=RunOptions(callback=records.append))
     assert [mesh.mesh.n_elements for mesh in meshes] == [62, 500]
     assert all(mesh.is_converged for mesh in meshes)
     assert meshes[-1].outer_steps <= 4 < len(records) - meshes[-1].outer_steps

@@ -14,6 +14,7 @@ from bemkit.cli.main import main
 from bemkit.runs.adaptive import run_adaptive
 from bemkit.runs.distinct_solutions import distinct_solutions
 from bemkit.runs.run import UnsolvableSceneError
+from bemkit.runs.steps import RunOptions, guess_from
 from bemkit.scene.toml import scene_to_toml
 from tests.scene.test_load_history import block
 
@@ -63,7 +64,7 @@ def test_a_probe_takes_the_mesh_that_an_accuracy_needs() -> None:
 def test_a_start_chooses_the_solution_of_the_first_of_adaptive_meshes() -> None:
     scene = dataclasses.replace(leg(3.0), mesh=bk.MeshOptions(accuracy=0.1))
     for start in distinct_solutions(leg(3.0)):
-        first, *_ = run_adaptive(scene, start=start)
+        first, *_ = run_adaptive(scene, RunOptions(guess_from(scene, start)))
         assert first.mesh.n_elements != start.mesh.n_elements
         assert (first.force_normal > 0.0) == (start.force_normal > 0.0)
 

@@ -13,9 +13,10 @@ from bemkit.contact.body import ContactState
 from bemkit.contact.problem import ContactProblem
 from bemkit.geometry.meshing.partition import STEEPEST, better_partition
 from bemkit.reference import DiscBetweenPlates
-from bemkit.runs.adaptive import EarlierSteps, _best_last, _Refinement, run_adaptive
+from bemkit.runs.adaptive import _best_last, _Refinement, run_adaptive
 from bemkit.runs.density import DensityMeshes, is_enough
 from bemkit.runs.mesh_sequence import Level
+from bemkit.runs.steps import RunOptions
 from tests.failing_solver import Failing
 from tests.scenes import contact_error, disc, paper, reference_values, square, wavy
 from tests.slow import slow_except
@@ -116,7 +117,7 @@ def test_a_mesh_that_is_accurate_enough_is_the_best_one() -> None:
         def error(self, solution: bk.Solution) -> float:
             return 1e-3 if solution is coarse else 5e-3
 
-    refinement = Refinement(DensityMeshes(accuracy=1e-2), None, None, EarlierSteps(), None)
+    refinement = Refinement(DensityMeshes(accuracy=1e-2), RunOptions())
     assert _best_last((coarse, fine), "", 1e-2, refinement)[-1].n_elements == fine.n_elements
     assert _best_last((coarse, fine), "an obstacle", 1e-2, refinement)[-1].n_elements == coarse.n_elements
     assert _best_last((fine,), "", 1e-2, refinement)[-1].message.startswith(f"One mesh with {fine.n_elements} elements")
@@ -281,7 +282,7 @@ def test_scene_files_hold_the_accuracy() -> None:
 def test_the_time_of_the_next_mesh_follows_from_the_plans() -> None:
     """Ten times the elements take longer, but not a thousand times: small meshes cost more than dense algebra."""
     meshes = DensityMeshes(accuracy=1e-3)
-    refinement = _Refinement(meshes, None, None, EarlierSteps(), None)
+    refinement = _Refinement(meshes, RunOptions())
     level = Level.first(paper(1, bk.Galerkin(1), bk.MeshOptions(accuracy=1e-3)))
     solution = bk.run(level.scene, mesh=level.partition.mesh)
     assert refinement.expected_seconds(level, solution, 1.0) == pytest.approx(1.0)
