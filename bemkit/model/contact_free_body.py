@@ -3,21 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from bemkit.arrays import FloatArray
 from bemkit.contact.body import ContactState, LinearBody
 from bemkit.contact.certificate import Certificate
+from bemkit.contact.direct_body import WholeBody
 from bemkit.contact.equilibrium import NOISE_FACTOR, Imbalance, resultant_imbalance, round_off_of
-from bemkit.geometry.spaces import BoundarySpace, dof_points
 from bemkit.operators.boundary_equations import LinearConditions
 from bemkit.operators.counts import OperationCounts
-from bemkit.operators.rigid_modes import admissible_modes
 from bemkit.operators.steklov_poincare import CondensedMap
-from bemkit.operators.steklov_poincare.forces_inside import ForcesInside, condensed_under
-from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions
+from bemkit.operators.steklov_poincare.forces_inside import ForcesInside
 from bemkit.solvers.base import ContactSolution, Status, StepRecord
 
 _TOLERANCE = 1e-9
@@ -30,23 +28,19 @@ class ContactFreeBody(LinearBody):
 
     Parameters
     ----------
-    space : BoundarySpace
-        Of the displacements.
-    conditions : NodalConditions
-        Supports; every other direction is free.
-    force : (n_nodes, 2) array [N/m]
-        Given nodal forces.
-    condensed : CondensedMap
+    whole : WholeBody
         Without retained directions: all that is unknown has been solved for.
     """
 
-    space: BoundarySpace
-    conditions: NodalConditions
-    force: FloatArray
-    condensed: CondensedMap
+    whole: WholeBody
 
     weights: FloatArray = field(default_factory=lambda: np.zeros(0), init=False)
     stiffness_scale = 1.0
+
+    @property
+    def condensed(self) -> CondensedMap:
+        """The condensed map of the body."""
+        return self.whole.condensed
 
     @property
     def work(self) -> OperationCounts:
@@ -59,14 +53,11 @@ class ContactFreeBody(LinearBody):
 
     def recover(self, state: ContactState) -> tuple[FloatArray, FloatArray]:
         """Return displacement (n_nodes, 2) and total force (n_nodes, 2) of all boundary nodes, in x and y."""
-        return self.condensed.recover(np.zeros(0))
+        return self.whole.fields(np.zeros(0))
 
     def under(self, force: FloatArray, displacement: FloatArray, inside: ForcesInside | None = None) -> ContactFreeBody:
-        """Return the same body under other forces and displacements; see `DirectBody.under`."""
-        conditions = replace(self.conditions, displacement=displacement)
-        condensed = condensed_under(self.condensed, conditions, force, inside)
-        condensed = replace(condensed, work=self.condensed.work + condensed.work)
-        return replace(self, conditions=conditions, force=force, condensed=condensed)
+        """Return the same body under other forces and displacements; see `WholeBody.under`."""
+        return ContactFreeBody(self.whole.under(force, displacement, inside))
 
     def imbalance(self, state: ContactState) -> Imbalance:
         """Return how far the forces are from those given on free directions, and all together from equilibrium.
@@ -77,15 +68,16 @@ class ContactFreeBody(LinearBody):
         displacement, force = self.recover(state)
         if not np.isfinite(displacement).all():
             return Imbalance(np.nan, np.nan)
-        points, balanced = dof_points(self.space), admissible_modes(self.space.mesh)
+        whole = self.whole
         round_off = round_off_of(displacement, self.condensed.sensitivity)
         resultant, inner = self.condensed.volume_force, self.condensed.inner_force
         total = float(np.abs(force).sum()) + inner or 1.0
-        if inner == 0.0 < round_off and total <= NOISE_FACTOR * round_off and not self.force.any():
+        if inner == 0.0 < round_off and total <= NOISE_FACTOR * round_off and not whole.force.any():
             return Imbalance(total / (round_off / np.finfo(float).eps), 0.0)
-        missing = self.conditions.in_frames(force - self.force)[self.conditions.is_free]
+        missing = whole.conditions.in_frames(force - whole.force)[whole.conditions.is_free]
         residual = Imbalance(float(np.abs(missing).max(initial=0.0)) / total, 0.0, round_off / total)
-        return residual.joined(resultant_imbalance(points, force, balanced, round_off, resultant, inner))
+        of_all = resultant_imbalance(whole.points, force, whole.balanced, round_off, resultant, inner)
+        return residual.joined(of_all)
 
 
 def contact_free_state() -> ContactState:

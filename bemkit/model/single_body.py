@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, TypeAlias
 
-from bemkit.contact.contact_nodes import NoContactNodesError, opened
+from bemkit.contact.contact_nodes import ContactNodes, NoContactNodesError, opened
 from bemkit.contact.direct_body import DirectBody, WholeBody
 from bemkit.errors import InputError
 from bemkit.model.given import without_body_forces
@@ -12,9 +12,11 @@ from bemkit.model.prepared import Prepared
 from bemkit.operators.steklov_poincare import CondensedMap, SteklovPoincare
 
 if TYPE_CHECKING:
+    from bemkit.arrays import FloatArray
     from bemkit.contact.half_plane.surface_body import SurfaceBody
     from bemkit.contact.hierarchical_body import HierarchicalBody
     from bemkit.model.contact_free_body import ContactFreeBody
+    from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions
 
 SingleBody: TypeAlias = "DirectBody | HierarchicalBody | SurfaceBody | ContactFreeBody"
 
@@ -68,23 +70,18 @@ def single_body(prepared: Prepared, elastic: SteklovPoincare, condensed: Condens
         from bemkit.model.free_motion import check_held
 
         check_held(prepared)
+    nodes = prepared.contact_nodes
+    conditions = opened(body.conditions, nodes) if condensed is None else body.conditions
     if body.mesh.surface is not None:
-        return _half_plane(prepared, elastic)
-    if not prepared.n_contact:
+        return _half_plane(elastic, conditions, nodes, body.force)
+    if not prepared.n_contact or is_direct(prepared):
+        condensed = elastic.condense(conditions, body.force) if condensed is None else condensed
+        whole = WholeBody.of(body.own_space, condensed, conditions, body.force, body.free_modes)
+        if prepared.n_contact:
+            return DirectBody.of(whole, nodes, elastic.material)
         from bemkit.model.contact_free_body import ContactFreeBody
 
-        return ContactFreeBody(
-            body.own_space, body.conditions, body.force, elastic.condense(body.conditions, body.force)
-        )
-    nodes = prepared.contact_nodes
-    if is_direct(prepared):
-        conditions = body.conditions
-        if condensed is None:
-            conditions = opened(body.conditions, nodes)
-            condensed = elastic.condense(conditions, body.force)
-        whole = WholeBody.of(body.own_space, condensed, conditions, body.force, body.free_modes)
-        return DirectBody.of(whole, nodes, elastic.material)
-    conditions = opened(body.conditions, nodes)
+        return ContactFreeBody(whole)
     from bemkit.contact.hierarchical_body import hierarchical_body
     from bemkit.operators.steklov_poincare.hierarchical import HierarchicalCollocation
 
@@ -93,21 +90,21 @@ def single_body(prepared: Prepared, elastic: SteklovPoincare, condensed: Condens
     return hierarchical_body(compressed, conditions, nodes, body.force, body.inside)
 
 
-def _half_plane(prepared: Prepared, elastic: SteklovPoincare) -> SurfaceBody:
+def _half_plane(
+    elastic: SteklovPoincare, conditions: NodalConditions, nodes: ContactNodes, force: FloatArray
+) -> SurfaceBody:
     from bemkit.operators.half_plane.elasticity import HalfPlaneElasticity, LargeHalfPlane
 
-    body, nodes = prepared.only, prepared.contact_nodes
-    conditions = opened(body.conditions, nodes)
     if isinstance(elastic, HalfPlaneElasticity):
         if isinstance(elastic, LargeHalfPlane) and not conditions.is_fixed.any():
             from bemkit.contact.half_plane.large_strip_body import LargeStripBody
 
-            return LargeStripBody(elastic, conditions, nodes, body.force)
+            return LargeStripBody(elastic, conditions, nodes, force)
         from bemkit.contact.half_plane.strip_body import StripBody
 
-        return StripBody(elastic, conditions, nodes, body.force)
+        return StripBody(elastic, conditions, nodes, force)
     from bemkit.contact.half_plane.periodic_body import PeriodicBody
     from bemkit.operators.half_plane.periodic import PeriodicElasticity
 
     assert isinstance(elastic, PeriodicElasticity)
-    return PeriodicBody(elastic, conditions, nodes, body.force)
+    return PeriodicBody(elastic, conditions, nodes, force)

@@ -13,7 +13,6 @@ import pytest
 import bemkit as bk
 from bemkit.arrays import FloatArray, IntArray
 from bemkit.cli.console import print_summary
-from bemkit.geometry.spaces import dof_points
 from bemkit.model.contact_free_body import certified, contact_free_state
 from bemkit.model.free_motion import FreeBodyError
 from bemkit.model.model import build_model
@@ -331,16 +330,16 @@ class Reported(CondensedMap):
 def test_only_forces_in_equilibrium_are_certified() -> None:
     scene = bending()
     body = build_model(prepare(scene, scene.build_mesh())).body
-    points = dof_points(body.space)
+    whole, points = body.whole, body.whole.points
     displacement, force = body.recover(contact_free_state())
     assert certified(body).is_converged
 
     def status_with(u: FloatArray, f: FloatArray) -> bk.Status:
         known = {name: getattr(body.condensed, name) for name in ("stiffness", "load", "sensitivity", "volume_force")}
-        return certified(replace(body, condensed=Reported(**known, fields=(u, f)))).status
+        return certified(replace(body, whole=replace(whole, condensed=Reported(**known, fields=(u, f))))).status
 
-    free = int(np.flatnonzero(body.conditions.is_free.all(axis=1))[0])
-    other = int(np.flatnonzero(body.conditions.is_fixed.all(axis=1))[0])
+    free = int(np.flatnonzero(whole.conditions.is_free.all(axis=1))[0])
+    other = int(np.flatnonzero(whole.conditions.is_fixed.all(axis=1))[0])
     bump = np.zeros_like(force)
     bump[free, 0] = 1e-6 * np.abs(force).sum()
     assert status_with(displacement, force + bump) is bk.Status.STALLED
@@ -349,7 +348,7 @@ def test_only_forces_in_equilibrium_are_certified() -> None:
     pair[other, 0] = -bump[free, 0]
     assert status_with(displacement, force + pair) is bk.Status.STALLED
     # on the supports alone only the balance can tell: of forces along x, or of moments
-    held = body.conditions.is_fixed.all(axis=1)
+    held = whole.conditions.is_fixed.all(axis=1)
     for amounts in (np.ones(held.sum()), np.sign(points[held, 1])):
         bump = np.zeros_like(force)
         bump[held, 0] = 1e-6 * np.abs(force).sum() * amounts / np.abs(amounts).max()

@@ -169,8 +169,6 @@ class MortarCoupling:
         Largest depth of overlap of the sides; zero without overlap.
     deepest : (2,) array [m]
         Point of the largest depth.
-    facing : (n,) array
-        Cosine of the angle between d and the normal of the non-mortar body.
     on_non_mortar : (n, n_scalar) csr_matrix
         ``int psi_i phi_j / weights_i`` with the basis of the non-mortar space; rows sum to one.
     on_mortar : (n, n_scalar) csr_matrix
@@ -185,7 +183,6 @@ class MortarCoupling:
     gap: FloatArray
     overlap: float
     deepest: FloatArray
-    facing: FloatArray
     on_non_mortar: csr_matrix
     on_mortar: csr_matrix
 
@@ -295,7 +292,6 @@ def _integrate(
         gap=distance,
         overlap=overlap,
         deepest=deepest,
-        facing=np.einsum("nc,nc->n", direction, side.directions(side.normals, rows.element, node_xi)[:, 0]),
         on_non_mortar=on_non_mortar,
         on_mortar=on_mortar,
     )

@@ -90,7 +90,6 @@ def test_straight_sides_that_cover_each_other(degree: tuple[int, int], n: tuple[
     assert_sums_are_exact(coupling, 1.0)
     assert_is_dual(one, coupling)
     assert not coupling.gap.any()
-    np.testing.assert_allclose(coupling.facing, 1.0, rtol=1e-14)
     down = rotation(angle) @ np.array([0.0, -1.0])
     np.testing.assert_allclose(coupling.frame[:, 0], np.tile(down, (coupling.nodes.size, 1)), atol=1e-13)
 
@@ -163,7 +162,6 @@ def test_means_of_polynomials_are_their_values_at_the_nodes(degree: int) -> None
     half = 0.5 * np.arctan(0.2)
     direction = np.array([-np.sin(half), -np.cos(half)])
     np.testing.assert_allclose(coupling.frame[:, 0], np.tile(direction, (coupling.nodes.size, 1)), atol=1e-14)
-    np.testing.assert_allclose(coupling.facing, np.cos(half), rtol=1e-14)
     is_dual = coupling.points[:, 0] > 0.21  # the first of five elements is partly ahead of the end of the wedge
     points = coupling.points[is_dual]
     gap = (0.1 + 0.2 * points[:, 0]) / (np.cos(half) + 0.2 * np.sin(half))
