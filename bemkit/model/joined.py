@@ -73,14 +73,17 @@ def condensed_under_step(
 
 def _condensed_again(prepared: Prepared, elastic: Sequence[SteklovPoincare]) -> tuple[CondensedMap, ...]:
     """Condense the bodies onto other nodes in contact; copies once."""
-    firsts: dict[int, CondensedMap] = {}
-    condensed = []
-    for number, map_, body in zip(shape_numbers(prepared.bodies), elastic, prepared.bodies, strict=True):
-        if number in firsts:
-            condensed.append(loaded_alone(firsts[number], body))
-        else:
-            condensed.append(firsts.setdefault(number, map_.condense(body.conditions, body.force)))
-    return tuple(condensed)
+    pairs = [(elastic[group[0]], prepared.bodies[group[0]]) for group in groups(prepared.bodies)]
+    return for_copies([map_.condense(body.conditions, body.force) for map_, body in pairs], prepared.bodies)
+
+
+def for_copies(of_shapes: Sequence[CondensedMap], bodies: Sequence[PreparedBody]) -> tuple[CondensedMap, ...]:
+    """Return the condensed maps of all bodies from those of the first of each shape, whose stiffness copies share."""
+    firsts = [group[0] for group in groups(bodies)]
+    return tuple(
+        of_shapes[number] if k == firsts[number] else loaded_alone(of_shapes[number], body)
+        for k, (number, body) in enumerate(zip(shape_numbers(bodies), bodies, strict=True))
+    )
 
 
 def _condensed_under(

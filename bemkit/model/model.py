@@ -19,7 +19,7 @@ from bemkit.contact.problem import ContactProblem
 from bemkit.errors import InputError
 from bemkit.model.fields import HeldForces, elastic_energy, insert_loads
 from bemkit.model.given import loaded_map, with_far_motion, without_body_forces
-from bemkit.model.placed import groups, shape_numbers
+from bemkit.model.placed import shape_numbers
 from bemkit.model.prepared import Prepared, PreparedBody
 from bemkit.model.single_body import SingleBody, is_direct, is_single, single_body
 from bemkit.model.units import Units, motion_units
@@ -300,17 +300,12 @@ def build_model(prepared: Prepared, executor: Executor | None = None) -> Model:
     """
     if is_single(prepared):
         return _single(prepared, *_single_of(prepared, executor))
-    from bemkit.model.joined import joined_bodies, loaded_alone
+    from bemkit.model.joined import for_copies, joined_bodies
     from bemkit.model.shapes import condensed_shapes
 
     shapes = condensed_shapes(prepared, executor)
-    numbers = shape_numbers(prepared.bodies)
-    elastic = _loaded([shapes[number][0] for number in numbers], prepared.bodies)
-    firsts = [int(group[0]) for group in groups(prepared.bodies)]
-    condensed = tuple(
-        shapes[number][1] if k == firsts[number] else loaded_alone(shapes[number][1], body)
-        for k, (number, body) in enumerate(zip(numbers, prepared.bodies, strict=True))
-    )
+    elastic = _loaded([shapes[number][0] for number in shape_numbers(prepared.bodies)], prepared.bodies)
+    condensed = for_copies([of_shape for _, of_shape in shapes], prepared.bodies)
     n_unknowns = 2 * prepared.n_contact - int(np.count_nonzero(prepared.tangent_follows))
     work = sum((base.work for _, base in shapes), OperationCounts(contact_unknowns=n_unknowns))
     joined = joined_bodies(prepared, condensed)

@@ -140,6 +140,12 @@ class CoupledMembers:
         """(n_motions, 2 n_contact) sparse array: relative displacements of the rigid motions."""
         return sparse.csr_array((self.gap_operator @ self.motions).T)
 
+    @for_all_loads
+    def compliance(self) -> sparse.csr_array:
+        """(2 n_contact, 2 n_contact) sparse array [1/Pa]: relative displacements by forces, but for rigid motions."""
+        of_members = blocks_of_members(self.shapes, lambda shape: shape.flexibility)
+        return sparse.csr_array(self.gap_operator @ of_members @ self.gap_operator.T)
+
     @cached_property
     def motion_owner(self) -> IntArray:
         """(n_motions,) array: the member that each of the motions moves."""

@@ -14,7 +14,7 @@ from bemkit.contact.dense_body import DenseBody
 from bemkit.contact.equilibrium import NOISE_FACTOR, Imbalance
 from bemkit.contact.joined.coupled_members import CoupledMembers, for_all_loads
 from bemkit.contact.joined.dense_form import RelativeStiffness
-from bemkit.contact.joined.sparse_form import Compliance, sparse_response
+from bemkit.contact.joined.sparse_form import sparse_response
 from bemkit.operators.boundary_equations import LinearConditions
 from bemkit.operators.rigid_modes import RigidMotions, as_dense
 
@@ -107,7 +107,7 @@ class JoinedBodies(CoupledMembers, LinearBody):
                 raise
         self.held_friction.check(conditions)
         self._check_moved(conditions)
-        return sparse_response(self, self._compliance, conditions)
+        return sparse_response(self, conditions)
 
     def _check_moved(self, conditions: LinearConditions) -> None:
         """Raise SingularResponse, which names them, if the conditions leave members free to move."""
@@ -241,10 +241,6 @@ class JoinedBodies(CoupledMembers, LinearBody):
         """Return the displacements (n,) [m] of each member that go with a state."""
         displacement, _ = self.recover(state)
         return tuple(np.split(displacement, np.cumsum([member.n_components for member in self.members])[:-1]))
-
-    @for_all_loads
-    def _compliance(self) -> Compliance:
-        return Compliance.of(self)
 
     @for_all_loads
     def _relative_stiffness(self) -> RelativeStiffness:

@@ -6,7 +6,6 @@ import importlib.util
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from copy import copy
-from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
@@ -17,7 +16,6 @@ from scipy.sparse.linalg import splu
 from bemkit.arrays import ComplexArray, FloatArray, IntArray, spread_fractions
 from bemkit.contact.body import ContactState, SingularResponse
 from bemkit.contact.joined.coupled_members import CoupledMembers
-from bemkit.contact.joined.member import blocks_of_members
 from bemkit.contact.reduced_conditions import ReducedConditions, as_pairs
 from bemkit.errors import printable
 from bemkit.operators.boundary_equations import LinearConditions
@@ -113,49 +111,12 @@ def sparse_solver_name() -> str:
     return "PARDISO"
 
 
-@dataclass(frozen=True, eq=False)
-class Compliance:
-    """Relative displacements of the contact nodes by forces p and rigid motions a: ``by_force p + by_motion a``.
-
-    Deformation and motion are separate terms: a body of large modulus between soft ones moves far and hardly deforms,
-    and a stiffness would lose the deformation in the round-off of the motion.
-
-    Parameters
-    ----------
-    by_force : (2 n_contact, 2 n_contact) sparse array [1/Pa]
-    by_motion : (2 n_contact, n_motions) sparse array [-]
-    force_unit : (2 n_contact,) array [Pa]
-        E' of the more compliant partner; ``by_force`` times this is of size one.
-    motion_unit : (n_motions,) array [1/Pa]
-        1 / E' of the member that moves.
-    """
-
-    by_force: sparse.csr_array
-    by_motion: sparse.csr_array
-    force_unit: FloatArray
-    motion_unit: FloatArray
-
-    @classmethod
-    def of(cls, joined: CoupledMembers) -> Compliance:
-        """Multiply the flexibilities of the members by their coupling."""
-        of_members = blocks_of_members(joined.shapes, lambda shape: shape.flexibility)
-        moduli = np.array([member.modulus for member in joined.members])
-        return cls(
-            sparse.csr_array(joined.gap_operator @ of_members @ joined.gap_operator.T),
-            sparse.csr_array(joined.relative_motions.T),
-            joined.moduli,
-            1.0 / moduli[joined.motion_owner],
-        )
-
-
-def sparse_response(joined: CoupledMembers, compliance: Compliance, conditions: LinearConditions) -> ContactState:
+def sparse_response(joined: CoupledMembers, conditions: LinearConditions) -> ContactState:
     """Return the response of many members; see `LinearBody.respond`.
 
     Parameters
     ----------
     joined : CoupledMembers
-    compliance : Compliance
-        Of the same members.
     conditions : LinearConditions
         That leave no rigid motion free.
 
@@ -170,31 +131,34 @@ def sparse_response(joined: CoupledMembers, compliance: Compliance, conditions: 
     ``p = T y + p_0``, the unknown forces y and motions a of the members solve ``U (w_0 + C p + M a) + X p = c`` and
     ``M^T p = -l``, the balance of each member under the work l of its load on its motions. The second rows have no
     diagonal. A small penalty there lets the motions be eliminated first, which couples no more forces than the
-    compliance C of their member does: half of the entries of a system of forces and displacements.
+    compliance C of their member does: half of the entries of a system of forces and displacements. Deformation C p and
+    motion M a are separate terms: a body of large modulus between soft ones moves far and hardly deforms, and a
+    stiffness would lose the deformation in the round-off of the motion.
     """
     n, reduced = joined.n_contact, ReducedConditions.of(conditions)
-    node, weights = reduced.node, joined.weights
+    node, weights, by_force, motions = reduced.node, joined.weights, joined.compliance, joined.relative_motions
     on_displacement, on_force = (
         _rows(node, numbers, n) for numbers in (reduced.on_displacement, reduced.on_traction / weights[node])
     )
     by_unknown = sparse.csr_array(_rows(node, reduced.direction, n).T)
     given = (weights[:, None] * as_pairs(reduced.given)).ravel()
-    at_rest = joined.prescribed + joined.gap_operator @ joined.deformation(joined.load) + compliance.by_force @ given
+    at_rest = joined.prescribed + joined.gap_operator @ joined.deformation(joined.load) + by_force @ given
     # forces by the square root of the modulus on both sides, motions by its inverse: entries of size one
     is_tangential = np.abs(reduced.direction.real) > np.abs(reduced.direction.imag)
-    row, motion = np.sqrt(compliance.force_unit[2 * node + is_tangential]), np.sqrt(compliance.motion_unit)
+    row = np.sqrt(joined.moduli[2 * node + is_tangential])
+    motion = 1.0 / np.sqrt(np.array([member.modulus for member in joined.members])[joined.motion_owner])
     scaled = sparse.diags_array(row)
-    ties = scaled @ (on_displacement @ compliance.by_force + on_force) @ by_unknown @ scaled
-    moved = scaled @ on_displacement @ compliance.by_motion @ sparse.diags_array(motion)
-    balance = sparse.diags_array(motion) @ compliance.by_motion.T @ by_unknown @ scaled
+    ties = scaled @ (on_displacement @ by_force + on_force) @ by_unknown @ scaled
+    moved = scaled @ on_displacement @ motions.T @ sparse.diags_array(motion)
+    balance = sparse.diags_array(motion) @ motions @ by_unknown @ scaled
     # all blocks in one format, also the empty one, are put together without sorting their entries anew
     blocks = [[ties, moved], [balance, sparse.csr_array((motion.size, motion.size))]]
     matrix = sparse.block_array([[sparse.csr_array(block) for block in row] for row in blocks], format="csr")
     values = row * (reduced.value - on_displacement @ at_rest - on_force @ given)
-    work = motion * -(joined.motions.T @ joined.load + compliance.by_motion.T @ given)
+    work = motion * -(joined.motions.T @ joined.load + motions @ given)
     solution = _solved(matrix, np.append(values, work), n_motions=motion.size)
     force = by_unknown @ (row * solution[: node.size])
-    displacement = at_rest + compliance.by_force @ force + compliance.by_motion @ (motion * solution[node.size :])
+    displacement = at_rest + by_force @ force + motions.T @ (motion * solution[node.size :])
     traction = (force + given).reshape(n, 2) / joined.weights[:, None]
     displacement, traction = displacement.reshape(n, 2), conditions.with_given_tractions(traction)
     return ContactState(conditions.with_given_displacements(displacement), traction)
