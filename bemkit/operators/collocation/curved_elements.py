@@ -96,7 +96,10 @@ class CurvedElements:
         return result
 
     def _near(self, is_double: bool, x: ComplexArray, elements: IntArray, is_midpoint: BoolArray) -> ComplexArray:
-        """Return the factors (n, 2 or 4) of curved elements (n,) of the mesh, each at one near point."""
+        """Return the factors (n, 2 or 4) of curved elements (n,) of the mesh, each at one near point.
+
+        The double layer has round-off of eps l / d at the distance d from an element of half length l.
+        """
         geometry, constants = self.geometry, self.constants
         least_distance = (geometry.half * geometry.distance_at(SEPARATION))[elements]
         # relative to the centre, where the midpoint of a polynomial has no round-off
