@@ -15,6 +15,7 @@ from bemkit.cli.outputs import Outputs, TextFile, csv_of
 if TYPE_CHECKING:
     from bemkit.scene.scene import Scene
     from bemkit.studies.engine import Task
+    from bemkit.studies.stability.axes import Axis
     from bemkit.studies.stability.records import StabilityRecord
 
 
@@ -60,10 +61,8 @@ def stability(
         shows_tables = not quiet and not outputs.uses_stdout
         labels = {"scene": scene_to_toml(chosen) if rows else ""}
         finished = FILE.finished(rows, labels)
-        remaining = iter(axes)
 
-        def run_axis(tasks: Sequence[Task[StabilityRecord]]) -> list[StabilityRecord]:
-            axis = next(remaining)
+        def run_axis(axis: Axis, tasks: Sequence[Task[StabilityRecord]]) -> list[StabilityRecord]:
             computed = progress.compute(tasks, axis.name, finished=finished)
             records = list(FILE.keep(rows, computed, finished, labels))
             if shows_tables:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import cache, partial
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -30,6 +30,9 @@ TWIN_OF_BODIES = Similarity(length=3.7e-3, modulus=7.3e5, stress=7.3e5)
 """The same for several bodies."""
 
 
+RunTasks: TypeAlias = Callable[[Axis, Sequence[Task[StabilityRecord]]], Iterable[StabilityRecord]]
+
+
 class StabilityError(InputError):
     """A sweep that cannot begin."""
 
@@ -37,11 +40,11 @@ class StabilityError(InputError):
 def sweep(
     scene: Scene,
     axes: Sequence[Axis],
-    run_tasks: Callable[[Sequence[Task[StabilityRecord]]], Iterable[StabilityRecord]] = compute,
+    run_tasks: RunTasks | None = None,
 ) -> Iterator[StabilityRecord]:
     """Compute the records of some axes from a baseline scene, of one body or of several, one axis after the other.
 
-    `run_tasks` computes the tasks of one axis, such as `compute` of the engine with records of an earlier sweep.
+    `run_tasks` computes the tasks of an axis, by default `compute` of the engine.
 
     Raises
     ------
@@ -60,7 +63,8 @@ def sweep(
     if baseline.solution is None or not baseline.is_converged:
         raise StabilityError(f"the scene itself has no converged solution ({baseline.message}): give one that has")
     for axis in axes:
-        yield from run_tasks(_tasks(axis, baseline.solution))
+        tasks = _tasks(axis, baseline.solution)
+        yield from compute(tasks) if run_tasks is None else run_tasks(axis, tasks)
 
 
 def _tasks(axis: Axis, baseline: Solution) -> list[Task[StabilityRecord]]:

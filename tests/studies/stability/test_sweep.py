@@ -189,7 +189,7 @@ def test_finished_rows_are_handed_on_and_not_computed(monkeypatch: pytest.Monkey
     row = StabilityRecord("friction", 0.1, "right", "converged", 1, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, "")
     begun: list[Task[StabilityRecord]] = []
     run = partial(compute, finished={row.key: row}, begins=begun.append)
-    rows = list(sweep(small_paper_scene(1), [axis], run))
+    rows = list(sweep(small_paper_scene(1), [axis], lambda _, tasks: run(tasks)))
     assert rows[0] is row
     assert [task.label for task in begun] == ["friction 0.2"]
     assert rows[1].verdict == "right"
