@@ -223,9 +223,9 @@ class Similarity:
                 return Traction(*self._vector(_number(x), _number(y), self.stress))
             case Pressure(pressure, shear):
                 return Pressure(self.stress * _number(pressure), self.stress * _number(shear))
-            case Force(x, y, moment):
+            case Force(x, y, moment, is_rigid):
                 force = self.stress * self.length
-                return Force(*self._vector(x, y, force), force * self.length * moment)
+                return Force(*self._vector(x, y, force), force * self.length * moment, is_rigid)
             case PrescribedDisplacement(x, y) if x is not None and y is not None:
                 return PrescribedDisplacement(*self._vector(_number(x), _number(y), self.length))
             case PrescribedDisplacement(x, y) if self.turn == 0.0:
@@ -266,7 +266,7 @@ class Similarity:
                     angular_velocity=rate / self.length,
                     centre=self._point(centre),
                 )
-        return force  # heat by a number: the same everywhere
+        return replace(force, temperature=_number(force.temperature))
 
 
 def _number(field: object) -> float:

@@ -176,7 +176,18 @@ def test_copies_are_bodies_that_are_listed() -> None:
     assert copied.work.single_layer.computed < listed.work.single_layer.computed
 
 
+def test_forces_of_rigid_connections_stay_those_of_rigid_connections() -> None:
+    load = bk.Part("load", bk.Force(1.0, -2.0, 0.5, is_rigid=True), ("top",))
+    first, *others = assembly().bodies
+    scaled = Similarity(length=2.0).apply(replace(assembly(), bodies=(replace(first, parts=(load,)), *others)))
+    assert scaled.bodies[0].parts[0].condition == bk.Force(2.0, -4.0, 2.0, is_rigid=True)
+
+
 def test_bodies_that_cannot_be_similar_are_refused() -> None:
+    heated = bk.Heating(expansion=1e-5, temperature=bk.Expression("x"))
+    bodies = tuple(replace(body, body_forces=(heated,)) for body in assembly().bodies)
+    with pytest.raises(bk.InputError, match="is not a number: give one, fields are not turned"):
+        Similarity(length=2.0).apply(replace(assembly(), bodies=bodies))
     with pytest.raises(bk.InputError, match=r"modulus is 2\.0 and stress 1\.0: give equal factors for several bodies"):
         Similarity(modulus=2.0).apply(assembly())
     with pytest.raises(bk.InputError, match=r"turn is 90\.0: a scene is turned if it lists its bodies"):
