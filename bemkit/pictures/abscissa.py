@@ -8,6 +8,7 @@ from typing import TypeVar
 import numpy as np
 
 from bemkit.arrays import FloatArray
+from bemkit.pictures.drawing import Axes
 from bemkit.pictures.shown import Result
 from bemkit.scene.unit_names import UnitNames, with_unit
 
@@ -49,3 +50,8 @@ class Abscissa:
     def label(self, units: UnitNames | None) -> str:
         """Return the name with its unit."""
         return with_unit(self.name, "length", units)
+
+    def write_below(self, axes: Axes, units: UnitNames | None) -> None:
+        """Write the label below axes; a dollar sign in the name of a part begins no formula."""
+        label = self.label(units)
+        axes.set_xlabel(label, parse_math=label.count("$") == 2)

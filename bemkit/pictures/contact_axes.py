@@ -44,7 +44,7 @@ def contact_axes(axes: Axes | None, solution: Result, part: str, subject: str) -
     axes = axes_or_new(axes)
     strip = axes_with_strip(axes, f"{subject}\n{solution.title}")
     abscissa = Abscissa.along(solution, part)
-    strip.set_xlabel(abscissa.label(solution.units), parse_math="$" not in part)
+    abscissa.write_below(strip, solution.units)
     _draw_status(strip, solution, part, abscissa)
     places = [abscissa.at(transition.s) for transition in solution.transitions if transition.part == part]
     for place in places if len(places) <= _MOST_LINES else ():

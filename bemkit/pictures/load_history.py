@@ -127,7 +127,7 @@ def draw_status_over_time(solution: Result, part: str, axes: Axes | None = None)
     axes = axes_or_new(axes)
     colours = ListedColormap([STATUS_COLOURS[name] for name in names])
     axes.pcolormesh(edges, times, statuses, cmap=colours, vmin=-0.5, vmax=len(names) - 0.5)
-    axes.set_xlabel(abscissa.label(solution.units))
+    abscissa.write_below(axes, solution.units)
     axes.set_ylabel("time $t$")
     axes.set_title(f"Status over time\n{solution.title}", parse_math=False, fontsize=11)
     handles = [Patch(color=STATUS_COLOURS[name], label=name) for name in names]

@@ -85,6 +85,14 @@ def test_status_is_drawn_for_every_node_and_step(solution: bk.Solution, loading:
         assert [words[int(value)] for value in numbers[k]] == step.contact.status_words()
 
 
+def test_dollar_signs_in_the_name_of_a_part_begin_no_formula() -> None:
+    name = "floor of $\\foo$"
+    parts = tuple(replace(part, name=name) if part.name == "floor" else part for part in LOOP.parts)
+    figure = Figure()
+    draw_status_over_time(bk.run(replace(LOOP, parts=parts)), name, figure.add_subplot())
+    figure.draw_without_rendering()
+
+
 def test_all_pictures_have_names(solution: bk.Solution) -> None:
     assert list(figures(solution))[-3:] == ["friction-loop", "work", "status-over-time"]
 
