@@ -23,6 +23,9 @@ from bemkit.scene.discretisation import MOST_ELEMENTS, MeshOptions
 from bemkit.scene.scene import Scene
 from bemkit.solvers.base import Status
 
+_NEEDED, _STUCK = "would be needed", "no longer falls"
+_REMEDIES = {_NEEDED: "allow more elements or time", _STUCK: "round corners with singular tractions"}
+"""By the ends of reasons why no finer mesh is made."""
 _MOST_MISSED = 12
 """Largest number of meshes that miss contact; each has nodes where the one before missed it."""
 _SAME = 1e-9
@@ -185,15 +188,15 @@ def _refined(first: Level, refinement: _Refinement, options: MeshOptions) -> tup
                 obstacle = f"no finer mesh can be made ({error})"
                 break
             if following is None:
-                obstacle = "the estimated error no longer falls"
+                obstacle = f"the estimated error {_STUCK}"
                 break
             level = following
             if excess := refinement.excess(level, most_elements):
-                obstacle = f"more than {excess} would be needed"
+                obstacle = f"more than {excess} {_NEEDED}"
             elif options.most_seconds is not None:
                 expected = refinement.expected_seconds(level, solution, now - started)
                 if now - begin + expected > options.most_seconds:
-                    obstacle = f"more than {options.most_seconds:g} s would be needed"
+                    obstacle = f"more than {options.most_seconds:g} s {_NEEDED}"
     return _best_last(solutions, obstacle, accuracy, refinement)
 
 
@@ -213,9 +216,12 @@ def _best_last(
     message = f"{made} with {best.n_elements} elements. {best.message}"
     status = best.status
     if obstacle:
+        remedy = next(
+            (known for end, known in _REMEDIES.items() if obstacle.endswith(end)), "give a number of elements"
+        )
         message = (
             f"The accuracy {accuracy:g} was not reached: {obstacle}; estimated error {refinement.shown_error(best)}; "
-            f"allow more elements or time, or ask for less. {message}"
+            f"{remedy}, or ask for less. {message}"
         )
         status = Status.ACCURACY_NOT_REACHED if best.is_converged else best.status
     names = [f"mesh {number} of {len(solutions)}" for number in range(1, len(solutions) + 1)]

@@ -174,6 +174,7 @@ def test_an_accuracy_out_of_reach_ends_at_the_budget(budget: dict[str, float], r
     assert best.estimated_error == min(s.estimated_error for s in solutions if s.estimated_error is not None)
     assert f"The accuracy 1e-10 was not reached: {reason} would be needed" in best.message
     assert f"estimated error {best.estimated_error:.1e}" in best.message
+    assert "; allow more elements or time, or ask for less" in best.message
 
 
 @pytest.mark.slow
@@ -214,6 +215,7 @@ def test_a_finer_mesh_that_fails_leaves_the_result_of_the_coarser_one() -> None:
     assert failed.status is bk.Status.STALLED
     assert best.status is bk.Status.ACCURACY_NOT_REACHED
     assert f"was not reached: the solve on {failed.mesh.n_elements} elements ended stalled (certificate" in best.message
+    assert "give a number of elements, or ask for less" in best.message
     assert best.linear_solves > failed.linear_solves
 
 
