@@ -20,7 +20,7 @@ _LEAST_COVER = 1e-6
 _LEAST_RESOLVED = 0.01
 """Common length, relative to the mean element of the finer side, that a node of the mesh can represent."""
 _STEPPED = 1.1
-"""Ratio of the lengths of constant elements above which the steps between the longer ones press the shorter ones."""
+"""Ratio of the distances of nodes above which the steps of constant elements press shorter elements."""
 _FEWEST = 4
 """Number of longer constant elements on the common length that carry multipliers."""
 _WHOLE = 1.0 - 1e-6
@@ -129,10 +129,11 @@ def is_non_mortar(one: ContactSide, two: ContactSide, *, has_friction: bool = Fa
     Returns
     -------
     bool
-        Of sides of constant elements, true if those of the first side are longer and at least four of them face the
-        second one. Else true if only the first side is completely covered. If both or none are, true if the mean
-        distance of nodes on the first side is not larger than on the second one. Of curved constant or linear sides
-        that cover each other and have friction or are arcs about one point, the coarser side carries the multipliers.
+        Where the nodes of constant elements are farther from each other than those of the other side, and at least four
+        of these elements face it, true if the first side has them. Else true if only the first side is completely
+        covered. If both or none are, true if the mean distance of nodes on the first side is not larger than on the
+        second one. Of curved constant or linear sides that cover each other and have friction or are arcs about one
+        point, the coarser side carries the multipliers.
 
     Notes
     -----
@@ -158,8 +159,9 @@ def _is_first_non_mortar(one: ContactSide, two: ContactSide, cover: float, *, ha
         has_friction or common_centre([(side.mesh, side.elements) for side in (one, two)]) is not None
     )
     first, second = (_mean_length(side) / max(side.space.degree, 1) for side in (one, two))
-    longest, is_constant = max(first, second), one.space.degree == two.space.degree == 0
-    if is_constant and longest > _STEPPED * min(first, second) and cover >= _FEWEST * longest:
+    longer, shorter = max(first, second), min(first, second)
+    has_steps = (one if first > second else two).space.degree == 0
+    if has_steps and longer > _STEPPED * shorter and cover >= _FEWEST * longer:
         return first > second
     share = _WHOLE_CURVED if fits else _WHOLE
     is_whole = [cover >= share * float(side.lengths.sum()) for side in (one, two)]
