@@ -112,7 +112,7 @@ class IncrementEnd:
         # a node that rested, or slipped the other way, slips under the friction of the end only
         turns = before.state.traction[:, 1] * self.state.traction[:, 1] <= 0.0
         turns |= before.motion.last_slip <= _RESTED * units.displacement * np.abs(slip)
-        of_turns = weights * (self.state.traction - before.state.traction)[:, 1] * slip
+        of_turns = weights * (before.state.traction - self.state.traction)[:, 1] * slip
         along_slip = 2.0 * weights * self.state.traction[:, 1] * slip
         (forces_before, displacements_before), (forces, displacements) = before.acting, self.acting
         of_forces = 0.5 * model.depth * float((forces_before + forces) @ (displacements - displacements_before))
@@ -121,7 +121,7 @@ class IncrementEnd:
             dissipation=dissipation,
             increment_work=float(sigma[:, 0] @ (approached - moved[:, 0])) + float(of_friction.sum()) - dissipation,
             friction_gain=float(np.maximum(along_slip, 0.0).sum()),
-            missed_dissipation=float(np.abs(of_turns[is_held & turns]).sum()),
+            missed_dissipation=float(np.maximum(of_turns[is_held & turns], 0.0).sum()),
         )
 
 

@@ -351,31 +351,39 @@ def test_laws_that_depend_on_slip_share_what_does_not_depend_on_the_law(monkeypa
     assert n_responses <= 1.3 * n_solves
 
 
-def slider(n_increments: int) -> LoadHistory:
-    """Push a half-plane to and fro on a rigid floor: a spring of the compliance 1 / (pi E') that slips as a whole."""
-    scene = bk.Scene(
-        title="slider",
-        shape=bk.PeriodicHalfPlane(1.0),
-        material=bk.Material(100.0, 0.0),
-        law=bk.Coulomb(0.4),
-        far=bk.FarField(x=0.0, force_y=2.0),
-        parts=(bk.Part("floor", bk.Contact(bk.Gap())),),
-        steps=(bk.Step(5.0, {"far.x": "0.01 * sin(pi / 2 * t)"}, increments=5 * n_increments),),
-        mesh=bk.MeshOptions(8),
+def slider(*steps: bk.Step) -> LoadHistory:
+    """Push a half-plane on a rigid floor: a spring of the compliance 1 / (pi E') that slips as a whole."""
+    return solved(
+        bk.Scene(
+            title="slider",
+            shape=bk.PeriodicHalfPlane(1.0),
+            material=bk.Material(100.0, 0.0),
+            law=bk.Coulomb(0.4),
+            far=bk.FarField(x=0.0, force_y=2.0),
+            parts=(bk.Part("floor", bk.Contact(bk.Gap())),),
+            steps=steps,
+            mesh=bk.MeshOptions(8),
+        )
     )
-    solution = bk.run(scene)
-    assert solution.loading is not None
-    names = [warning.kind for warning in solution.warnings]
-    assert ("coarse increments" in names) == (n_increments < 4)
-    return solution.loading
 
 
 @pytest.mark.parametrize(("n_increments", "tolerance"), [(1, 0.1), (2, 0.1), (8, 0.01)])
 def test_the_dissipation_that_coarse_increments_miss_is_estimated(n_increments: int, tolerance: float) -> None:
     """A closed cycle of a slider of the friction F and the compliance c takes 4 F (A - c F)."""
+    loading = slider(bk.Step(5.0, {"far.x": "0.01 * sin(pi / 2 * t)"}, increments=5 * n_increments))
     friction, compliance = 0.8, 1.0 / (100.0 * np.pi)
-    cycle = slider(n_increments).total(n_increments)
+    cycle = loading.total(n_increments)
     exact = 4.0 * friction * (0.01 - compliance * friction)
     assert cycle.dissipation + cycle.missed_dissipation == pytest.approx(exact, rel=tolerance)
+    assert len(list(loading.warnings())) == (n_increments < 4)
     if n_increments == 1:
         assert cycle.dissipation < 0.8 * exact
+
+
+def test_slip_under_a_falling_bound_misses_nothing() -> None:
+    """The bound meets a friction of 0.63 and falls to 0.2: the mean of both is that of the slip."""
+    loading = slider(bk.Step(1.0, {"far.x": 0.002}), bk.Step(2.0, {"law.friction_coefficient": 0.1}))
+    work = loading.total(1)
+    slip = (0.002 * 100.0 * np.pi - 0.2) / (100.0 * np.pi)
+    assert work.dissipation == pytest.approx(0.5 * (0.002 * 100.0 * np.pi + 0.2) * slip, rel=1e-9)
+    assert work.missed_dissipation <= 1e-9 * work.dissipation
