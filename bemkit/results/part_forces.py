@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
+from typing import SupportsIndex, overload
 
 import numpy as np
 
 from bemkit.arrays import FloatArray, IntArray
+from bemkit.errors import UnknownPartError
+from bemkit.formulas import choices
 from bemkit.geometry.local_values import summed_at_dofs
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.quadrature import gauss_legendre
@@ -91,6 +94,28 @@ class ContactForce(PartForce):
     contact_length: float
     peak_pressure: float
     largest_slip: float
+
+
+class ContactForces(tuple[ContactForce, ...]):
+    """What each contact transmits, by index or by name."""
+
+    __slots__ = ()
+
+    @overload
+    def __getitem__(self, key: SupportsIndex | str) -> ContactForce: ...
+
+    @overload
+    def __getitem__(self, key: slice) -> tuple[ContactForce, ...]: ...
+
+    def __getitem__(self, key: SupportsIndex | str | slice) -> ContactForce | tuple[ContactForce, ...]:
+        """Return a contact by its index or name, or some by a slice; UnknownPartError if there is no such name."""
+        if not isinstance(key, str):
+            return super().__getitem__(key)
+        for contact in self:
+            if contact.name == key:
+                return contact
+        names = [contact.name for contact in self]
+        raise UnknownPartError(f"there is no contact {key!r}: there are {choices(key, names)}")
 
 
 def part_force(name: str, mesh: BoundaryMesh, space: BoundarySpace, load: FloatArray, elements: IntArray) -> PartForce:
@@ -180,7 +205,7 @@ def contact_forces(
     lengths: Sequence[float],
     transitions: Sequence[Transition],
     at_held_nodes: Mapping[str, FloatArray],
-) -> tuple[ContactForce, ...]:
+) -> ContactForces:
     """Return the forces and sizes of each contact.
 
     Parameters
@@ -203,7 +228,7 @@ def contact_forces(
         closed = min(length, _contact_length(*zones, resultant.name) + float(further[2]))
         entries = vars(resultant) | _sizes(table, depth, resultant.name, further)
         forces.append(ContactForce(**entries, contact_length=closed))
-    return tuple(forces)
+    return ContactForces(forces)
 
 
 def forces_on_parts(on_sides: Iterable[tuple[tuple[str, str], PartForce]]) -> dict[str, dict[str, PartForce]]:

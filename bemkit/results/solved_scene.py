@@ -14,7 +14,7 @@ from bemkit.contact.laws import FrictionLaw
 from bemkit.errors import InputError, format_point
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.results.contact_table import ContactTable
-from bemkit.results.part_forces import ContactForce, PartForce, RigidResult
+from bemkit.results.part_forces import ContactForces, PartForce, RigidResult
 from bemkit.results.solved_body import BoundaryFields, SideName, SolvedBody
 from bemkit.results.transitions import Transition
 from bemkit.scene.conditions import name_at_obstacle
@@ -48,7 +48,7 @@ class SolvedScene:
     friction_bound : (n_contact,) array or None [Pa]
         The largest friction at each contact node; None if there is none anywhere.
     contacts : tuple of ContactForce
-        What each contact transmits, with contact length, peak pressure and largest slip.
+        What each contact transmits, with contact length, peak pressure and largest slip; by index or by name.
     rigid : mapping of str to RigidResult
         How each rigid body moved and what acts on it, by name.
     contact : ContactTable
@@ -62,7 +62,7 @@ class SolvedScene:
     contact_sides: Mapping[str, tuple[SideName, ...]]
     contact_directions: FloatArray
     friction_bound: FloatArray | None
-    contacts: tuple[ContactForce, ...]
+    contacts: ContactForces
     rigid: Mapping[str, RigidResult] = field(default_factory=dict)
     contact: ContactTable
     transitions: tuple[Transition, ...]

@@ -23,7 +23,7 @@ from bemkit.operators.counts import OperationCounts
 from bemkit.plan.plan import Plan
 from bemkit.results.contact_table import ContactTable
 from bemkit.results.load_history import LoadStep, StepWork
-from bemkit.results.part_forces import ContactForce, PartForce, RigidResult
+from bemkit.results.part_forces import ContactForce, ContactForces, PartForce, RigidResult
 from bemkit.results.solution import Solution, stated_warnings
 from bemkit.results.solved_body import BoundaryFields, SideName, SolvedBody
 from bemkit.results.transitions import Transition
@@ -125,7 +125,7 @@ def read_step(reader: Reader, group: str, outcome: str, problem: Scene, layout: 
         contact_sides={name: tuple(SideName(*side) for side in sides) for name, sides in entries["sides"].items()},
         contact_directions=np.stack([columns[name] for name in _DIRECTIONS], axis=1),
         friction_bound=bound if entries["has_friction"] else None,
-        contacts=tuple(_by_name(ContactForce, entries["contacts"]).values()),
+        contacts=ContactForces(_by_name(ContactForce, entries["contacts"]).values()),
         rigid=_by_name(RigidResult, entries["rigid"]),
         **_outcome(entries),
     )

@@ -34,6 +34,17 @@ _EXAMPLES: Mapping[str, str] = MappingProxyType(
         "obstacle": "RigidHalfPlane()",
     }
 )
+_OF_OBJECTS: Mapping[str, str] = MappingProxyType(
+    {
+        "parts": "Part('wall', Clamped(), sides=('left',))",
+        "steps": "Step(1.0)",
+        "body_forces": "Gravity(7800.0)",
+        "bodies": "Body(name='punch', ...)",
+        "rigid": "RigidBody(name='punch', ...)",
+        "contacts": "ContactPair(('punch.bottom', 'plate.top'))",
+    }
+)
+_NO_OBJECTS = (str, int, float, type, Mapping, list, tuple)
 _SEVERAL = ("parts", "steps", "load_factors", "body_forces", "bodies", "rigid", "contacts", "sides")
 
 
@@ -70,9 +81,19 @@ def check_objects(owner: Any, name: str = "") -> None:
         Naming the attribute, its value and an example.
     """
     begin = f"{name}: " if name else ""
+    for attribute in _SEVERAL:
+        value = getattr(owner, attribute, ())
+        if isinstance(value, str) or not isinstance(value, Iterable):
+            raise InputError(f"{begin}{attribute} is {value!r}: give a tuple, such as ({value!r},)")
+        if isinstance(value, list):  # equal to the same scene from a file
+            object.__setattr__(owner, attribute, tuple(value))
+        if attribute in _OF_OBJECTS and (wrong := [item for item in value if isinstance(item, _NO_OBJECTS)]):
+            raise InputError(
+                f"{begin}{attribute} contains {wrong[0]!r}: give objects, such as {_OF_OBJECTS[attribute]}"
+            )
     for attribute, example in _EXAMPLES.items():
         value = getattr(owner, attribute, None)
-        if isinstance(value, str | int | float | type | Mapping | list | tuple):
+        if isinstance(value, _NO_OBJECTS):
             shown = f"the class {value.__name__}" if isinstance(value, type) else repr(value)
             raise InputError(f"{begin}{attribute} is {shown}: give an object, such as {example}")
     obstacle = getattr(owner, "obstacle", None)
@@ -81,12 +102,6 @@ def check_objects(owner: Any, name: str = "") -> None:
             f"{begin}obstacle is {obstacle!r}, which has no method gap(points, normals): give one as "
             "bemkit.contact.obstacle.Obstacle describes it"
         )
-    for attribute in _SEVERAL:
-        value = getattr(owner, attribute, ())
-        if isinstance(value, str) or not isinstance(value, Iterable):
-            raise InputError(f"{begin}{attribute} is {value!r}: give a tuple, such as ({value!r},)")
-        if isinstance(value, list):  # equal to the same scene from a file
-            object.__setattr__(owner, attribute, tuple(value))
 
 
 def check_names(owner: str, names: Iterable[str], kind: str) -> None:

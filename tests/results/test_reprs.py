@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import dataclasses
 
+import pytest
+
 import bemkit as bk
 
 
@@ -22,6 +24,14 @@ def test_a_table_shows_its_size_and_prints_its_rows() -> None:
     solution = bk.run(dataclasses.replace(bk.load_scene("paper-1"), mesh=bk.MeshOptions(elements=40)))
     assert repr(solution.forces) == "Table(4 rows: name, force_x, force_y, moment)"
     assert str(solution.forces).splitlines()[2].startswith("| foundation | 0.0")
+
+
+def test_contacts_are_found_by_name() -> None:
+    solution = bk.run(dataclasses.replace(bk.load_scene("paper-1"), mesh=bk.MeshOptions(elements=40)))
+    assert solution.contacts["foundation"] is solution.contacts[0]
+    assert solution.contacts[:1] == solution.contacts
+    with pytest.raises(bk.BemkitError, match="no contact 'fundation': there are foundation; did you mean 'foundation'"):
+        solution.contacts["fundation"]
 
 
 def test_without_contact_nothing_is_said_of_it() -> None:

@@ -40,6 +40,15 @@ PAIR = bk.ContactPair(("upper.bottom", "lower.top"))
         (lambda: replace(SCENE, units="mm"), r"^units is 'mm': give an object, such as UnitNames\("),
         (lambda: replace(SCENE, parts=WALL), r"^parts is Part\(name='wall'.*: give a tuple, such as \(Part\("),
         (lambda: replace(SCENE, load_factors=2.0), r"^load_factors is 2.0: give a tuple, such as \(2.0,\)"),
+        (
+            lambda: replace(SCENE, contacts=(("a.top", "b.bottom"),)),
+            r"^contacts contains \('a.top', 'b.bottom'\): give objects, such as ContactPair\(",
+        ),
+        (lambda: replace(SCENE, parts=[bk.Part]), r"^parts contains <class .*>: give objects, such as Part\("),
+        (
+            lambda: bk.ContactPair("a.top", "b.bottom"),
+            r"^contact: sides is 'a.top': give a tuple, such as \('a.top',\)",
+        ),
         (lambda: replace(WALL, condition="roller"), "^part 'wall': condition is 'roller': give an object"),
         (lambda: replace(WALL, condition=bk.Roller), "^part 'wall': condition is the class Roller: give an object"),
         (lambda: replace(WALL, sides="right"), r"^part 'wall': sides is 'right': give a tuple, such as \('right',\)"),
