@@ -12,7 +12,7 @@ class PlainNumbers(ScalarFormatter):
 
     def __init__(self) -> None:
         super().__init__(useOffset=False, useMathText=True)
-        self.set_powerlimits((-2, 3))
+        self.set_powerlimits((-3, 4))  # 2500 MPa, not 2.5 times 10^3 MPa
 
     def __call__(self, x: float, pos: Any = None) -> str:
         """Return the text of a number."""

@@ -75,3 +75,12 @@ def test_numbers_beside_axes_are_plain_text_below_a_power_of_ten() -> None:
     assert "\u22123" in texts
     assert not any("$" in text for text in texts)
     assert axes.yaxis.get_offset_text().get_text().startswith(r"$\times\mathdefault{10^{")
+
+
+def test_thousands_are_written_in_full() -> None:
+    axes = Figure().add_subplot()
+    axes.plot([0.0, 1.0], [0.0, 2500.0])
+    ignore_round_off(axes, 2500.0)
+    axes.get_figure().draw_without_rendering()
+    assert "2500" in [label.get_text() for label in axes.get_yticklabels()]
+    assert axes.yaxis.get_offset_text().get_text() == ""
