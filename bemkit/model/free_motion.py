@@ -20,6 +20,10 @@ _DIRECTIONS = (
     *("to the left", "down and to the left", "downward", "down and to the right"),
 )
 _REMEDY = ": change the load or hold the body"
+_REMEDY_AWAY = (
+    ": all contacts face away from their obstacles; choose sides that face them, or turn the direction of the obstacle "
+    "round"
+)
 _STRAIGHT = 1e-6
 """Largest rotation that counts as none, relative to the translation over the size of the body."""
 _MET = 1e-3
@@ -115,7 +119,8 @@ def describe(prepared: Prepared, load: UnsolvableLoad) -> str:
                 f"the load slides the body {_direction(mode[:2])} with {net} more than friction can hold; "
                 "change the load, raise the friction or hold the body"
             )
-        return f"the load pushes the body {_direction(mode[:2])} with {net}; nothing holds it{_REMEDY}"
+        remedy = _REMEDY_AWAY if np.isnan(load.lift).all() else _REMEDY
+        return f"the load pushes the body {_direction(mode[:2])} with {net}; nothing holds it{remedy}"
     moment = amount(load.work / abs(turn) * force * units.length, "energy", scene.result_units)
     sense = "anticlockwise" if turn > 0.0 else "clockwise"
     words = f"the load turns the body {sense} {_pivot(mode, units)} with {moment}"

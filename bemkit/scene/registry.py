@@ -329,7 +329,8 @@ SYNONYMS: Mapping[str, tuple[str, ...]] = MappingProxyType(
     {
         **dict.fromkeys(("e", "young", "young_modulus", "elastic_modulus", "modulus"), ("youngs_modulus",)),
         **dict.fromkeys(("nu", "poisson"), ("poisson_ratio",)),
-        **dict.fromkeys(("mu", "friction", "coefficient"), ("friction_coefficient", "coulomb")),
+        **dict.fromkeys(("mu", "friction", "coefficient"), ("friction_coefficient", "coulomb", "law")),
+        **dict.fromkeys(("boundary", "supports", "loads", "conditions"), ("parts",)),
         **dict.fromkeys(("n", "number", "size"), ("elements",)),
         **dict.fromkeys(("tolerance", "tol", "error", "eps"), ("accuracy",)),
         **dict.fromkeys(("p", "order"), ("degree",)),

@@ -59,6 +59,11 @@ def test_directions(load: bk.Traction, floor: bk.RigidHalfPlane, side: str, oppo
     assert f"the load pushes the body {words}; nothing holds it" in complaint(floating(load, floor, side, opposite))
 
 
+def test_a_contact_that_faces_away_is_named() -> None:
+    away = floating(bk.Traction(y=-5.0), bk.RigidHalfPlane((0.0, 0.0), (0.0, -1.0)), "bottom", "top")
+    assert "nothing holds it: all contacts face away from their obstacles; choose sides" in complaint(away)
+
+
 @pytest.mark.parametrize(("push", "direction"), [(0.3, "to the right"), (-0.3, "to the left")])
 def test_a_sliding_body(push: float, direction: str) -> None:
     # 0.6 against 0.4 times the pressing force 1.0

@@ -227,6 +227,7 @@ def test_mistakes_that_only_the_whole_scene_shows_are_listed_together() -> None:
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
+        ("title = ", "friction = 0.3\ntitle = ", "friction: unknown key.*did you mean 'law'"),
         ("title = ", "titel = ", "titel: unknown key.*did you mean 'title'"),
         ("youngs_modulus", "youngs_modulos", "material.youngs_modulos: unknown key.*did you mean 'youngs_modulus'"),
         ("[mesh]", "[mesh]\nlength = 3", "mesh.length: unknown key: the keys are elements, grading"),
