@@ -72,6 +72,15 @@ class Plan(ShownInNotebooks):
     warnings: tuple[ResultWarning, ...] = ()
     is_compressed: bool = False
 
+    def __repr__(self) -> str:
+        """Return one line."""
+        return f"Plan({self.sizes.n_elements} elements, {self.memory / 1e6:.3g} MB, about {self.seconds:.2g} s)"
+
+    def __str__(self) -> str:
+        """Return memory and time, and a line for each item, needed or skipped."""
+        lines = (f"{each.name}: {'' if each.is_needed else 'skipped, '}{each.reason}" for each in self.items)
+        return "\n".join([repr(self), *lines])
+
     def as_dict(self) -> dict[str, Any]:
         """Return the plan as JSON can hold it."""
         return {

@@ -7,6 +7,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
+import numpy.typing as npt
 from numpy.polynomial import legendre
 
 from bemkit.arrays import BoolArray, FloatArray, IntArray
@@ -189,7 +190,7 @@ _END = 1e-9
 """Distance from the end of an element, in its local coordinate, within which a point counts as the node."""
 
 
-def stress_at(boundary: BoundaryStress, points: FloatArray, part: str | None = None) -> FloatArray:
+def stress_at(boundary: BoundaryStress, points: npt.ArrayLike, part: str | None = None) -> FloatArray:
     """Evaluate the stress inside a body and on its boundary; see `SolvedBody.stress`."""
     points = as_points(np.atleast_2d(np.asarray(points, float)))
     mesh = boundary.mesh
@@ -213,7 +214,7 @@ def stress_at(boundary: BoundaryStress, points: FloatArray, part: str | None = N
     return stress
 
 
-def displacement_at(boundary: BoundaryStress, points: FloatArray) -> FloatArray:
+def displacement_at(boundary: BoundaryStress, points: npt.ArrayLike) -> FloatArray:
     """Evaluate the displacement inside a body and on its boundary; see `SolvedBody.displacement`."""
     points = as_points(np.atleast_2d(np.asarray(points, float)))
     location = Locator(boundary.mesh).locate(points)

@@ -9,6 +9,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from bemkit.arrays import BoolArray, FloatArray, read_only
 from bemkit.errors import InputError
@@ -149,7 +150,7 @@ class SolvedBody:
             self.mesh, self.scene, fields.displacement, fields.traction_dofs, self.particular
         )
 
-    def stress(self, points: FloatArray, part: str | None = None) -> FloatArray:
+    def stress(self, points: npt.ArrayLike, part: str | None = None) -> FloatArray:
         """Evaluate the stress inside the body and on its boundary.
 
         Parameters
@@ -178,7 +179,7 @@ class SolvedBody:
 
         return stress_at(self.boundary_stress, points, part)
 
-    def displacement(self, points: FloatArray) -> FloatArray:
+    def displacement(self, points: npt.ArrayLike) -> FloatArray:
         """Evaluate the displacement (n, 2) [m] inside the body and on its boundary, at points (n, 2) [m].
 
         Raises

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import numpy.typing as npt
 
 from bemkit.arrays import FloatArray
 from bemkit.contact.body import SlipHistory
@@ -96,11 +97,11 @@ class SolvedScene:
         """The resultants on each part of the only body; see `SolvedBody.part_forces`."""
         return self.body.part_forces
 
-    def stress(self, points: FloatArray, part: str | None = None) -> FloatArray:
+    def stress(self, points: npt.ArrayLike, part: str | None = None) -> FloatArray:
         """Evaluate the stress (n, 2, 2) [Pa] inside the only body and on its boundary; see `SolvedBody.stress`."""
         return self.body.stress(points, part)
 
-    def displacement(self, points: FloatArray) -> FloatArray:
+    def displacement(self, points: npt.ArrayLike) -> FloatArray:
         """Evaluate the displacement (n, 2) [m] inside the only body and on its boundary, at points (n, 2) [m]."""
         return self.body.displacement(points)
 

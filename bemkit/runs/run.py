@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, overload
 
 from bemkit.errors import InputError, NoResultError
 from bemkit.interrupts import interruptible
@@ -19,6 +19,7 @@ from bemkit.solvers.base import StepRecord
 if TYPE_CHECKING:
     from concurrent.futures import Executor
 
+    from bemkit.results.solution import Solution
     from bemkit.results.solved_steps import SolvedSteps
 
 _COARSEST, _RATIO = 1024, 16
@@ -35,6 +36,32 @@ class NoMeshError(NoResultError):
 
 class LoadHistoryError(InputError):
     """A load history was given where only a single load is possible."""
+
+
+@overload
+def run(
+    scene: Scene,
+    *,
+    mesh: Meshes = ...,
+    start: Any = ...,
+    coarsest: int | None = ...,
+    file: str | Path | None = ...,
+    callback: Callable[[StepRecord], None] | None = ...,
+    executor: Executor | None = ...,
+) -> Solution: ...
+
+
+@overload
+def run(
+    scene: Sequence[Scene],
+    *,
+    mesh: Meshes = ...,
+    start: Any = ...,
+    coarsest: int | None = ...,
+    file: str | Path | None = ...,
+    callback: Callable[[StepRecord], None] | None = ...,
+    executor: Executor | None = ...,
+) -> SolvedSteps: ...
 
 
 @interruptible()

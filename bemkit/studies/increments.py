@@ -70,7 +70,7 @@ def increment_errors(scene: Scene) -> IncrementErrors:
     for steps, words in ((coarse, "as stated"), (fine, "with halved increments")):
         if not steps[-1].is_converged:
             raise UnsolvedHistoryError(f"the history {words} is not solved: {steps[-1].message}")
-    whole, halves = (steps[-1].loading.total() for steps in (coarse, fine))
+    whole, halves = (loading.total() for steps in (coarse, fine) if (loading := steps[-1].loading) is not None)
     return IncrementErrors(
         len(coarse),
         _change(whole.external_work, halves.external_work),

@@ -26,6 +26,13 @@ def test_a_table_shows_its_size_and_prints_its_rows() -> None:
     assert str(solution.forces).splitlines()[2].startswith("| foundation | 0.0")
 
 
+def test_a_plan_prints_its_items() -> None:
+    plan = bk.make_plan(bk.load_scene("paper-1"))
+    assert repr(plan).startswith("Plan(320 elements, ")
+    assert "symmetry: skipped, not asked for" in str(plan).splitlines()
+    assert len(str(plan).splitlines()) == 1 + len(plan.items)
+
+
 def test_contacts_are_found_by_name() -> None:
     solution = bk.run(dataclasses.replace(bk.load_scene("paper-1"), mesh=bk.MeshOptions(elements=40)))
     assert solution.contacts["foundation"] is solution.contacts[0]

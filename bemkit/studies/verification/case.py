@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TypeAlias, cast
+from typing import TypeAlias
 
 from bemkit.errors import InputError
 from bemkit.results.solution import Solution
@@ -19,8 +19,8 @@ Solve: TypeAlias = Callable[[Scene, float], Solution]
 def at_resolution(scene: Scene, resolution: float) -> Solution:
     """Solve a scene with a number of elements, or to an accuracy, which is less than one."""
     if resolution < 1.0:
-        return cast(Solution, run(with_overrides(scene, accuracy=resolution)))
-    return cast(Solution, run(with_overrides(scene, elements=int(resolution))))
+        return run(with_overrides(scene, accuracy=resolution))
+    return run(with_overrides(scene, elements=int(resolution)))
 
 
 @dataclass(frozen=True)

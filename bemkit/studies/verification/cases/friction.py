@@ -115,7 +115,7 @@ def _least_friction(scene: Scene, n: float) -> Solution:
     while most - least > 3e-5 or known is None:
         friction = 0.5 * (least + most)
         try:
-            known = cast(Solution, run(replace(with_overrides(scene, elements=int(n)), law=Coulomb(friction))))
+            known = run(replace(with_overrides(scene, elements=int(n)), law=Coulomb(friction)))
             most = friction
         except UnsolvableSceneError:
             least = friction

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import cast
 
 import numpy as np
 
@@ -192,7 +191,7 @@ def growing_cylinder() -> Case:
 
     def solve(scene: Scene, n_steps: float) -> Solution:
         factors = (np.arange(1.0, n_steps + 1.0) / n_steps) ** 2
-        return cast(Solution, run(replace(scene, load_factors=tuple(factors))))
+        return run(replace(scene, load_factors=tuple(factors)))
 
     quantities = _share_that_sticks((6e-2, 3e-2, 1.5e-2), spence_stick_ratio(0.3, _STEEL))
     validity = "incremental law, load in 20, 40, 80 steps on 160 elements"
@@ -229,7 +228,7 @@ def mindlin_cycle() -> Case:
     scene = replace(scene, mesh=MeshOptions(elements=120))
 
     def solve(scene: Scene, n_quarter: float) -> Solution:
-        return cast(Solution, run(to_and_fro(scene, {"far.force_x": 0.2}, int(n_quarter))))
+        return run(to_and_fro(scene, {"far.force_x": 0.2}, int(n_quarter)))
 
     expected = mindlin_loss(PartialSlip(_CYLINDER, 0.2, 0.3), 1.0)
     lost = Quantity("energy lost in a cycle", lost_in_last_cycle, (3e-2, 7e-3), expected)

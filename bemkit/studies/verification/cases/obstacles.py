@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import cast
 
 from bemkit.contact.laws import Coulomb
 from bemkit.contact.obstacle import Gap
@@ -124,7 +123,7 @@ def _hp(name: str, source: str, validity: str, quantities: tuple[Quantity, ...],
     """
 
     def solve(scene: Scene, accuracy: float) -> Solution:
-        return cast(Solution, run(with_overrides(scene, accuracy=accuracy, degree="hp")))
+        return run(with_overrides(scene, accuracy=accuracy, degree="hp"))
 
     return Case(load_scene(name), source, validity, (1e-2, middle, 1e-6), quantities, solve)
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import cast
 
 import numpy as np
 
@@ -74,7 +73,7 @@ def _unmatched(scene: Scene, n: float) -> Solution:
     """Divide the second body into 1.7 times as many elements as the first."""
     counts = int(n), int(1.7 * n)
     bodies = (replace(body, mesh=MeshOptions(elements=k)) for body, k in zip(scene.bodies, counts, strict=True))
-    return cast(Solution, run(replace(scene, bodies=tuple(bodies))))
+    return run(replace(scene, bodies=tuple(bodies)))
 
 
 def gravity_columns() -> Case:
@@ -191,10 +190,10 @@ def _pressed_then_sheared(scene: Scene, accuracy: float) -> Solution:
         pushed = replace(upper.parts[0], condition=PrescribedDisplacement(shift, -0.0022))
         return replace(scene, bodies=(replace(upper, parts=(pushed, *upper.parts[1:])), lower))
 
-    fitted = cast(Solution, run(with_overrides(under(0.0008), accuracy=accuracy)))
+    fitted = run(with_overrides(under(0.0008), accuracy=accuracy))
     meshes = {name: body.mesh for name, body in fitted.bodies.items()}
     steps = [with_overrides(under(shift), elements=100) for shift in (0.0, 0.0008)]
-    return cast(Solution, run(steps, mesh=meshes)[-1])
+    return run(steps, mesh=meshes)[-1]
 
 
 def pin_in_hole() -> Case:
