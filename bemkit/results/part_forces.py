@@ -97,7 +97,7 @@ class ContactForce(PartForce):
 
 
 class ContactForces(tuple[ContactForce, ...]):
-    """What each contact transmits, by index or by name."""
+    """Forces and sizes of each contact, by index or by name."""
 
     __slots__ = ()
 
