@@ -80,10 +80,11 @@ def format_point(point: FloatArray | tuple[float, float], size: float = 0.0, dig
     ----------
     point : (2,) array [m]
     size : float [m]
-        Size of the body that the point is on. A coordinate that is round-off beside it is written as 0.
+        Size of the body that the point is on. A coordinate that is round-off beside it is written as 0; by default none
+        is.
     digits : int
     """
-    least = _ROUND_OFF * max(size, abs(point[0]), abs(point[1]))
+    least = _ROUND_OFF * max(size, abs(point[0]), abs(point[1])) if size else 0.0
     x, y = (0.0 if abs(coordinate) < least else coordinate for coordinate in point)
     return f"({x:.{digits}g}, {y:.{digits}g})"
 

@@ -100,6 +100,7 @@ def _interference(scene: Scene, names: tuple[str, str]) -> float:
 def _overlap(names: tuple[str, str], depth: float, place: FloatArray) -> OverlapError:
     one, two = names
     return OverlapError(
-        f"bodies {one!r} and {two!r} overlap by {depth:.4g} at {format_point(place, digits=6)}: move them apart, or "
+        f"bodies {one!r} and {two!r} overlap by {depth:.4g} at "
+        f"{format_point(place, float(np.abs(place).max()), digits=6)}: move them apart, or "
         "state a contact with an interference between them"
     )

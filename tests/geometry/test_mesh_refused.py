@@ -69,7 +69,7 @@ REFUSED = {
     ),
     "length of round-off": (
         lambda: BoundaryMesh([[0, 0], [1, 0], [1, 1e-15], [0, 1]], closed(4)),
-        "element 1, from (1, 0) to (1, 0), has length 1e-15, no more than the round-off",
+        "element 1, from (1, 0) to (1, 1e-15), has length 1e-15, no more than the round-off",
     ),
     "same point": (
         lambda: BoundaryMesh([[0, 0], [1, -1], [2, 0], [1, 1], [0, 0], [-1, 0.5]], closed(6)),
