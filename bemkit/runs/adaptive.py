@@ -23,9 +23,6 @@ from bemkit.scene.discretisation import MOST_ELEMENTS, MeshOptions
 from bemkit.scene.scene import Scene
 from bemkit.solvers.base import Status
 
-_NEEDED, _STUCK = "would be needed", "no longer falls"
-_REMEDIES = {_NEEDED: "allow more elements or time", _STUCK: "round corners with singular tractions"}
-"""By the ends of reasons why no finer mesh is made."""
 _MOST_MISSED = 12
 """Largest number of meshes that miss contact; each has nodes where the one before missed it."""
 _SAME = 1e-9
@@ -148,6 +145,19 @@ class _Refinement:
         return spent * make_plan(level.scene, level.meshes).seconds / float(solution.plan.seconds)
 
 
+@dataclass(frozen=True)
+class _Obstacle:
+    """Why no finer mesh is solved, and what helps."""
+
+    reason: str
+    remedy: str = "give a number of elements"
+
+    @classmethod
+    def of_limit(cls, limit: str) -> _Obstacle:
+        """Return the obstacle that a finer mesh exceeds a limit."""
+        return cls(f"more than {limit} would be needed", "allow more elements or time")
+
+
 def _required_accuracy(options: MeshOptions) -> float:
     """Return the accuracy of mesh options; an error without one."""
     if options.accuracy is None:
@@ -159,69 +169,67 @@ def _refined(first: Level, refinement: _Refinement, options: MeshOptions) -> tup
     """Solve level after level until the accuracy of the options is reached or cannot be; see `run_adaptive`."""
     begin, accuracy = time.perf_counter(), _required_accuracy(options)
     most_elements = MOST_ELEMENTS if options.most_elements is None else options.most_elements
-    level, obstacle = first, ""
-    solutions: list[Solution] = []
-    while not obstacle:
+    level, solutions = first, list[Solution]()
+    obstacle: _Obstacle | None = None
+    while obstacle is None:
         started = time.perf_counter()
         try:
             solution = refinement.solved(level, solutions[-1] if solutions else None)
         except BemkitError as error:
             if not solutions:
                 raise
-            obstacle = f"{level.n_elements} elements cannot be solved ({error})"
+            obstacle = _Obstacle(f"{level.n_elements} elements cannot be solved ({error})")
             break
         solutions.append(solution)
         level = level.with_sides_of(solution)
         now = time.perf_counter()
         is_missed = solution.status is Status.MISSED_CONTACT
         if sum(each.status is Status.MISSED_CONTACT for each in solutions) > _MOST_MISSED:
-            obstacle = f"contact lies between the nodes of {len(solutions)} meshes"
+            obstacle = _Obstacle(f"contact lies between the nodes of {len(solutions)} meshes")
         elif not solution.is_converged and not is_missed:
             worst, word = solution.certificate.worst, solution.status.name.lower().replace("_", " ")
-            obstacle = f"the solve on {solution.n_elements} elements ended {word} (certificate {worst:.1e})"
+            reason = f"the solve on {solution.n_elements} elements ended {word} (certificate {worst:.1e})"
+            obstacle = _Obstacle(reason)
         elif not (is_missed or solution.missed_contacts) and refinement.meshes.is_enough(solutions):
             break
         else:
             try:
                 following = refinement.following(level, solutions)
             except BemkitError as error:
-                obstacle = f"no finer mesh can be made ({error})"
+                obstacle = _Obstacle(f"no finer mesh can be made ({error})")
                 break
             if following is None:
-                obstacle = f"the estimated error {_STUCK}"
+                obstacle = _Obstacle("the estimated error no longer falls", "round corners with singular tractions")
                 break
             level = following
             if excess := refinement.excess(level, most_elements):
-                obstacle = f"more than {excess} {_NEEDED}"
+                obstacle = _Obstacle.of_limit(excess)
             elif options.most_seconds is not None:
                 expected = refinement.expected_seconds(level, solution, now - started)
                 if now - begin + expected > options.most_seconds:
-                    obstacle = f"more than {options.most_seconds:g} s {_NEEDED}"
+                    obstacle = _Obstacle.of_limit(f"{options.most_seconds:g} s")
     return _best_last(solutions, obstacle, accuracy, refinement)
 
 
 def _best_last(
-    solutions: Sequence[Solution], obstacle: str, accuracy: float, refinement: _Refinement
+    solutions: Sequence[Solution], obstacle: _Obstacle | None, accuracy: float, refinement: _Refinement
 ) -> tuple[Solution, ...]:
     """Put the best solution last, with the totals of all and the reason why it misses the accuracy.
 
     The last one is the best if it is accurate enough.
     """
     best = solutions[-1]
-    if obstacle:
+    if obstacle is not None:
         # without estimates the finest mesh is the best
         converged = [solution for solution in reversed(solutions) if solution.is_converged]
         best = min(converged, key=refinement.error, default=best)
     made = "One mesh" if len(solutions) == 1 else f"{len(solutions)} meshes, the last"
     message = f"{made} with {best.n_elements} elements. {best.message}"
     status = best.status
-    if obstacle:
-        remedy = next(
-            (known for end, known in _REMEDIES.items() if obstacle.endswith(end)), "give a number of elements"
-        )
+    if obstacle is not None:
         message = (
-            f"The accuracy {accuracy:g} was not reached: {obstacle}; estimated error {refinement.shown_error(best)}; "
-            f"{remedy}, or ask for less. {message}"
+            f"The accuracy {accuracy:g} was not reached: {obstacle.reason}; estimated error "
+            f"{refinement.shown_error(best)}; {obstacle.remedy}, or ask for less. {message}"
         )
         status = Status.ACCURACY_NOT_REACHED if best.is_converged else best.status
     names = [f"mesh {number} of {len(solutions)}" for number in range(1, len(solutions) + 1)]

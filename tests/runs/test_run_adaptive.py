@@ -13,7 +13,7 @@ from bemkit.contact.body import ContactState
 from bemkit.contact.problem import ContactProblem
 from bemkit.geometry.meshing.partition import STEEPEST, better_partition
 from bemkit.reference import DiscBetweenPlates
-from bemkit.runs.adaptive import _best_last, _Refinement, run_adaptive
+from bemkit.runs.adaptive import _best_last, _Obstacle, _Refinement, run_adaptive
 from bemkit.runs.density import DensityMeshes, is_enough
 from bemkit.runs.mesh_sequence import Level
 from bemkit.runs.steps import RunOptions
@@ -118,9 +118,11 @@ def test_a_mesh_that_is_accurate_enough_is_the_best_one() -> None:
             return 1e-3 if solution is coarse else 5e-3
 
     refinement = Refinement(DensityMeshes(accuracy=1e-2), RunOptions())
-    assert _best_last((coarse, fine), "", 1e-2, refinement)[-1].n_elements == fine.n_elements
-    assert _best_last((coarse, fine), "an obstacle", 1e-2, refinement)[-1].n_elements == coarse.n_elements
-    assert _best_last((fine,), "", 1e-2, refinement)[-1].message.startswith(f"One mesh with {fine.n_elements} elements")
+    assert _best_last((coarse, fine), None, 1e-2, refinement)[-1].n_elements == fine.n_elements
+    assert _best_last((coarse, fine), _Obstacle("an obstacle"), 1e-2, refinement)[-1].n_elements == coarse.n_elements
+    assert _best_last((fine,), None, 1e-2, refinement)[-1].message.startswith(
+        f"One mesh with {fine.n_elements} elements"
+    )
 
 
 @pytest.mark.slow
