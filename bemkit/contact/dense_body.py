@@ -23,10 +23,10 @@ if TYPE_CHECKING:
 _SMALLEST_RCOND = 1e-13
 """Below this reciprocal condition number of a row-scaled system its matrix counts as singular. The condensed stiffness
 of a floating body leaves 1e-15 of its free motions; solvers that are refused without need only take other steps."""
-
 _NO_ROOM = 1e-3
 """Change of volume that errors of normals explain, see `DenseBody._enclosed`: squares of angles."""
-
+_NO_CHANGE = 1e-6
+"""Change of a volume by displacements that counts as small, relative to the largest one."""
 _LEFT_OVER = 1e-9
 """Stiffness that may be round-off of zero, relative to the largest."""
 
@@ -382,6 +382,7 @@ class DenseBody(LinearBody):
         """
         change, coupled = np.split(self.stiffness[self.n_unknowns :], [self.n_unknowns], axis=1)
         sizes = np.abs(change).sum(axis=1)
+        sizes = np.maximum(sizes, _NO_CHANGE * sizes.max(initial=0.0))  # contact on both sides of a body may leave none
         modulus = self.largest_modulus or self.modulus or self.stiffness_scale * float(np.median(self.weights))
         combinations, yielding, _ = np.linalg.svd(coupled * modulus / sizes / sizes[:, None])
         enclosed = (combinations / sizes[:, None]).T[yielding < _NO_ROOM]
