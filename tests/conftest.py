@@ -27,12 +27,11 @@ def pytest_configure(config: pytest.Config) -> None:
 
 @pytest.hookimpl(wrapper=True)
 def pytest_collection() -> Generator[None, object, object]:
-    """Collect no garbage while tests are read, never look at them again, and collect less often than by default."""
+    """Collect no garbage while tests are read, and less often than by default while they run."""
     gc.disable()
     try:
         return (yield)
     finally:
-        gc.freeze()
         gc.set_threshold(10_000, 20, 20)
         gc.enable()
 
