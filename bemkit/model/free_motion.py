@@ -29,7 +29,7 @@ _STRAIGHT = 1e-6
 _MET = 1e-3
 """Distance of a node from a corner that meets it, relative to the largest distance of nodes."""
 _ROUND_OFF = 1e-9
-"""Round-off of a mode, and of coordinates relative to the size of the body."""
+"""Round-off of a mode."""
 
 
 class FreeBodyError(InputError):

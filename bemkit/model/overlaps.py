@@ -36,7 +36,7 @@ def check_apart(scene: Scene, bodies: Sequence[PlacedBody]) -> None:
         least = outlines[k].tolerance + outlines[m].tolerance + ROUND_OFF * size
         depth, place = deepest_overlap(outlines[k], outlines[m], least + _interference(scene, names))
         if depth > 0.0:
-            raise _overlap(names, depth, place)
+            raise _overlap(names, depth, place, size)
     for rigid in scene.rigid:
         if is_finite(rigid.obstacle):
             for body, outline in zip(finite, outlines, strict=True):
@@ -44,7 +44,7 @@ def check_apart(scene: Scene, bodies: Sequence[PlacedBody]) -> None:
                 gap = rigid.obstacle.gap(points, points)
                 k, names = int(gap.argmin()), (body.name, rigid.name)
                 if -gap[k] > ROUND_OFF * body.mesh.diameter + _interference(scene, names):
-                    raise _overlap(names, -float(gap[k]), points[k])
+                    raise _overlap(names, -float(gap[k]), points[k], body.mesh.diameter)
     for obstacle, touching in finite_obstacles({body.name: body.scene for body in finite}):
         for body, outline in zip(finite, outlines, strict=True):
             _check_obstacle(obstacle, touching, body, outline)
@@ -97,10 +97,9 @@ def _interference(scene: Scene, names: tuple[str, str]) -> float:
     return max((pair.interference for pair in scene.contacts if bodies[pair.name] == set(names)), default=0.0)
 
 
-def _overlap(names: tuple[str, str], depth: float, place: FloatArray) -> OverlapError:
+def _overlap(names: tuple[str, str], depth: float, place: FloatArray, size: float) -> OverlapError:
     one, two = names
     return OverlapError(
-        f"bodies {one!r} and {two!r} overlap by {depth:.4g} at "
-        f"{format_point(place, float(np.abs(place).max()), digits=6)}: move them apart, or "
-        "state a contact with an interference between them"
+        f"bodies {one!r} and {two!r} overlap by {depth:.4g} at {format_point(place, size, digits=6)}: move them apart, "
+        "or state a contact with an interference between them"
     )
