@@ -150,7 +150,9 @@ def violations_at(values: PointsBetween, law: FrictionLaw, stress: float, length
     )
 
 
-def violations_between_nodes(solution: SolvedScene, names: Collection[str] | None = None) -> dict[str, BetweenNodes]:
+def violations_between_nodes(
+    solution: SolvedScene, names: Collection[str] | None = None, known: Mapping[str, BetweenNodes] | None = None
+) -> dict[str, BetweenNodes]:
     """Measure the displacements and tractions of a solution along its contacts.
 
     Parameters
@@ -159,6 +161,8 @@ def violations_between_nodes(solution: SolvedScene, names: Collection[str] | Non
     names : collection of str, optional
         The contacts to measure; by default all. The stress and the length to which violations are relative are those of
         all contacts.
+    known : mapping of str to BetweenNodes, optional
+        Contacts that are measured already.
 
     Returns
     -------
@@ -188,10 +192,10 @@ def violations_between_nodes(solution: SolvedScene, names: Collection[str] | Non
         for body in partners:
             forces[body] += float(contact.weight[rows] @ size[rows])
             stresses[body] = max(stresses[body], float(size[rows].max(initial=0.0)))
-    violations: dict[str, BetweenNodes] = {}
+    violations = dict(known or {})
     moved = {name: float(np.abs(body.boundary.displacement).max()) for name, body in bodies.items()}
     for name, partners, law, measure in stated:
-        if names is not None and name not in names:
+        if name in violations or (names is not None and name not in names):
             continue
         modulus = min(bodies[body].scene.material.plane_modulus for body in partners)
         force, stress = (
@@ -206,7 +210,7 @@ def violations_between_nodes(solution: SolvedScene, names: Collection[str] | Non
                 force / modulus or max(moved[body] for body in partners) or max(moved.values()) or 1.0,
             )
         violations[name] = replace(found, has_forces=force > 0.0)
-    return violations
+    return {name: violations[name] for name, *_ in stated if name in violations}
 
 
 def _at_obstacles(solution: SolvedScene) -> Iterator[MeasuredContact]:

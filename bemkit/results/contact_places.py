@@ -54,12 +54,9 @@ class ContactPlaces:
     Parameters
     ----------
     solution : SolvedScene
-    missed : callable () -> mapping of str to (x, y)
-        Points where contact is missed, by contact; called where ends of zones are asked for.
     """
 
     solution: SolvedScene
-    missed: Callable[[], Mapping[str, tuple[float, float]]]
 
     def sides(self, contact: str) -> list[Side]:
         """Return the sides of elastic bodies in a contact of the table: two, or one at an obstacle.
@@ -86,11 +83,10 @@ class ContactPlaces:
     def elements(self, name: str) -> IntArray:
         """Return the elements of a body that may touch others or obstacles, without those near `singular_points`."""
         mesh, elements = self.solution.bodies[name].mesh, self._touching(name)
-        if not self.singular_points:
-            return elements
-        points, reaches = map(np.array, zip(*self.singular_points, strict=True))
+        points, reaches = self.singular_points
+        around = norms(points - mesh.centre) <= 0.5 * mesh.diameter + reaches
         ends = np.stack([mesh.start[elements], mesh.end[elements]])
-        is_near = norms(ends[:, :, None] - points) < (1.0 - LYING_AT) * reaches
+        is_near = norms(ends[:, :, None] - points[around]) < (1.0 - LYING_AT) * reaches[around]
         return elements[~is_near.any(axis=(0, 2))]
 
     def _touching(self, name: str) -> IntArray:
@@ -100,31 +96,30 @@ class ContactPlaces:
         return np.unique(np.concatenate([np.zeros(0, np.intp), *(body.mesh.part(part) for part in parts)]))
 
     @cached_property
-    def singular_points(self) -> list[tuple[FloatArray, float]]:
-        """Points (2,) at which tractions have no bound, singular corners and edges, and lengths [m] of elements there.
+    def singular_points(self) -> tuple[FloatArray, FloatArray]:
+        """Points (n, 2) at which tractions have no bound, corners and edges, and lengths (n,) [m] of elements there.
 
         They are compared with lengths of whole contacts, which symmetry lines may halve.
 
         Both sides of a contact have the length of the longer elements, since an error of one side is one of the other.
         Points with elements longer than `LARGEST_REACH` are excluded.
         """
-        points = []
+        found: list[tuple[FloatArray, float, float]] = []
         for name, corners in self.corners.items():
             mesh = self.solution.bodies[name].mesh
             n_lines = 0 if mesh.symmetry is None else 2 - (mesh.symmetry.x, mesh.symmetry.y).count(None)
             length = 2.0**n_lines * float(mesh.lengths[self._touching(name)].sum())
             for corner in corners:
                 point = np.array([corner.x, corner.y])
-                points.append((point, _reach(mesh, np.array(corner.elements), point), length))
+                found.append((point, _reach(mesh, np.array(corner.elements), point), length))
         for one, two, point, _ in self._edges:
             reach = max(_reach(side.mesh, side.elements_at(point), point) for side in (one, two))
-            points.append((point, reach, min(one.whole_length, two.whole_length)))
-        long = [point for point, reach, length in points if reach > LARGEST_REACH * length]  # on one of two sides
-        return [
-            (point, reach)
-            for point, reach, length in points
-            if all(np.linalg.norm(point - other) > LYING_AT * length for other in long)
-        ]
+            found.append((point, reach, min(one.whole_length, two.whole_length)))
+        points = np.array([point for point, _, _ in found]).reshape(-1, 2)
+        reaches, lengths = np.array([sizes for _, *sizes in found]).reshape(-1, 2).T
+        long = points[reaches > LARGEST_REACH * lengths]  # on one of two sides
+        is_short = (norms(points[:, None] - long) > LYING_AT * lengths[:, None]).all(axis=1)
+        return points[is_short], reaches[is_short]
 
     @cached_property
     def corners(self) -> Mapping[str, tuple[SingularCorner, ...]]:
@@ -173,16 +168,16 @@ class ContactPlaces:
                 zones.append((table, tuple(each for each in found if not each.is_of_contact)))
         return zones
 
-    @cached_property
-    def zone_ends(self) -> tuple[ZoneEnd, ...]:
-        """Ends of zones of one status on all sides, missed and unresolved contact.
+    def zone_ends(self, missed: Mapping[str, tuple[float, float]]) -> tuple[ZoneEnd, ...]:
+        """Return ends of zones of one status on all sides, and unresolved and missed contacts.
 
-        See `resolved_transitions`, `unresolved_contacts` and `Solution.missed_contacts`.
+        See `resolved_transitions`, `unresolved_contacts` and, for the points (x, y) of the last, by contact,
+        `Solution.missed_contacts`.
         """
         resolved = [each for zones in self._zones for each in resolved_transitions(*unrolled(*zones))]
         places = [(each.part, (each.x, each.y)) for each in resolved]
         table, _ = self.solution.contact.unrolled
-        places += [*unresolved_contacts(table, resolved), *self.missed().items()]
+        places += [*unresolved_contacts(table, resolved), *missed.items()]
         return tuple(side.near(np.array(place)) for name, place in places for side in self.sides(name))
 
     @cached_property

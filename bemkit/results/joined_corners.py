@@ -25,17 +25,23 @@ from bemkit.results.zone_ends import LYING_AT, LYING_ON, Side
 
 
 class _Place(NamedTuple):
-    """A point of a side: the elements that end and start there, twice the same one inside of it, and the angle."""
+    """A point of a side: the elements that end and start there, twice the same one inside of it."""
 
     side: Side
     before: int
     after: int
-    angle: float
+
+    @property
+    def angle(self) -> float:
+        """The angle [rad] of the body there."""
+        if self.before == self.after:
+            return float(np.pi)
+        return round(angle_between(self.side.mesh, self.before, self.after), DIGITS)
 
     def given(self, of_body: GivenSides, touching: int) -> WedgeSide | None:
         """Return the condition beside the touching element, before or after the point; None if it is unknown."""
         element = (self.after, self.before)[touching]
-        if np.isin(element, self.side.mesh.part(self.side.part)):  # the side goes on, past the end of the other one
+        if element in self.side.mesh.part(self.side.part):  # the side goes on, past the end of the other one
             return FREE
         return of_body.at_start(element) if touching == BEFORE else of_body.at_end(element)
 
@@ -72,11 +78,11 @@ def joined_corners(
         end, foot = _end_of(side, point), _foot_of(other, point, LYING_ON * min(one.length, two.length))
         if foot is None or end.before == end.after:
             continue
-        way = AFTER if np.isin(end.after, side.mesh.part(side.part)) else BEFORE  # of the touching element
+        way = AFTER if end.after in side.mesh.part(side.part) else BEFORE  # of the touching element
         touching = (end.before, end.after)[way], (foot.after, foot.before)[way]
         wedges = end.given(given[side.body], way), foot.given(given[other.body], 1 - way)
         contact = touching_side(table, law_at_nodes, side.mesh.centres[touching[0]], every_node)
-        is_on_other = np.isin(touching[1], other.mesh.part(other.part))
+        is_on_other = touching[1] in other.mesh.part(other.part)
         if contact == FREE or not is_on_other or wedges[0] is None or wedges[1] is None:
             continue
         ordered = [
@@ -109,10 +115,9 @@ def _foot_of(side: Side, point: FloatArray, near: float) -> _Place | None:
     if float(np.linalg.norm(mesh.points(np.array([end.element]), places)[0, 0] - point)) > near:
         return None
     if end.distance > LYING_AT * side.length:
-        return _Place(side, end.element, end.element, np.pi)
+        return _Place(side, end.element, end.element)
     return _at_node(side, int(mesh.elements[end.element, int(end.fraction > 0.5)]))
 
 
 def _at_node(side: Side, node: int) -> _Place:
-    before, after = side.mesh.node_elements[node].tolist()
-    return _Place(side, before, after, round(angle_between(side.mesh, before, after), DIGITS))
+    return _Place(side, *side.mesh.node_elements[node].tolist())

@@ -157,7 +157,7 @@ class Solution(SolvedScene, Explorable):
         """Singular corners, edges and ends of zones of the contacts."""
         from bemkit.results.contact_places import ContactPlaces
 
-        return ContactPlaces(self, lambda: self.missed_contacts)
+        return ContactPlaces(self)
 
     @property
     def singular_corners(self) -> tuple[SingularCorner, ...]:
@@ -213,7 +213,7 @@ class Solution(SolvedScene, Explorable):
     @cached_property
     def contacts_between_nodes(self) -> dict[str, BetweenNodes]:
         """Largest violations between the nodes of each contact, by its name in the contact table."""
-        return violations_between_nodes(self)
+        return violations_between_nodes(self, known=self.narrow_contacts_between_nodes)
 
     @cached_property
     def missed_contacts(self) -> dict[str, tuple[float, float]]:
@@ -229,8 +229,6 @@ class Solution(SolvedScene, Explorable):
     def narrow_contacts_between_nodes(self) -> dict[str, BetweenNodes]:
         """Largest violations between the nodes of contacts with a force at a few nodes at most."""
         names = narrow_contacts(self.contact)
-        if "contacts_between_nodes" in vars(self):  # measured already
-            return {name: each for name, each in self.contacts_between_nodes.items() if name in names}
         return violations_between_nodes(self, names) if names else {}
 
     @cached_property

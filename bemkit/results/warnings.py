@@ -126,7 +126,7 @@ def _unbounded_tractions(solution: Solution) -> Iterator[ResultWarning]:
             corners[key] = (corner.exponent - 1.0, length + corners.get(key, (0.0, 0.0))[1])
     for (x, y, names), (power, length) in corners.items():
         bodies = " and ".join(map(repr, names))
-        is_excluded = any(np.array_equal(point, (x, y)) for point, _ in solution.places.singular_points)
+        is_excluded = (solution.places.singular_points[0] == (x, y)).all(axis=1).any()
         excluded = f"The estimated error of tractions excludes {amount(length, 'length', solution.units, 2)} there."
         prefix = f"{'Bodies' if len(names) > 1 else 'Body'} {bodies}: " if names else ""
         yield ResultWarning(

@@ -73,7 +73,8 @@ class DensityMeshes:
 
         Meshes that miss contact have no error.
         """
-        ends = StepErrors.of(solutions[-1]).worst.places.zone_ends
+        worst = StepErrors.of(solutions[-1]).worst
+        ends = worst.places.zone_ends(worst.missed_contacts)
         return is_enough([self.error(each) for each in solutions if not each.unfound_contacts], ends, self.accuracy)
 
     def following(self, level: Level, solutions: Sequence[Solution]) -> Level:

@@ -118,11 +118,12 @@ class Level:
     def members(self, solution: Solution) -> list[Member]:
         """Return the results of a solution on each partition of this level."""
         members, places = [], solution.places
+        zone_ends = places.zone_ends(solution.missed_contacts)
         for number, partition in enumerate(self.partitions):
             names = [name for name, key in self.keys.items() if key == number]
             ends = (
                 tuple(end for end in each if end.body in names)
-                for each in (places.zone_ends, places.facing_ends, places.reversals)
+                for each in (zone_ends, places.facing_ends, places.reversals)
             )
             bodies = tuple(solution.bodies[name] for name in names)
             members.append(Member(partition, bodies, places.elements(names[0]), *ends))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import pickle
 from dataclasses import replace
 from typing import Any
 
@@ -219,3 +220,8 @@ def test_a_contact_beside_a_part_that_faces_nothing_is_no_longer_than_its_part()
     solution = bk.run(scene)
     assert solution.contacts[0].contact_length == pytest.approx(1.0, rel=1e-12)
     assert solution.part_length("floor") == pytest.approx(1.0, rel=1e-12)
+
+
+def test_a_solution_can_be_sent_to_another_process_after_its_summary_was_read(solution: Solution) -> None:
+    summary = solution.summary()
+    assert pickle.loads(pickle.dumps(solution)).summary() == summary

@@ -86,7 +86,7 @@ class Polyline:
         Zero and -1 if no point is deeper than `least`.
         """
         low, high = self.box
-        rows = np.flatnonzero(((points > low) & (points < high)).all(axis=1))
+        rows = np.flatnonzero(((points > low + least) & (points < high - least)).all(axis=1))
         if not rows.size:
             return 0.0, -1
         rows = rows[:: 1 + rows.size // _MOST_POINTS]
