@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, ExitStack, nullcontext
 from functools import partial, wraps
 from pathlib import Path
@@ -262,18 +262,10 @@ class StudyProgress(ExitStack):
         self.enter_context(shown_progress(quiet))
 
     def compute(
-        self,
-        tasks: Sequence[Task[R]],
-        name: str,
-        *,
-        processes: int = 1,
-        cluster: str | None = None,
-        finished: Mapping[Hashable, R] | None = None,
+        self, tasks: Sequence[Task[R]], name: str, *, processes: int = 1, cluster: str | None = None
     ) -> Iterator[R]:
         """Return records as they are ready; see `bemkit.cli.progress.compute_with_progress`."""
         from bemkit.cli.progress import compute_with_progress
 
         self.close()  # its bar takes the place of the first
-        return compute_with_progress(
-            tasks, name, is_live=self._is_live, processes=processes, cluster=cluster, finished=finished
-        )
+        return compute_with_progress(tasks, name, is_live=self._is_live, processes=processes, cluster=cluster)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
@@ -63,7 +63,6 @@ def compute_with_progress(
     is_live: bool,
     processes: int = 1,
     cluster: str | None = None,
-    finished: Mapping[Hashable, R] | None = None,
     console: Console | None = None,
 ) -> Iterator[R]:
     """Compute records as `bemkit.studies.engine.compute` does, while a bar, by default on standard error, shows it.
@@ -84,7 +83,7 @@ def compute_with_progress(
         def begins(task: Job[R]) -> None:
             bar.update(row, description=task.label)
 
-        for record in compute(tasks, executor, finished=finished, begins=begins, n_workers=n_workers):
+        for record in compute(tasks, executor, begins=begins, n_workers=n_workers):
             bar.advance(row)
             yield record
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Container, Iterator, Sequence
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -60,11 +60,13 @@ def stability(
         reserve(outputs.check(FILE.check(rows)))
         shows_tables = not quiet and not outputs.uses_stdout
         labels = {"scene": scene_to_toml(chosen) if rows else ""}
-        finished = FILE.finished(rows, labels)
 
         def run_axis(axis: Axis, tasks: Sequence[Task[StabilityRecord]]) -> list[StabilityRecord]:
-            computed = progress.compute(tasks, axis.name, finished=finished)
-            records = list(FILE.keep(rows, computed, finished, labels))
+            def computed(finished: Container[object]) -> Iterator[StabilityRecord]:
+                return progress.compute([task for task in tasks if task.key not in finished], axis.name)
+
+            by_key = FILE.completed(rows, labels, computed)
+            records = [by_key[task.key] for task in tasks]
             if shows_tables:
                 print_axis(axis, records)
             return records

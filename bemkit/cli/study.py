@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Container, Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -92,6 +92,14 @@ def errors(
         def figures(records: Sequence[ErrorRecord]) -> dict[str, Figure]:
             return {FIGURE: draw_errors(records, shown, title=problem.title)}
 
+        def computed(finished: Container[object]) -> Iterator[ErrorRecord]:
+            reference = asked.reference(problem)
+            tasks = error_tasks([run for run in runs if run.key not in finished], reference, asked.repeat)
+            records = progress.compute(tasks, "error study", processes=jobs)
+            if shows_tables:
+                print_reference(problem.title, reference)
+            return records
+
         rows, table = study_output(output, table_of)
         texts = table, csv_of(csv_file, table_of)
         # sharp at the width of a page, and a small file
@@ -101,14 +109,7 @@ def errors(
         runs = asked.runs(problem)
         shows_tables = not quiet and not outputs.uses_stdout
         with concerning(scene):
-            labels = asked.labels(problem)
-            finished = FILE.finished(rows, labels)
-            reference = asked.reference(problem)
-            tasks = error_tasks(runs, reference, asked.repeat)
-            computed = progress.compute(tasks, "error study", processes=jobs, finished=finished)
-            if shows_tables:
-                print_reference(problem.title, reference)
-            by_key = {record.key: record for record in FILE.keep(rows, computed, finished, labels)}
+            by_key = FILE.completed(rows, asked.labels(problem), computed)
             records = [by_key[run.key] for run in runs]
             if shows_tables:
                 print_study(records, shown)

@@ -1,11 +1,11 @@
-"""The engine of all studies: tasks computed here or in other processes, kept as they finish, shown and written."""
+"""The engine of all studies: tasks computed here or in other processes."""
 
 from __future__ import annotations
 
 import os
 import signal
 import time
-from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, ProcessPoolExecutor, wait
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -89,7 +89,6 @@ def compute(
     tasks: Sequence[Task[R]],
     executor: Executor | None = None,
     *,
-    finished: Mapping[Hashable, R] | None = None,
     begins: Callable[[Task[R]], None] | None = None,
     n_workers: int = 1,
 ) -> Iterator[R]:
@@ -100,8 +99,6 @@ def compute(
     tasks : sequence of Task
     executor : Executor, optional
         Such as a `ProcessPoolExecutor` or that of a `distributed` client; by default tasks are computed here, in turn.
-    finished : mapping of keys to records, optional
-        Of an earlier study; they are handed on instead of computed again.
     begins : callable, optional
         Called with each task before it is computed here.
     n_workers : int
@@ -110,22 +107,20 @@ def compute(
     Yields
     ------
     record
-        In the order of the tasks; from an executor finished ones first, the others as they are ready.
+        In the order of the tasks; from an executor as they are ready.
 
     Raises
     ------
     StudyError
         If the executor breaks down, or a task cannot be sent to another process.
     """
-    finished = {} if finished is None else finished
     if executor is not None:
-        yield from (finished[task.key] for task in tasks if task.key in finished)
-        yield from _computed_elsewhere([task for task in tasks if task.key not in finished], executor, n_workers)
+        yield from _computed_elsewhere(tasks, executor, n_workers)
         return
     for task in tasks:
-        if task.key not in finished and begins is not None:
+        if begins is not None:
             begins(task)
-        yield finished[task.key] if task.key in finished else task.compute()
+        yield task.compute()
 
 
 @contextmanager

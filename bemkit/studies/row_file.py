@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Hashable, Iterator, Mapping
+from collections.abc import Callable, Hashable, Iterable, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, Generic, Protocol, TypeVar
 
 from bemkit.atomic_files import OutputFileError, check_target
@@ -105,24 +106,30 @@ class RowFile(Generic[R]):
                 raise RowFileError(f"{path}: holds a study {what}: choose another name or delete it first")
         return {row.key: row for row in rows}
 
-    def keep(
-        self, path: str | Path | None, rows: Iterator[R], finished: dict[Hashable, R], labels: Mapping[str, str]
-    ) -> Iterator[R]:
-        """Pass rows on after adding the new ones to the finished ones and to the file, if any.
+    def completed(
+        self,
+        path: str | Path | None,
+        labels: Mapping[str, str],
+        compute: Callable[[Mapping[Hashable, R]], Iterable[R]],
+    ) -> dict[Hashable, R]:
+        """Return the rows of a study by their keys: the finished ones and the others, each in the file once it exists.
+
+        `compute` takes the finished rows and yields the others.
 
         Raises
         ------
         OutputFileError
             If the file cannot be written.
+        RowFileError
+            As `finished` does.
         """
-        is_begun = False
-        for row in rows:
-            if row.key not in finished:
-                finished[row.key] = row
-                if path is not None:
-                    self._append(Path(path), row, labels, is_begun=is_begun)
-                    is_begun = True
-            yield row
+        rows, is_begun = self.finished(path, labels), False
+        for row in compute(MappingProxyType(rows)):
+            rows[row.key] = row
+            if path is not None:
+                self._append(Path(path), row, labels, is_begun=is_begun)
+                is_begun = True
+        return rows
 
     def _append(self, path: Path, row: R, labels: Mapping[str, str], *, is_begun: bool) -> None:
         """Add a row; the first one follows the header of a new file, or the last whole line of an old one."""

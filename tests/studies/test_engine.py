@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from functools import partial
@@ -52,64 +52,73 @@ def tasks(*numbers: int) -> list[Task[Square]]:
     return [Task(number, f"square of {number}", partial(square, number)) for number in numbers]
 
 
+def missing(*numbers: int) -> Callable[[Mapping[Hashable, Square]], Iterator[Square]]:
+    """Return what computes those of the numbers that are not finished."""
+    return lambda finished: compute([task for task in tasks(*numbers) if task.key not in finished])
+
+
 def as_text(records: Sequence[Square]) -> str:
     return "".join(f"{record.value}\n" for record in records)
 
 
-def test_records_come_in_order_and_finished_ones_are_handed_on() -> None:
-    kept = Square(2, -1.0, "kept")
+def test_records_come_in_order() -> None:
     begun: list[str] = []
-    finished = {2: kept}
-    records = list(compute(tasks(1, 2, 3), finished=finished, begins=lambda task: begun.append(task.label)))
-    assert records == [Square(1, 1.0), kept, Square(3, 9.0)]
+    records = list(compute(tasks(1, 3), begins=lambda task: begun.append(task.label)))
+    assert records == [Square(1, 1.0), Square(3, 9.0)]
     assert begun == ["square of 1", "square of 3"]
     with ThreadPoolExecutor(2) as executor:
-        first, *others = compute(tasks(1, 2, 3), executor, finished=finished)
-    assert first is kept
-    assert {record.key for record in others} == {1, 3}
+        assert {record.key for record in compute(tasks(1, 3), executor)} == {1, 3}
+
+
+def test_without_a_file_all_records_are_computed() -> None:
+    assert FILE.completed(None, LABELS, missing(1, 2)) == {1: Square(1, 1.0), 2: Square(2, 4.0)}
 
 
 def test_every_record_is_in_the_file_before_the_next_is_computed(tmp_path: Path) -> None:
     path = tmp_path / "squares.jsonl"
     assert FILE.check(str(path)) == [path]
     with pytest.raises(ValueError, match="no such number"):
-        list(FILE.keep(path, compute(tasks(1, 2, -1, 3)), FILE.finished(path, LABELS), LABELS))
+        FILE.completed(path, LABELS, missing(1, 2, -1, 3))
     finished = FILE.finished(path, LABELS)
     assert list(finished.values()) == [Square(1, 1.0), Square(2, 4.0)]
     content = path.read_bytes()
-    assert list(FILE.keep(path, compute(tasks(2), finished=finished), finished, LABELS)) == [Square(2, 4.0)]
+    assert FILE.completed(path, LABELS, missing(2)) == finished
     assert path.read_bytes() == content  # nothing new, nothing written
-    list(FILE.keep(path, compute(tasks(3), finished=finished), finished, LABELS))
+    assert FILE.completed(path, LABELS, missing(3)) == finished | {3: Square(3, 9.0)}
     assert [record.key for record in FILE.read(path)[1]] == [1, 2, 3]
     with pytest.raises(RowFileError, match="holds a study with title squares, not cubes: choose another name"):
         FILE.finished(path, {"title": "cubes"})
 
 
 def test_a_row_is_appended_and_what_was_there_stays(tmp_path: Path) -> None:
-    path, content = tmp_path / "squares.jsonl", ""
-    for record in FILE.keep(path, compute(tasks(*range(50))), {}, LABELS):
-        assert FILE.read(path)[1][-1] == record
-        assert path.read_text().startswith(content)
-        content = path.read_text()
+    path = tmp_path / "squares.jsonl"
+
+    def seen(finished: Mapping[Hashable, Square]) -> Iterator[Square]:
+        content = ""
+        for record in missing(*range(50))(finished):
+            yield record
+            assert FILE.read(path)[1][-1] == record
+            assert path.read_text().startswith(content)
+            content = path.read_text()
+
+    assert len(FILE.completed(path, LABELS, seen)) == 50
     assert [each.name for each in tmp_path.iterdir()] == ["squares.jsonl"]
 
 
 def test_a_killed_study_resumes_after_its_last_whole_line(tmp_path: Path) -> None:
     path = tmp_path / "squares.jsonl"
-    list(FILE.keep(path, compute(tasks(1, 2, 3, 4)), {}, LABELS))
+    FILE.completed(path, LABELS, missing(1, 2, 3, 4))
     path.write_bytes(path.read_bytes()[:-3])
-    finished = FILE.finished(path, LABELS)
-    assert list(finished) == [1, 2, 3]
-    list(FILE.keep(path, compute(tasks(3, 4, 5), finished=finished), finished, LABELS))
+    assert list(FILE.finished(path, LABELS)) == [1, 2, 3]
+    FILE.completed(path, LABELS, missing(3, 4, 5))
     assert [record.key for record in FILE.read(path)[1]] == [1, 2, 3, 4, 5]
 
 
 def test_rows_are_kept_in_files_that_say_so(tmp_path: Path) -> None:
     with pytest.raises(OutputFileError, match=r"squares\.h5: rows are kept as JSON Lines: give a name that ends in"):
         FILE.check(tmp_path / "squares.h5")
-    (tmp_path / "squares.jsonl").mkdir()
-    with pytest.raises(OutputFileError, match=r"squares\.jsonl: cannot be written \(Is a directory\): choose another"):
-        list(FILE.keep(tmp_path / "squares.jsonl", iter([square(1)]), {}, LABELS))
+    with pytest.raises(OutputFileError, match=r"squares\.jsonl: cannot be written \(No such file or directory\)"):
+        FILE.completed(tmp_path / "missing" / "squares.jsonl", LABELS, missing(1))
 
 
 def as_table(records: Sequence[Square]) -> Table:
@@ -140,7 +149,7 @@ def test_a_long_bundle_hands_back_what_is_finished(monkeypatch: pytest.MonkeyPat
     has_arrived = Event()
 
     def slow(number: int) -> Square:
-        time.sleep(0.05 * number)  # longer than four times the first one
+        time.sleep(0.2 * number)  # longer than four times the first one
         return Square(number, 0.0)
 
     def last() -> Square:

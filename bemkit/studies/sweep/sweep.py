@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Container, Iterable, Mapping, Sequence
 from concurrent.futures import Executor
 from functools import partial
 from os import cpu_count
 from pathlib import Path
-from typing import Protocol
 
 from bemkit.atomic_files import reserved
 from bemkit.errors import BemkitError
@@ -25,11 +24,8 @@ from bemkit.studies.sweep.table import Sweep
 Values = tuple[float, ...]
 
 
-class Compute(Protocol):
-    """Computes the rows of tasks; see `bemkit.studies.engine.compute`."""
-
-    def __call__(self, tasks: Sequence[Task[SweepRow]], *, finished: Mapping[object, SweepRow]) -> Iterator[SweepRow]:
-        """Yield the rows as they are ready."""
+Compute = Callable[[Sequence[Task[SweepRow]]], Iterable[SweepRow]]
+"""Computes the rows of tasks, such as `bemkit.studies.engine.compute`."""
 
 
 def sweep(
@@ -93,9 +89,9 @@ def run_sweep(
     names = tuple(key.text for key in keys)
     labels = {"scene": text, "keys": json.dumps(names), "starts": "cold" if cold else "near"}
     with reserved(FILE.check(file)):
-        finished = FILE.finished(file, labels)
-        tasks = sweep_tasks(scene, keys, grid, finished=finished, cold=cold)
-        by_key = {row.key: row for row in FILE.keep(file, compute(tasks, finished=finished), finished, labels)}
+        by_key = FILE.completed(
+            file, labels, lambda finished: compute(sweep_tasks(scene, keys, grid, finished=finished, cold=cold))
+        )
     return Sweep(scene, names, tuple(by_key[values] for values in grid))
 
 
@@ -104,10 +100,10 @@ def sweep_tasks(
     keys: Sequence[SweepKey],
     grid: Sequence[Values],
     *,
-    finished: Collection[object] = (),
+    finished: Container[object] = (),
     cold: bool = False,
 ) -> tuple[Task[SweepRow], ...]:
-    """Return a task for each row, those that share their bodies one after the other.
+    """Return a task for each row that is not finished, those that share their bodies one after the other.
 
     Raises
     ------
@@ -135,13 +131,14 @@ def sweep_tasks(
         if len(rows) > 1 and shared[0].mesh.accuracy is None:
             body = SharedBody(shared, starts_cold=cold)
         left = [values for values in rows if values not in finished]
-        for values in rows:
+        for values in left:
             solve = partial(run if body is None else body.run, scenes[values])
-            done = body.release if body is not None and left and values == left[-1] else None
+            done = body.release if body is not None and values == left[-1] else None
             tasks.append(Task(values, _label(keys, values), partial(_solved_row, values, solve, done), of_body))
     for values, reason in refused.items():
-        row = partial(row_of, values, Attempt(None, str(reason), 0.0))
-        tasks.append(Task(values, _label(keys, values), row))
+        if values not in finished:
+            row = partial(row_of, values, Attempt(None, str(reason), 0.0))
+            tasks.append(Task(values, _label(keys, values), row))
     return tuple(tasks)
 
 

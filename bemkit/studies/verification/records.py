@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Hashable, Mapping
 from dataclasses import dataclass
 
 from bemkit.studies.row_file import RowFile
@@ -148,13 +148,12 @@ class Verification:
         return json_text(content)
 
 
-def rows_of(cases: dict[str, Case], records: Sequence[VerificationRecord]) -> tuple[VerifiedRow, ...]:
-    """Return the rows of some cases, in their order."""
-    by_key = {record.key: record for record in records}
+def rows_of(cases: dict[str, Case], records: Mapping[Hashable, VerificationRecord]) -> tuple[VerifiedRow, ...]:
+    """Return the rows of some cases, in their order, of records by their keys."""
 
     def of(name: str, case: Case, quantity: Quantity) -> VerifiedRow:
         keys = ((name, quantity.name, resolution) for resolution in case.resolutions)
-        return VerifiedRow(name, case, quantity, tuple(by_key[key] for key in keys if key in by_key))
+        return VerifiedRow(name, case, quantity, tuple(records[key] for key in keys if key in records))
 
     return tuple(of(name, case, quantity) for name, case in cases.items() for quantity in case.quantities)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from functools import partial
@@ -68,19 +68,19 @@ def verify(
         If the file cannot be written or read, or is of another version of bemkit.
     """
     chosen = {name: cases[name]() for name in selected(names, tuple(cases))}
-    finished = FILE.finished(file, LABELS)
-    tasks, wanted = [], set[Hashable]()
+    keys: dict[Task[Comparison], set[Hashable]] = {}
     for name, case in chosen.items():
         for resolution in case.resolutions[: case.n_quick if quick else None]:
-            keys = {(name, quantity.name, resolution) for quantity in case.quantities}
-            wanted |= keys
-            if not keys <= finished.keys():
-                label = f"{name}, {resolution:g}"
-                tasks.append(Task((name, resolution), label, partial(compare, name, case, resolution)))
-    records = [record for key, record in finished.items() if key in wanted]
-    computed = (record for comparison in run(tasks) for record in comparison.records)
-    records += FILE.keep(file, computed, finished, LABELS)
-    return Verification(rows_of(chosen, records))
+            task = Task((name, resolution), f"{name}, {resolution:g}", partial(compare, name, case, resolution))
+            keys[task] = {(name, quantity.name, resolution) for quantity in case.quantities}
+
+    def computed(finished: Mapping[Hashable, VerificationRecord]) -> Iterator[VerificationRecord]:
+        comparisons = run([task for task in keys if not keys[task] <= finished.keys()])
+        return (record for comparison in comparisons for record in comparison.records if record.key not in finished)
+
+    wanted = set[Hashable]().union(*keys.values())
+    records = FILE.completed(file, LABELS, computed)
+    return Verification(rows_of(chosen, {key: record for key, record in records.items() if key in wanted}))
 
 
 def selected(names: Sequence[str], known: tuple[str, ...]) -> tuple[str, ...]:

@@ -97,7 +97,7 @@ def test_changed_settings_and_other_scenes_are_not_mixed(
 ) -> None:
     path = tmp_path / "rows.jsonl"
     labels = {"scene": bk.scene_to_toml(bk.load_scene("paper-1")), "reference": "known", "grading": "exponent 3"}
-    list(FILE.keep(path, iter([row()]), {}, labels | {"budget": "500 elements", "repetitions": "1"}))
+    FILE.completed(path, labels | {"budget": "500 elements", "repetitions": "1"}, lambda finished: [row()])
     content = path.read_bytes()
     assert message in str(call(*FAST, "-o", path, *arguments).exception)
     other = call("study", "paper-2", *FAST[2:], "-o", path)
@@ -184,7 +184,7 @@ def test_without_matplotlib_there_is_no_figure(without: Callable[..., None], tmp
 def test_a_label_that_is_missing_is_noticed(tmp_path: Path) -> None:
     path = tmp_path / "rows.jsonl"
     labels, rows = dict.fromkeys(FILE.labels, "x"), (row(), row(size=80.0, message="a \u00fc"))
-    list(FILE.keep(path, iter(rows), {}, labels))
+    FILE.completed(path, labels, lambda finished: rows)
     assert repr(FILE.read(path)) == repr((labels, rows))
     path.write_text(path.read_text().replace('"grading": "x", ', ""))
     with pytest.raises(
@@ -216,7 +216,8 @@ def test_progress_goes_to_standard_error(capsys: pytest.CaptureFixture[str]) -> 
     shown = capsys.readouterr()
     assert shown.out == ""
     assert "linear, uniform 20, semismooth-newton" in shown.err
-    list(compute_with_progress(tasks, "error study", is_live=False, finished={computed.key: computed}))
+    assert computed.key == tasks[0].key
+    list(compute_with_progress([], "error study", is_live=False))
     assert capsys.readouterr() == ("", "")
 
 

@@ -51,17 +51,16 @@ def test_a_killed_study_keeps_its_rows_and_goes_on_where_it_stopped(tmp_path: Pa
 def test_a_last_line_that_was_cut_off_is_computed_again(tmp_path: Path, cut: int) -> None:
     path, labels = tmp_path / "rows.jsonl", dict.fromkeys(FILE.labels, "x")
     rows = [row(size=float(n)) for n in range(4)]
-    list(FILE.keep(path, iter(rows), {}, labels))
+    FILE.completed(path, labels, lambda finished: rows)
     path.write_bytes(path.read_bytes()[:-cut])
-    finished = FILE.finished(path, labels)
-    assert [record.size for record in finished.values()] == [0.0, 1.0, 2.0]
-    list(FILE.keep(path, iter(rows[3:]), finished, labels))
+    assert [record.size for record in FILE.finished(path, labels).values()] == [0.0, 1.0, 2.0]
+    FILE.completed(path, labels, lambda finished: [each for each in rows if each.key not in finished])
     assert [record.size for record in FILE.read(path)[1]] == [0.0, 1.0, 2.0, 3.0]
 
 
 def test_a_damaged_line_and_a_foreign_file_are_refused(tmp_path: Path) -> None:
     path = tmp_path / "rows.jsonl"
-    list(FILE.keep(path, iter([row(), row(size=80.0)]), {}, dict.fromkeys(FILE.labels, "x")))
+    FILE.completed(path, dict.fromkeys(FILE.labels, "x"), lambda finished: [row(), row(size=80.0)])
     content = path.read_text()
     for damaged in ("my thesis\n", content.replace('"meshes"', '"mashes"'), content.replace("{", "[", 2), ""):
         path.write_text(damaged)

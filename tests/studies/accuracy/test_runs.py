@@ -17,7 +17,7 @@ import bemkit as bk
 from bemkit.reference import MEASURES, Reference, find_reference, over_resolved
 from bemkit.studies.accuracy.records import STAGES, ErrorRecord, by_series, fitted_order
 from bemkit.studies.accuracy.runs import Run, adaptive, all_runs, error_tasks, graded, uniform
-from bemkit.studies.engine import StudyError, Task, compute
+from bemkit.studies.engine import StudyError, compute
 
 LINEAR, QUADRATIC, CONSTANT = bk.Galerkin(1), bk.Galerkin(2), bk.ConstantCollocation()
 NEWTON, AUGMENTED = bk.SemismoothNewton(), bk.AugmentedLagrangian()
@@ -107,15 +107,9 @@ def test_an_accuracy_out_of_reach_shows_what_was_reached() -> None:
     assert far.energy < 1e-4
 
 
-def test_finished_rows_are_handed_on() -> None:
+def test_tasks_have_labels_and_repetitions() -> None:
     runs = paper_runs(uniform((20, 40)))
-    tasks = error_tasks(runs, reference(), 1)
-    begun: list[Task[ErrorRecord]] = []
-    first = next(compute(tasks))
-    rows = list(compute(tasks, finished={first.key: first}, begins=begun.append))
-    assert rows[0] is first
-    assert begun == [tasks[1]]
-    assert begun[0].label == "linear, uniform 40, semismooth-newton"
+    assert [task.label for task in error_tasks(runs, reference(), 1)][1] == "linear, uniform 40, semismooth-newton"
     with pytest.raises(StudyError, match="repeat is 0: give at least one"):
         error_tasks(runs, reference(), 0)
 
@@ -124,12 +118,10 @@ def test_finished_rows_are_handed_on() -> None:
 def test_an_executor_finds_the_same_errors_without_times() -> None:
     runs = paper_runs(uniform((20, 40)), elements=(CONSTANT, LINEAR))
     timed = {row.key: row for row in compute(error_tasks(runs, reference(), 1))}
-    kept = timed[runs[0].key]
     with ThreadPoolExecutor(2) as executor:
-        rows = list(compute(error_tasks(runs, reference()), executor, finished={kept.key: kept}))
-    assert rows[0] is kept
+        rows = list(compute(error_tasks(runs, reference()), executor))
     assert {row.key for row in rows} == set(timed)
-    for row in rows[1:]:
+    for row in rows:
         assert math.isnan(row.seconds)
         assert math.isnan(row.peak_memory)
         assert [getattr(row, name) for name in MEASURES] == [getattr(timed[row.key], name) for name in MEASURES]

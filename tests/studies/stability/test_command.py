@@ -61,7 +61,9 @@ def test_a_wrong_row_shows_in_the_exit_code(swept: bytes, tmp_path: Path) -> Non
     path.write_bytes(swept)
     labels, (first, *others) = FILE.read(path)
     path.unlink()
-    list(FILE.keep(path, iter([replace(first, verdict="wrong", message="the check finds 1.0"), *others]), {}, labels))
+    FILE.completed(
+        path, labels, lambda finished: [replace(first, verdict="wrong", message="the check finds 1.0"), *others]
+    )
     result = call(*FAST, "-o", path)
     assert result.return_value == 1
     assert "the check finds 1.0" in result.output

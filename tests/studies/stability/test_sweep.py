@@ -5,14 +5,12 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Callable
-from functools import partial
 
 import numpy as np
 import pytest
 
 import bemkit as bk
 from bemkit.scene.toml import load_scene, with_overrides
-from bemkit.studies.engine import Task, compute
 from bemkit.studies.stability.axes import Axis, UnknownAxisError, axes_of, find_axes
 from bemkit.studies.stability.case import Case
 from bemkit.studies.stability.records import StabilityRecord, Verdict
@@ -182,17 +180,6 @@ def test_a_load_history_is_no_baseline() -> None:
         StabilityError, match="the scene has 32 load steps, but a sweep solves one: give it a single load"
     ):
         list(sweep(bk.load_scene("friction-loop"), find_axes(["load"])))
-
-
-def test_finished_rows_are_handed_on_and_not_computed(monkeypatch: pytest.MonkeyPatch) -> None:
-    axis = dataclasses.replace(shortened("friction"), values=(0.1, 0.2))
-    row = StabilityRecord("friction", 0.1, "right", "converged", 1, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, "")
-    begun: list[Task[StabilityRecord]] = []
-    run = partial(compute, finished={row.key: row}, begins=begun.append)
-    rows = list(sweep(small_paper_scene(1), [axis], lambda _, tasks: run(tasks)))
-    assert rows[0] is row
-    assert [task.label for task in begun] == ["friction 0.2"]
-    assert rows[1].verdict == "right"
 
 
 def test_differences_on_other_meshes_are_means_and_see_missing_parts() -> None:

@@ -124,7 +124,7 @@ def test_what_is_in_the_file_is_not_computed_again(tmp_path: Path) -> None:
     ]
     assert second.rows[0].errors == first.rows[0].errors
     old = tmp_path / "old.jsonl"
-    list(FILE.keep(old, (record for row in first.rows for record in row.records), {}, {"version": "0.0"}))
+    FILE.completed(old, {"version": "0.0"}, lambda finished: (record for row in first.rows for record in row.records))
     with pytest.raises(RowFileError, match="holds a study with version"):
         verify(["kirsch-hole"], file=old)
 
