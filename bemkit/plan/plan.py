@@ -133,6 +133,7 @@ def plan_steps(steps: Sequence[Prepared], proposal: Symmetry | None = None) -> P
         items = tuple(items_of_several(first, sizes, len(steps), is_dense=contact.is_dense))
     thinness = [warning for body in drawn for warning in first.thinness_warnings(body)]
     of_profiles = [warning for body in drawn for warning in _profile_warnings(body.scene)]
+    of_contacts = [*map(_too_short, first.unresolved), *_mixed_planes(first)]
     return Plan(
         linear_solver=linear_solver.solver,
         sizes=sizes,
@@ -140,7 +141,7 @@ def plan_steps(steps: Sequence[Prepared], proposal: Symmetry | None = None) -> P
         memory=int(kept + max(contact.memory, *(each.memory - each.kept for each in costs))),
         seconds=seconds + sum(each.seconds for each in costs),
         items=items,
-        warnings=first_of_each_kind(dict.fromkeys([*thinness, *of_profiles, *map(_too_short, first.unresolved)])),
+        warnings=first_of_each_kind(dict.fromkeys([*thinness, *of_profiles, *of_contacts])),
         is_compressed=linear_solver.hierarchical is not None,
     )
 
@@ -151,6 +152,16 @@ def _too_short(contact: str) -> ResultWarning:
         "bodies so that these sides share more or nothing."
     )
     return ResultWarning("contact too short", contact, text)
+
+
+def _mixed_planes(prepared: Prepared) -> Iterator[ResultWarning]:
+    """Warn of contacts between a body in plane stress and one in plane strain."""
+    for rows in prepared.rows:
+        pair = [prepared.bodies[number] for number in (rows.body, rows.other) if 0 <= number < len(prepared.bodies)]
+        if len({body.material.plane for body in pair}) > 1:
+            states = " and ".join(f"{body.title} in plane {body.material.plane.value}" for body in pair)
+            text = f"Contact {rows.name!r} joins {states}: give both materials the same plane state."
+            yield ResultWarning("mixed plane states", rows.name, text)
 
 
 def _profile_warnings(scene: BodyScene) -> Iterator[ResultWarning]:

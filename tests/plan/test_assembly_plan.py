@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import bemkit as bk
 from bemkit.contact.joined.sparse_form import sparse_solver_name
 from bemkit.model.prepared import prepare
@@ -28,3 +30,21 @@ def test_contacts_that_the_mesh_does_not_resolve_are_skipped_with_a_warning():
     assert [rows.name for rows in prepared.rows] == ["left.right / right.left", "left.top / upper.bottom"]
     (warning,) = plan_steps([prepared]).warnings
     assert "'right.top / upper.bottom' is shorter than a hundredth of its elements and skipped" in warning.text
+
+
+def test_plane_stress_on_plane_strain_is_a_warning():
+    block, steel = bk.Rectangle(1.0, 1.0), bk.Material(1.0, 0.3)
+    base = bk.Part("base", bk.Clamped(), ("bottom",))
+    lower = bk.Body(name="lower", shape=block, material=steel, parts=(base,))
+    upper = bk.Body(name="upper", shape=block, material=steel, placement=bk.Placement((0.0, 1.0)))
+    scene = bk.Scene(
+        title="Blocks",
+        bodies=(lower, upper),
+        contacts=(bk.ContactPair(("upper.bottom", "lower.top")),),
+        mesh=bk.MeshOptions(elements=16),
+    )
+    assert not make_plan(scene).warnings
+    plate = replace(upper, material=replace(steel, plane=bk.Plane.STRESS))
+    (warning,) = make_plan(replace(scene, bodies=(lower, plate))).warnings
+    assert "body 'lower' in plane strain" in warning.text
+    assert "body 'upper' in plane stress" in warning.text
