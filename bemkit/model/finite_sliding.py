@@ -30,6 +30,8 @@ _LEAST_COSINE = 0.866
 """Cosine of the angle by which a direction of contact may turn: 30 degrees."""
 _LEAST_FACING = 0.5
 """Cosine of 60 degrees between the normal of a body and the direction of contact, below which contact is oblique."""
+_BESIDE = 0.01
+"""Share of an unknown motion within which a node lies at either side of a corner."""
 _SHARE_OF_ZONE = 0.05
 """Largest motion that is longer than an element, relative to the length of contact."""
 
@@ -120,8 +122,9 @@ def _is_off_obstacle(
     along = np.sum(relative * tangents, axis=1)[:, None]
     turned_normals = placement.turned_back(normals)
     is_off = np.ones(rows.n_contact, bool)
-    for unknown in (0.0, short):
-        moved = relative - np.clip(along, -unknown, unknown) * tangents
+    # a node that meets a corner of the obstacle may also lie beside it
+    for unknown, beside in ((0.0, 0.0), (short, 0.0), (short, _BESIDE * short), (short, -_BESIDE * short)):
+        moved = relative - (np.clip(along, -unknown, unknown) + beside) * tangents
         # the rigid body moves back to its place, and takes the points along
         back = centre + placement.back(points + moved + carried - centre)
         followed, direction = obstacle.gap(back, turned_normals), obstacle.approach(back, turned_normals)

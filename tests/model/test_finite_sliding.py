@@ -95,6 +95,16 @@ def test_a_punch_is_dragged_so_far_that_its_corners_are_at_other_elements(law: b
     assert bk.run(pressed(square(0.0), law, x=0.03, y=y)).is_converged
 
 
+@pytest.mark.parametrize("law", slow_only([bk.Frictionless(), bk.Coulomb(0.3)], bk.Frictionless()))
+@pytest.mark.parametrize("moment", [7e-7, -7.9e-7])
+def test_a_punch_turns_about_a_corner_that_meets_a_node(law: bk.FrictionLaw, moment: float) -> None:
+    """Turned, the corner lies beside the node by round-off; the distance of nodes does not resolve more than that."""
+    punch = replace(pressed(square(0.0), law, force_y=-1e-6, moment=moment), mesh=bk.MeshOptions(elements=110))
+    solution = bk.run(punch)
+    assert np.isclose(np.abs(solution.contact.points[:, 0]), 0.8, rtol=1e-12).any()
+    assert solution.is_converged, solution.message
+
+
 def test_a_side_that_ends_outside_of_the_body_moves_along_itself_without_limit() -> None:
     """The same long box as a punch, and as a floor below the block."""
     box = bk.RigidPolygon(((-5.0, 0.0), (5.0, 0.0), (5.0, 1.0), (-5.0, 1.0)))
