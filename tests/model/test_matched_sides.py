@@ -137,20 +137,30 @@ def test_constant_elements_carry_the_pressure_of_a_stiff_disc_in_a_soft_ring(
     np.testing.assert_allclose(solution.contact.sigma_n, -pressure, rtol=1e-2)  # 1.0 without either
 
 
-@pytest.mark.parametrize("upper_elements", [bk.ConstantCollocation(), bk.Galerkin(1)])
-def test_longer_constant_elements_carry_the_pressure_of_shorter_ones(upper_elements: Discretisation) -> None:
+@pytest.mark.parametrize(
+    ("upper_elements", "n_above", "mesh_below"),
+    [
+        (bk.ConstantCollocation(), 120, bk.MeshOptions(60)),
+        (bk.Galerkin(1), 120, bk.MeshOptions(60)),
+        # longer than those above in the middle, where contact is, but not in the mean
+        (bk.ConstantCollocation(), 60, bk.MeshOptions(120, grading=bk.Algebraic(3.0))),
+    ],
+)
+def test_longer_constant_elements_carry_the_pressure_of_shorter_ones(
+    upper_elements: Discretisation, n_above: int, mesh_below: bk.MeshOptions
+) -> None:
     """A block on a wider one, against quadratic elements; multipliers of the shorter elements are wrong by 30 %."""
     load = bk.Part("load", bk.Pressure(bk.Expression("1e-3 * (1 + 0.5 * x)")), ("top",))
     base = bk.Part("base", bk.Clamped(), ("bottom",))
 
-    def pressed(above: Discretisation, below: Discretisation, n_below: int) -> ContactTable:
+    def pressed(above: Discretisation, below: Discretisation, n_above: int, mesh_below: bk.MeshOptions) -> ContactTable:
         upper = bk.Body(
             name="upper",
             shape=bk.Rectangle(2.0, 1.0, (-1.0, 0.0)),
             material=MATERIAL,
             parts=(load,),
             discretisation=above,
-            mesh=bk.MeshOptions(120),
+            mesh=bk.MeshOptions(n_above),
         )
         lower = bk.Body(
             name="lower",
@@ -158,13 +168,13 @@ def test_longer_constant_elements_carry_the_pressure_of_shorter_ones(upper_eleme
             material=MATERIAL,
             parts=(base,),
             discretisation=below,
-            mesh=bk.MeshOptions(n_below),
+            mesh=mesh_below,
         )
         contact = bk.ContactPair(("upper.bottom", "lower.top"))
         return bk.run(bk.Scene(title="p", bodies=(upper, lower), contacts=(contact,), law=bk.Coulomb(0.4))).contact
 
-    exact = pressed(bk.Galerkin(2), bk.Galerkin(2), 200)
-    table = pressed(upper_elements, bk.ConstantCollocation(), 60)
+    exact = pressed(bk.Galerkin(2), bk.Galerkin(2), 120, bk.MeshOptions(200))
+    table = pressed(upper_elements, bk.ConstantCollocation(), n_above, mesh_below)
     order, is_inside = np.argsort(exact.x), np.abs(table.x) < 0.8
     expected = np.interp(table.x, exact.x[order], exact.sigma_n[order])
     np.testing.assert_allclose(table.sigma_n[is_inside], expected[is_inside], atol=0.08 * np.abs(expected).mean())

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -21,8 +22,8 @@ _LEAST_RESOLVED = 0.01
 """Common length, relative to the mean element of the finer side, that a node of the mesh can represent."""
 _STEPPED = 1.1
 """Ratio of the distances of nodes above which the steps of constant elements press shorter elements."""
-_FEWEST = 4
-"""Number of longer constant elements on the common length that carry multipliers."""
+_FEWEST = 3
+"""Number of longer constant elements on the common length that carry multipliers: they resist rotation, too."""
 _WHOLE = 1.0 - 1e-6
 """Covered share of a completely covered side, with round-off."""
 _WHOLE_CURVED = 0.98
@@ -69,6 +70,11 @@ class _Elements:
             np.concatenate([side.sagittas for side in sides]),
         )
 
+    @cached_property
+    def lengths(self) -> FloatArray:
+        """(n_elements,) array [m]: lengths of the chords."""
+        return norms(self.end - self.start)
+
 
 def find_facing(
     sides: Sequence[ContactSide], distance: float, owners: Sequence[int] | None = None, *, has_friction: bool = False
@@ -104,14 +110,19 @@ def find_facing(
     pairs, number = np.unique(
         np.stack([elements.side[first], elements.side[second]], axis=1), axis=0, return_inverse=True
     )
-    shared = np.bincount(number.ravel(), cover, minlength=len(pairs))
+    shared, *moments = (
+        np.bincount(number.ravel(), weights, minlength=len(pairs))
+        for weights in (cover, cover * elements.lengths[first], cover * elements.lengths[second])
+    )
     least = np.full(len(pairs), np.inf)
     np.minimum.at(least, number.ravel(), added)
     found = []
-    for (one, two), length, corner in zip(pairs.tolist(), shared.tolist(), least.tolist(), strict=True):
+    for (one, two), length, moment, corner in zip(
+        pairs.tolist(), shared.tolist(), np.stack(moments, axis=1).tolist(), least.tolist(), strict=True
+    ):
         pair = sides[one], sides[two]
         if length > corner + _LEAST_COVER * min(float(side.lengths.sum()) for side in pair):
-            is_first = _is_first_non_mortar(*pair, length, has_friction=has_friction)
+            is_first = _is_first_non_mortar(*pair, length, moment, has_friction=has_friction)
             is_resolved = length >= _LEAST_RESOLVED * min(map(_mean_length, pair))
             found.append(FacingSides(*((one, two) if is_first else (two, one)), is_resolved))
     return found
@@ -129,11 +140,11 @@ def is_non_mortar(one: ContactSide, two: ContactSide, *, has_friction: bool = Fa
     Returns
     -------
     bool
-        Where the nodes of constant elements are farther from each other than those of the other side, and at least four
-        of these elements face it, true if the first side has them. Else true if only the first side is completely
-        covered. If both or none are, true if the mean distance of nodes on the first side is not larger than on the
-        second one. Of curved constant or linear sides that cover each other and have friction or are arcs about one
-        point, the coarser side carries the multipliers.
+        Where the nodes of constant elements are farther from each other on the common length than those of the other
+        side, and at least three of these elements face it, true if the first side has them. Else true if only the first
+        side is completely covered. If both or none are, true if the mean distance of nodes on the first side is not
+        larger than on the second one. Of curved constant or linear sides that cover each other and have friction or are
+        arcs about one point, the coarser side carries the multipliers.
 
     Notes
     -----
@@ -149,20 +160,36 @@ def is_non_mortar(one: ContactSide, two: ContactSide, *, has_friction: bool = Fa
     stiff disc in a soft ring with four times longer constant elements to 1e-5 instead of 1. Without friction a disc
     with a clearance would rotate nearly freely.
     """
-    _, _, cover, _ = _facing_elements(_Elements.of([one, two], [0, 1]), np.inf)
-    return _is_first_non_mortar(one, two, float(cover.sum()), has_friction=has_friction)
+    elements = _Elements.of([one, two], [0, 1])
+    first, second, cover, _ = _facing_elements(elements, np.inf)
+    moments = [float(cover @ elements.lengths[which]) for which in (first, second)]
+    return _is_first_non_mortar(one, two, float(cover.sum()), moments, has_friction=has_friction)
 
 
-def _is_first_non_mortar(one: ContactSide, two: ContactSide, cover: float, *, has_friction: bool) -> bool:
-    """Apply the rule of `is_non_mortar` to sides with a common length [m]."""
+def _is_first_non_mortar(
+    one: ContactSide, two: ContactSide, cover: float, moments: Sequence[float], *, has_friction: bool
+) -> bool:
+    """Apply the rule of `is_non_mortar`.
+
+    Parameters
+    ----------
+    one, two : ContactSide
+    cover : float [m]
+        Their common length.
+    moments : (float, float) [m^2]
+        Integrals over it of the lengths of the elements of each side, which may be graded elsewhere.
+    has_friction : bool
+    """
     fits = not any(side.is_straight or side.space.degree > 1 for side in (one, two)) and (
         has_friction or common_centre([(side.mesh, side.elements) for side in (one, two)]) is not None
     )
-    first, second = (_mean_length(side) / max(side.space.degree, 1) for side in (one, two))
+    parts = [max(side.space.degree, 1) for side in (one, two)]  # of an element between nodes
+    first, second = (moment / n for moment, n in zip(moments, parts, strict=True))
     longer, shorter = max(first, second), min(first, second)
     has_steps = (one if first > second else two).space.degree == 0
-    if has_steps and longer > _STEPPED * shorter and cover >= _FEWEST * longer:
+    if has_steps and longer > _STEPPED * shorter and cover**2 >= _FEWEST * longer:
         return first > second
+    first, second = (_mean_length(side) / n for side, n in zip((one, two), parts, strict=True))
     share = _WHOLE_CURVED if fits else _WHOLE
     is_whole = [cover >= share * float(side.lengths.sum()) for side in (one, two)]
     if is_whole[0] != is_whole[1]:
@@ -185,7 +212,7 @@ def _facing_elements(elements: _Elements, distance: float) -> tuple[IntArray, In
     swap = elements.side[first] > elements.side[second]
     first, second = np.where(swap, second, first)[is_pair], np.where(swap, first, second)[is_pair]
     start, end = elements.start, elements.end
-    tangents = (end - start) / norms(end - start)[:, None]
+    tangents = (end - start) / elements.lengths[:, None]
     opposes = np.einsum("ec,ec->e", tangents[first], tangents[second]) <= -_LEAST_OPPOSITION
     first, second = first[opposes], second[opposes]
 
@@ -202,7 +229,7 @@ def _facing_elements(elements: _Elements, distance: float) -> tuple[IntArray, In
     ahead1 = (at - a1) / (b1 - a1) * -cross(tangent, end[first] - origin)
     ahead2 = (at - a2) / (b2 - a2) * cross(tangent, end[second] - start[second]) - cross(tangent, end[second] - origin)
     gaps = ahead2 - ahead1
-    off_arc = 2.0 * elements.sagitta / norms(end - start)
+    off_arc = 2.0 * elements.sagitta / elements.lengths
     added = np.abs(gaps).max(axis=0) * (off_arc[first] + off_arc[second])
     nearest = np.where(gaps[0] * gaps[1] <= 0.0, 0.0, np.abs(gaps).min(axis=0))
     slack = elements.sagitta[first] + elements.sagitta[second]
@@ -231,7 +258,7 @@ def _near_elements(elements: _Elements, distance: float) -> tuple[IntArray, IntA
     from scipy.spatial import cKDTree
 
     centre = 0.5 * (elements.start + elements.end)
-    radius = 0.5 * norms(elements.end - elements.start) + elements.sagitta
+    radius = 0.5 * elements.lengths + elements.sagitta
     distance = min(distance, float(norms(np.ptp(centre, axis=0))))  # no two elements are farther apart
     octave = np.frexp(radius)[1]
     members = [np.flatnonzero(octave == size) for size in np.unique(octave)]
