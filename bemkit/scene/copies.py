@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from numbers import Integral
 from typing import Protocol
 
 from bemkit.errors import InputError
@@ -113,5 +114,5 @@ class ListedCopies:
 
 
 def _check_count(name: str, count: int) -> None:
-    if not 1 <= count <= MOST_COPIES or count != int(count):
+    if not isinstance(count, Integral) or not 1 <= count <= MOST_COPIES:
         raise InputError(f"{name} is {count}: give a whole number from 1 to {MOST_COPIES}")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from numbers import Integral
 from types import MappingProxyType
 from typing import Any, TypeAlias
 
@@ -46,7 +47,7 @@ class Step:
     def __post_init__(self) -> None:
         if not (math.isfinite(self.time) and self.time > 0.0):
             raise InputError(f"time is {self.time}: give the time at the end of the step, a positive number")
-        if self.increments < 1 or self.increments != int(self.increments):
+        if not isinstance(self.increments, Integral) or self.increments < 1:
             raise InputError(f"increments is {self.increments}: give a whole number, 1 or more")
         object.__setattr__(self, "changes", MappingProxyType(dict(self.changes)))
 

@@ -225,7 +225,7 @@ def test_what_does_not_fit_together_is_named(change: dict[str, object], message:
         (lambda: Touching(0.1, reach=0.0), "touching.reach is 0.0: give a positive length"),
         (lambda: ContactPair(PAIR.sides, reach=-1.0), "contact 'upper.bottom / lower.top': reach is -1.0: give a"),
         (lambda: GridCopies(0), "columns is 0: give a whole number from 1 to 100000"),
-        (lambda: GridCopies(rows=2.5), "rows is 2.5: give a whole number"),  # type: ignore[arg-type]
+        (lambda: GridCopies(rows=2.0), "rows is 2.0: give a whole number"),  # type: ignore[arg-type]
         (lambda: GridCopies(1000, 1000), "columns times rows is 1000000: give a whole number"),
         (lambda: CircleCopies(0, 1.0), "count is 0: give a whole number"),
         (lambda: ListedCopies(()), "the number of places is 0: give a whole number"),

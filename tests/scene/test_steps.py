@@ -154,7 +154,7 @@ def test_laws_of_assemblies_that_need_steps() -> None:
         ({"time": 0.0}, r"time is 0\.0: give the time at the end of the step, a positive number"),
         ({"time": float("nan")}, "time is nan"),
         ({"time": 1.0, "increments": 0}, "increments is 0: give a whole number, 1 or more"),
-        ({"time": 1.0, "increments": 2.5}, "increments is 2.5: give a whole number"),
+        ({"time": 1.0, "increments": 2.0}, "increments is 2.0: give a whole number"),
     ],
 )
 def test_steps_that_are_none(options: dict[str, Any], message: str) -> None:
