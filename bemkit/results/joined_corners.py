@@ -18,6 +18,7 @@ from bemkit.results.singular_corners import (
     GivenSides,
     SingularCorner,
     angle_between,
+    beside_middle,
     touching_side,
 )
 from bemkit.results.wedge import FREE, JoinedWedge, WedgeSide, joined_exponent
@@ -81,7 +82,8 @@ def joined_corners(
         way = AFTER if end.after in side.mesh.part(side.part) else BEFORE  # of the touching element
         touching = (end.before, end.after)[way], (foot.after, foot.before)[way]
         wedges = end.given(given[side.body], way), foot.given(given[other.body], 1 - way)
-        contact = touching_side(table, law_at_nodes, side.mesh.centres[touching[0]], every_node)
+        middle = beside_middle(side.mesh, touching[0], 1.0 if way == BEFORE else -1.0)
+        contact = touching_side(table, law_at_nodes, middle, every_node)
         is_on_other = touching[1] in other.mesh.part(other.part)
         if contact == FREE or not is_on_other or wedges[0] is None or wedges[1] is None:
             continue

@@ -27,6 +27,7 @@ from bemkit.solvers.active_sets import NodeStatus
 
 _PARALLEL = 1e-6
 """Component along the normal or the tangent that counts as zero."""
+_BESIDE = 1e-3
 DIGITS = 6
 """Digits to which angles are rounded: round-off of short elements must not separate equal ones."""
 BEFORE, AFTER = 0, 1
@@ -164,21 +165,26 @@ class GivenSides:
             return None
         condition = self._conditions.get(self._part[element])
         if isinstance(condition, Contact):
-            return self._in_contact(element)
+            return self._in_contact(element, xi)
         if isinstance(condition, PrescribedDisplacement):
             return _displaced(_normal(self._mesh, element, xi), np.array(condition.is_prescribed))
         if isinstance(condition, Clamped):
             return HELD
         return ROLLER if isinstance(condition, Roller) else FREE
 
-    def _in_contact(self, element: int) -> WedgeSide | None:
-        """Return the status of the contact node nearest to the middle of an element; None if its part has no node."""
+    def _in_contact(self, element: int, xi: float) -> WedgeSide | None:
+        """Return the status of a contact node, see `touching_side`; None if the part has no node."""
         rows = np.flatnonzero(self._table.rows(self._part[element]))
         if not rows.size:  # both nodes of a part of one element belong to its neighbours
             return None
         law = self._scene.laws[self._part[element]].at(self._table.points[rows])
         law = law if self._motion is None else law.at_slip(self._motion.of(rows))
-        return touching_side(self._table, law, self._mesh.centres[element], rows)
+        return touching_side(self._table, law, beside_middle(self._mesh, element, xi), rows)
+
+
+def beside_middle(mesh: BoundaryMesh, element: int, xi: float) -> FloatArray:
+    """Return the point (2,) beside the middle of an element towards an end at xi, so that equally near nodes differ."""
+    return np.asarray(mesh.points(np.array([element]), np.array([_BESIDE * xi]))[0, 0])
 
 
 def touching_side(table: ContactTable, law: FrictionLaw, point: FloatArray, rows: IntArray) -> WedgeSide:
