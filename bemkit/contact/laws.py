@@ -6,14 +6,13 @@ the node slips, it has the magnitude of the bound and opposes the slip,
     |sigma_t| <= bound(sigma_n),    sigma_t = -bound(sigma_n) u_t / |u_t|  where  u_t != 0.
 
 To add a law, derive a class from `FrictionLaw` and implement `bound` and `bound_derivative`. Coefficients may vary
-along
-
-the boundary: one number for each contact node, or formulas or functions of the coordinates, which `FrictionLaw.at`
-evaluates at the nodes.
+along the boundary: one number for each contact node, or formulas or functions of the coordinates, which
+`FrictionLaw.at` evaluates at the nodes.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
 from typing import ClassVar, Protocol, Self, TypeAlias, runtime_checkable
 
@@ -215,6 +214,11 @@ class LawOfCoefficients(FrictionLaw):
         """Return the law with its coefficients evaluated at (n_contact, 2) points [m]."""
         values = {name: evaluated_coefficient(name, value, points) for name, value in self.coefficients.items()}
         return replace(self, **values) if values else self  # type: ignore[type-var]
+
+    def with_lists(self, change: Callable[[FloatArray], FloatArray]) -> Self:
+        """Return the law with a change of the coefficients that list numbers of nodes."""
+        lists = {name: change(value) for name, value in self.coefficients.items() if isinstance(value, np.ndarray)}
+        return replace(self, **lists) if lists else self  # type: ignore[type-var]
 
     @property
     def coefficients(self) -> dict[str, Coefficient]:

@@ -11,7 +11,7 @@ import numpy as np
 
 from bemkit.arrays import FloatArray
 from bemkit.contact.body import SlipHistory
-from bemkit.contact.laws import FrictionLaw
+from bemkit.contact.laws import FrictionLaw, LawOfCoefficients
 from bemkit.results.contact_table import ContactTable, free_contacts
 from bemkit.results.part_forces import RigidResult
 from bemkit.results.points_between import (
@@ -117,13 +117,17 @@ def law_between(
     law: FrictionLaw, values: PointsBetween, contact: ContactTable, name: str, motion: SlipHistory | None
 ) -> FrictionLaw:
     """Return the law of a contact of the table at points between its nodes."""
-    law = law.at(values.points)
+    rows = np.flatnonzero(contact.rows(name))
+    order = np.argsort(contact.s[rows])
+
+    def between(nodal: FloatArray) -> FloatArray:
+        return np.interp(values.s, contact.s[rows[order]], nodal[order])
+
+    law = (law.with_lists(between) if isinstance(law, LawOfCoefficients) else law).at(values.points)
     if motion is None or not law.needs_history:
         return law
-    rows = np.flatnonzero(contact.rows(name))
-    rows = rows[np.argsort(contact.s[rows])]
-    slip, last = (np.interp(values.s, contact.s[rows], nodal[rows]) for nodal in (motion.slip, motion.last_slip))
-    return law.at_slip(SlipHistory(motion.time, motion.time_step, slip, last))
+    slip, last_slip = between(motion.slip[rows]), between(motion.last_slip[rows])
+    return law.at_slip(SlipHistory(motion.time, motion.time_step, slip, last_slip))
 
 
 def violations_at(values: PointsBetween, law: FrictionLaw, stress: float, length: float) -> BetweenNodes:

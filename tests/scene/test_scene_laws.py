@@ -33,6 +33,18 @@ def test_a_formula_for_the_coefficient() -> None:
     assert np.all(np.abs(contact.sigma_t) <= coefficient * -contact.sigma_n + 1e-9)
 
 
+@pytest.mark.parametrize("discretisation", [bk.Galerkin(1), bk.ConstantCollocation()])
+def test_one_number_for_each_contact_node_is_as_the_formula_there(discretisation: bk.Discretisation) -> None:
+    scene = dataclasses.replace(scene_from_toml(PAPER_1), discretisation=discretisation)
+    formula = bk.run(dataclasses.replace(scene, law=bk.Coulomb(lambda x, y: 0.2 + x)))
+    listed = bk.run(dataclasses.replace(scene, law=bk.Coulomb(0.2 + formula.contact.x)))
+    np.testing.assert_array_equal(listed.contact.sigma_t, formula.contact.sigma_t)
+    assert (listed.contact.sigma_t != 0.0).any()
+    one, other = (solution.contacts_between_nodes["foundation"].cone_excess for solution in (listed, formula))
+    assert one == pytest.approx(other, rel=0.2)  # beyond the last nodes their numbers are kept
+    assert [warning.kind for warning in listed.warnings] == [warning.kind for warning in formula.warnings]
+
+
 @pytest.mark.parametrize(
     "law", [bk.Tresca(bk.Expression("0.3 * x")), bk.CohesiveCoulomb(0.4, 0.0, bk.Expression("0.1 + x"))]
 )
