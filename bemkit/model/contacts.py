@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from operator import itemgetter
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -70,7 +71,8 @@ class ContactInterface:
         Where the node lies on a symmetry line across its tangent: neither slips nor carries friction.
     is_frictionless : (n,) bool array
         Where a support holds the node in one direction and the partner moves: the tangent follows from both, and a
-        friction of its own would repeat what other nodes say.
+        friction of its own would repeat what other nodes say. And where a node faces away from an obstacle whose
+        friction acts across gaps.
     """
 
     name: str
@@ -190,11 +192,14 @@ def obstacle_rows(
     """
     rigid = {body.name: number for number, body in enumerate(scene.rigid)}
     pairs = {pair.name: pair for pair in scene.contacts if pair.rigid_body is not None}
+    shared = {side for pair in scene.elastic_contacts for side in pair.elastic_parts}
     for number, (body, found) in enumerate(zip(bodies, candidates, strict=True)):
         fixed = conditions[number].is_fixed
         can_touch = approaches(found.nodes.nodes, found.nodes.directions, conditions[number])
         for name in dict.fromkeys(found.parts):
             rows = np.equal(found.parts, name) & can_touch
+            if name in pairs and (body.name, _part(pairs[name])) in shared:
+                rows &= np.isfinite(found.gap)  # nodes that face away belong to the other body
             nodes, gap, points = found.nodes.take(rows), found.gap[rows], found.points[rows]
             if not nodes.nodes.size:
                 continue
@@ -208,6 +213,7 @@ def obstacle_rows(
                 title, part, law, other = name, _part(pair), scene.law_of(pair), len(bodies) + k
                 gap, motions = gap + pair.gap_at(points), scene.rigid[k].motions_at(touched)
             is_held = np.asarray(fixed[nodes.nodes].any(axis=1))
+            faces_away = np.isinf(gap) & np.any(law.acts_across_gap)
             moves = motions is not None and bool(scene.rigid[other - len(bodies)].is_load_controlled.any())
             yield ContactInterface(
                 name=title,
@@ -227,7 +233,7 @@ def obstacle_rows(
                 other_elements=np.zeros(0, np.intp),
                 tangent_follows=nodes.is_shared | is_held,
                 is_on_line=np.zeros(nodes.nodes.size, bool),
-                is_frictionless=is_held if moves else np.zeros_like(is_held),
+                is_frictionless=faces_away | is_held if moves else faces_away,
             )
 
 
@@ -265,7 +271,11 @@ def law_of_rows(contacts: Sequence[ContactInterface]) -> FrictionLaw:
                 continue
             is_uniform = isinstance(law, LawOfCoefficients) and law.is_uniform
             try:
-                evaluated = law if is_uniform else law.at(rows.points[chosen])
+                evaluated = law if is_uniform else law.at(rows.points)
+                if isinstance(evaluated, LawOfCoefficients):
+                    evaluated = evaluated.with_lists(itemgetter(chosen))
+                elif not chosen.all():
+                    evaluated = law.at(rows.points[chosen])
             except ValueError as error:
                 kind = "part" if rows.other < 0 else "contact"
                 raise LawError(f"{kind} {rows.name!r}: friction law: {error}") from error

@@ -227,7 +227,8 @@ def bound_at(table: ContactTable, law: FrictionLaw) -> FloatArray | None:
     """Return the friction bound (n_contact,) [Pa] of a law at the tractions of a table; None without friction."""
     if law.is_frictionless:
         return None
-    return np.where(table.is_closed | np.asarray(law.acts_across_gap), law.bound(np.minimum(table.sigma_n, 0.0)), 0.0)
+    acts = table.is_closed | (np.asarray(law.acts_across_gap) & np.isfinite(table.gap))
+    return np.where(acts, law.bound(np.minimum(table.sigma_n, 0.0)), 0.0)
 
 
 def free_contacts(table: ContactTable) -> set[str]:

@@ -11,6 +11,7 @@ import pytest
 import bemkit as bk
 from bemkit.errors import NoResultError
 from bemkit.model.prepared import prepare
+from bemkit.testing import check_solution
 from tests.slow import slow_except
 
 ELEMENTS = [bk.Galerkin(1), bk.ConstantCollocation()]
@@ -164,3 +165,50 @@ def test_the_unit_of_stress_is_that_of_the_largest_overlap():
         units = prepare(loaded, mesh).units
         strain = units.stress / units.modulus
         assert strain == pytest.approx(expected / mesh.diameter if gap < 0.0 else expected, rel=1e-12)
+
+
+@pytest.mark.parametrize("bound", [0.003, np.full(41, 0.003)], ids=["number", "list"])
+def test_given_friction_does_not_act_where_the_boundary_faces_away(bound: object) -> None:
+    """A punch without friction at its own nodes would hang on given friction beside it, which has another direction."""
+    block = bk.Body(
+        name="block",
+        shape=bk.Rectangle(4.0, 1.0, (-2.0, -1.0)),
+        material=bk.Material(1.0, 0.3),
+        parts=(bk.Part("base", bk.Clamped(), ("bottom",)),),
+        mesh=bk.MeshOptions(100),
+    )
+    square = bk.RigidPolygon(((-0.8, 0.0), (0.8, 0.0), (0.8, 1.0), (-0.8, 1.0)))
+    solution = bk.run(
+        bk.Scene(
+            title="punch",
+            bodies=(block,),
+            rigid=(bk.RigidBody(name="punch", obstacle=square, force_x=0.002, force_y=-0.006),),
+            contacts=(bk.ContactPair(("block.top", "punch"), law=bk.Tresca(bound)),),
+        )
+    )
+    assert solution.is_converged
+    table = solution.contact
+    faces_away = np.isinf(table.gap)
+    assert faces_away.any()
+    assert not table.sigma_t[faces_away].any()
+    assert table.sigma_n @ table.weight == pytest.approx(-0.006, rel=1e-9)  # whole, without friction beside the punch
+    check_solution(solution)
+
+
+def test_the_whole_boundary_of_a_disc_faces_a_block_and_a_rigid_plane() -> None:
+    block = bk.Body(
+        name="block",
+        shape=bk.Rectangle(4.0, 1.0, (-2.0, -1.0)),
+        material=bk.Material(1.0, 0.3),
+        parts=(bk.Part("base", bk.Clamped(), ("bottom",)),),
+    )
+    disc = bk.Body(name="disc", shape=bk.Disk(1.0, (0.0, 1.0)), material=bk.Material(2.0, 0.3))
+    plane = bk.RigidBody(name="plane", obstacle=bk.RigidHalfPlane((0.0, 2.0), (0.0, -1.0)), y=-0.05)
+    forces = []
+    for lower, upper in (("*", "*"), ("arc-3, arc-4", "arc-1, arc-2")):
+        pairs = bk.ContactPair(("block.top", f"disc.{lower}")), bk.ContactPair((f"disc.{upper}", "plane"))
+        scene = bk.Scene(title="disc", bodies=(block, disc), rigid=(plane,), contacts=pairs, mesh=bk.MeshOptions(80))
+        solution = bk.run(dataclasses.replace(scene, law=bk.Coulomb(0.3)))
+        assert solution.is_converged, solution.message
+        forces.append(solution.rigid["plane"].force_y)
+    assert forces[0] == pytest.approx(forces[1], rel=1e-9)

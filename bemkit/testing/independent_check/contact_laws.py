@@ -21,7 +21,7 @@ def contact_violations(contact: MeasuredContact, *, knows_slip: bool) -> dict[st
     approach = np.where(np.abs(approach - table.u_n) <= contact.turned, table.u_n, approach)
     clearance = np.where(np.isfinite(table.gap), table.gap - approach, np.inf) / length
     # what shows that a node is in contact: its traction, but for friction that is given across a gap
-    acts_across_gap = np.broadcast_to(np.asarray(law.acts_across_gap), pressure.shape)
+    acts_across_gap = np.isfinite(table.gap) & np.asarray(law.acts_across_gap)
     held = np.maximum(np.abs(pressure), np.where(acts_across_gap | contact.is_supported, 0.0, np.abs(shear)))
     # A node that is held by less than it is away counts as open (its complementarity says by how much): whether
     # cohesion acts shall not depend on a traction of 1e-16.
