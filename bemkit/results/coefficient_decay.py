@@ -170,7 +170,7 @@ def _missing(coefficients: FloatArray, degrees: IntArray, at_break: BoolArray) -
     energy, mean_square, decay, last = np.empty((4, degrees.size))
     for n_known in np.unique(degrees).tolist():
         chosen = degrees == n_known
-        bounds = _without_gaps(np.linalg.norm(coefficients[chosen, :n_known], axis=2))
+        bounds = _without_gaps(np.linalg.norm(coefficients[chosen, :n_known], axis=2), at_break[chosen])
         n_fitted = max(2, min(n_known - 1, n_known // 2 + 1))
         k = np.arange(n_fitted) - 0.5 * (n_fitted - 1)
         logarithms = np.log(np.maximum(bounds[:, n_known - n_fitted :], np.finfo(float).tiny))
@@ -183,12 +183,12 @@ def _missing(coefficients: FloatArray, degrees: IntArray, at_break: BoolArray) -
     return _Missing(energy, mean_square, decay, last)
 
 
-def _without_gaps(sizes: FloatArray) -> FloatArray:
+def _without_gaps(sizes: FloatArray, at_break: BoolArray) -> FloatArray:
     """Return bounds (n, n_known) of coefficients that never rise, from sizes of which every other one may be zero.
 
     The last one is at least half of what three before it lead to, less where they do not alternate; of three, the
-    middle one at least the geometric mean of its neighbours. Otherwise an element in whose middle a field is symmetric
-    had no error, or one that hardly falls.
+    middle one at least the geometric mean of its neighbours, except beside corners and ends of parts: layers there are
+    not symmetric. Otherwise an element in whose middle a field is symmetric had no error, or one that hardly falls.
     """
     known, n_known = sizes.copy(), sizes.shape[1]
     if n_known >= 4:
@@ -197,7 +197,7 @@ def _without_gaps(sizes: FloatArray) -> FloatArray:
         alternates = np.minimum(1.0, next_to_last / np.maximum(sizes[:, -3], np.finfo(float).tiny))
         known[:, -1] = np.maximum(known[:, -1], 0.5 * alternates * expected)
     if n_known == 3:
-        known[:, 1] = np.maximum(known[:, 1], np.sqrt(known[:, 0] * known[:, 2]))
+        known[:, 1] = np.maximum(known[:, 1], np.where(at_break, 0.0, np.sqrt(known[:, 0] * known[:, 2])))
     return np.asarray(np.maximum.accumulate(known[:, ::-1], axis=1)[:, ::-1])
 
 
