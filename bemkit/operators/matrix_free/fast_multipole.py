@@ -17,7 +17,8 @@ from bemkit.geometry.proximity.cluster_tree import Clusters, ClusterTree, Discs
 from bemkit.geometry.quadrature import gauss_legendre
 from bemkit.operators.collocation.equations import CollocationEquations, Densities
 from bemkit.operators.material import Material
-from bemkit.operators.somigliana.expansions import Expansions, Sources, layer_sources
+from bemkit.operators.somigliana.expansions import Expansions
+from bemkit.operators.somigliana.point_sources import Sources, layer_sources
 from bemkit.operators.somigliana.source_series import SEPARATION, SourceSeries, order_for
 from bemkit.threads import for_each_chunk
 

@@ -1,62 +1,23 @@
 """Series of the complex potentials of clusters of elements, and their translations.
 
-Two analytic functions give the displacements of plane strain [Muskhelishvili1953],
-
-    2 mu u = kappa phi(z) - (z - c) conj(phi'(z)) - conj(psi(z)),      kappa = 3 - 4 nu,
-
-with any point c, on which psi depends: psi_d = psi_c + conj(d - c) phi'. Let F be a force at w, and v the strength of a
-double layer at w with the normal n. With f = -F / (8 pi (1 - nu)), g = mu n v / (4 pi (1 - nu)) and
-e = -2 mu Re(conj(n) v) / (4 pi (1 - nu)), their potentials are
-
-    phi = f log(z - w) + g / (z - w)
-    psi = -kappa conj(f) log(z - w) + (e - conj(w - c) f) / (z - w) + conj(w - c) g / (z - w)^2
-
-and the force causes an additional displacement -f / (2 mu). Far from a disc around c of radius r that contains all
-sources the potentials are ``a_0 log(z - c) + sum a_k (r / (z - c))^k``; in a disc far from all sources they are
-``sum a_m ((z - c) / r)^m`` [GreengardRokhlin1987]. Coefficients of phi and psi are arrays (n_clusters, 2, order + 1).
+Far from a disc around c of radius r that contains all sources (`point_sources`) the potentials phi and psi are
+``a_0 log(z - c) + sum a_k (r / (z - c))^k``; in a disc far from all sources they are ``sum a_m ((z - c) / r)^m``
+[GreengardRokhlin1987]. Coefficients of phi and psi are arrays (n_clusters, 2, order + 1).
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple, TypeVar
+from typing import TypeVar
 
 import numpy as np
 from scipy.special import comb
 
 from bemkit.arrays import ComplexArray, FloatArray, IntArray
-from bemkit.operators.material import Material
+from bemkit.operators.somigliana.point_sources import Sources
 
 Numbers = TypeVar("Numbers", FloatArray, ComplexArray)
-
-
-class Sources(NamedTuple):
-    """Positions w relative to a centre [m] and strengths f, g (complex) and e of sources; arrays of one shape."""
-
-    position: ComplexArray
-    f: ComplexArray
-    g: ComplexArray
-    e: FloatArray
-
-
-def layer_sources(
-    y: ComplexArray, dy: ComplexArray, traction: ComplexArray, displacement: ComplexArray, material: Material
-) -> Sources:
-    """Return the sources of the single layer of tractions minus the double layer of displacements.
-
-    Parameters
-    ----------
-    y, dy : complex arrays of one shape [m]
-        Gauss points on the boundary and the weighted steps along it.
-    traction, displacement : complex arrays of the same shape [Pa], [m]
-    material : Material
-    """
-    b = 1.0 / (np.pi * (material.kappa + 1.0))
-    double = (b * material.shear_modulus) * dy
-    return Sources(
-        y, (-0.5 * b) * np.abs(dy) * traction, 1j * double * displacement, -2.0 * (double.conj() * displacement).imag
-    )
 
 
 @dataclass(frozen=True)

@@ -8,6 +8,7 @@ by term.
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 from typing import TypeAlias
 
@@ -16,11 +17,9 @@ import numpy as np
 from bemkit.arrays import BoolArray, ComplexArray, IntArray
 from bemkit.geometry.proximity.cluster_tree import Clusters, Pairs
 from bemkit.geometry.quadrature import gauss_legendre
-from bemkit.operators.element_geometry import ElementGeometry
-from bemkit.operators.kernels import legendre_values
 from bemkit.operators.material import Material
-from bemkit.operators.somigliana.expansions import Expansions, Sources, layer_sources
-from bemkit.operators.somigliana.moments import N_POINTS, ArcQuadrature
+from bemkit.operators.somigliana.expansions import Expansions
+from bemkit.operators.somigliana.point_sources import N_POINTS, BoundaryData, Sources, layer_sources
 from bemkit.operators.somigliana.source_series import SEPARATION, SourceSeries
 
 ORDER = 34
@@ -34,34 +33,19 @@ class FarFields:
     Parameters
     ----------
     clusters : Clusters
-    geometry : ElementGeometry
-    curved : ArcQuadrature
+    data : BoundaryData
     material : Material
-    displacement, traction : (n_elements, n) complex arrays [m], [Pa]
-        Coefficients of Legendre polynomials.
     length : float [m]
         Unit of length in the logarithm.
     """
 
-    def __init__(
-        self,
-        clusters: Clusters,
-        geometry: ElementGeometry,
-        curved: ArcQuadrature,
-        material: Material,
-        displacement: ComplexArray,
-        traction: ComplexArray,
-        length: float,
-    ) -> None:
-        self.geometry, self._curved, self._clusters = geometry, curved, clusters
+    def __init__(self, clusters: Clusters, data: BoundaryData, material: Material, length: float) -> None:
+        self._clusters, self._material = clusters, material
         self._expansions = Expansions(ORDER, material.kappa, length)
-        self._material = material
-        series = SourceSeries(self._expansions, clusters, geometry.half[clusters.tree.order])
-        zero, one = np.zeros((traction.shape[0], 1), complex), np.ones((traction.shape[0], 1), complex)
-        of_data = (
-            series.of(partial(self._sources, v, p), len(clusters.levels))
-            for v, p in ((displacement, traction), (one, zero), (1j * one, zero))
-        )
+        series = SourceSeries(self._expansions, clusters, 0.5 * data.mesh.lengths[clusters.tree.order])
+        zero, one = np.zeros((data.mesh.n_elements, 1), complex), np.ones((data.mesh.n_elements, 1), complex)
+        units = (replace(data, displacement=unit, traction=zero) for unit in (one, 1j * one))
+        of_data = (series.of(partial(self._sources, each), len(clusters.levels)) for each in (data, *units))
         self._series = [np.stack(level, axis=1) for level in zip(*of_data, strict=True)]
 
     def divided(self, x: ComplexArray) -> tuple[list[Pairs], Pairs]:
@@ -97,20 +81,9 @@ class FarFields:
                 result[:, targets] += values[..., 0] - constant.real * values[..., 1] - constant.imag * values[..., 2]
         return result
 
-    def _sources(
-        self, displacement: ComplexArray, traction: ComplexArray, positions: IntArray, n_points: int
-    ) -> Sources:
+    def _sources(self, data: BoundaryData, positions: IntArray, n_points: int) -> Sources:
         """Return the sources of the single layer of tractions minus the double layer of displacements."""
-        highest = max(displacement.shape[1], traction.shape[1]) - 1
         elements = self._clusters.tree.order[positions]
-        is_straight = bool(self.geometry.is_straight[elements].all())
-        xi, weights = gauss_legendre(n_points + (highest + 1) // 2 if is_straight else N_POINTS + highest // 2)
-        half = (self.geometry.half * self.geometry.tangent)[elements, None]
-        y, slope = self.geometry.centre[elements, None] + half * xi, np.repeat(half, xi.size, axis=1)
-        curved = np.flatnonzero(~self.geometry.is_straight[elements])
-        y[curved], slope[curved] = self._curved.points(elements[curved], xi)
-        v, p = (
-            field[elements] @ legendre_values(field.shape[1] - 1, xi).reshape(field.shape[1], -1)
-            for field in (displacement, traction)
-        )
-        return layer_sources(y, slope * weights, p, v, self._material)
+        is_straight = bool(data.mesh.is_straight[elements].all())
+        rule = gauss_legendre(n_points + (data.highest + 1) // 2 if is_straight else N_POINTS + data.highest // 2)
+        return layer_sources(*data.at(elements, *rule), self._material)

@@ -26,8 +26,10 @@ from bemkit.geometry.local_values import values_on_elements
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.proximity.cluster_tree import Pairs
 from bemkit.geometry.proximity.location import Location, Locator, PointNotInsideError
+from bemkit.geometry.quadrature import gauss_legendre
 from bemkit.geometry.spaces import BoundarySpace, local_coefficients
 from bemkit.operators.element_geometry import ElementGeometry
+from bemkit.operators.integrals.splitting import SEPARATION, split_until
 from bemkit.operators.kernels import legendre_of_monomials, legendre_values
 from bemkit.operators.material import Material
 from bemkit.operators.somigliana.far_fields import FarFields
@@ -35,10 +37,10 @@ from bemkit.operators.somigliana.moments import (
     CENTRE,
     END,
     START,
-    ArcQuadrature,
     straight_displacement_moments,
     straight_gradient_moments,
 )
+from bemkit.operators.somigliana.point_sources import N_POINTS, BoundaryData, GaussData, Sources, layer_sources
 from bemkit.operators.somigliana.potentials import Background, PotentialFields, as_points
 from bemkit.threads import for_each_chunk
 
@@ -53,6 +55,8 @@ MOST_ELEMENTS, FEW_POINTS = 300, 30
 
 Terms: TypeAlias = Callable[[ComplexArray, IntArray, ComplexArray, bool], ComplexArray]
 """Contribution of elements at points: a function of points, elements, subtracted displacements, and a curved flag."""
+OfSources: TypeAlias = Callable[[Sources, ComplexArray], ComplexArray]
+"""Fields (n_fields, ...) of sources at points."""
 OfClusters: TypeAlias = Callable[[FarFields, ComplexArray, ComplexArray, list[Pairs]], ComplexArray]
 
 
@@ -112,10 +116,11 @@ class InteriorFields(PotentialFields):
         self._displacement = _element_polynomials(mesh, displacement_space, displacement_dofs, "displacement")
         self._traction = _element_polynomials(mesh, traction_space, traction_dofs, "traction")
         self._locator = Locator(mesh)
-        self._curved = ArcQuadrature(mesh, mesh.centre)
         centre = (float(mesh.centre[0]), float(mesh.centre[1]))
         curves = tuple(scaled_curve(curve, centre, (1.0, 1.0)) for curve in mesh.curves)
-        self.geometry = ElementGeometry(mesh.unchecked_copy(mesh.nodes - mesh.centre, curves))
+        about_centre = mesh.unchecked_copy(mesh.nodes - mesh.centre, curves)
+        self.geometry = ElementGeometry(about_centre)
+        self._data = BoundaryData(about_centre, self._displacement[CENTRE], self._traction[CENTRE])
 
     def is_inside(self, points: FloatArray) -> BoolArray:
         """Return the (n,) mask of the (n, 2) points [m] that lie strictly inside the body."""
@@ -153,9 +158,7 @@ class InteriorFields(PotentialFields):
 
     @cached_property
     def _far(self) -> FarFields:
-        displacement, traction = self._displacement[CENTRE], self._traction[CENTRE]
-        clusters, length = self._locator.clusters, self.mesh.diameter
-        return FarFields(clusters, self.geometry, self._curved, self.material, displacement, traction, length)
+        return FarFields(self._locator.clusters, self._data, self.material, self.mesh.diameter)
 
     def _summed(
         self, points: FloatArray, reference: ComplexArray, n_fields: int, terms: Terms, of_clusters: OfClusters
@@ -195,27 +198,48 @@ class InteriorFields(PotentialFields):
                 result = result + _at_points(terms(x[point], element, reference[point], kind), point, x.size)
         return result
 
-    @property
-    def _highest(self) -> int:
-        """Highest power of the local coordinate in the densities."""
-        return int(max(self._displacement.shape[2], self._traction.shape[2])) - 1
+    def _on_arcs(self, x: ComplexArray, element: IntArray, reference: ComplexArray, fields: OfSources) -> ComplexArray:
+        """Return the contribution of curved elements, bisected until each piece is away from its point."""
+        data = self._data
+
+        def is_away(pair: IntArray, low: FloatArray, high: FloatArray) -> BoolArray:
+            y, slope = data.points(element[near[pair]], 0.5 * (low + high)[:, None])
+            away: BoolArray = np.abs(x[near[pair]] - y[:, 0]) >= 0.5 * SEPARATION * (high - low) * np.abs(slope[:, 0])
+            return away
+
+        is_far = np.abs(x - self.geometry.centre[element]) >= SEPARATION * self.geometry.half[element]
+        far, near = np.flatnonzero(is_far), np.flatnonzero(~is_far)
+        piece, low, high = split_until(is_away, near.size, -1.0, 1.0)
+        xi, weights = gauss_legendre(N_POINTS + data.highest // 2)
+        middle, half = 0.5 * (low + high)[:, None], 0.5 * (high - low)[:, None]
+        on_pieces = data.at(element[near[piece]], middle + half * xi, half * weights)
+        on_wholes = (values[element[far]] for values in self._on_all_elements)
+        result: ComplexArray = np.zeros((1, x.size), complex)
+        for pair, (y, dy, traction, displacement) in ((far, on_wholes), (near[piece], on_pieces)):
+            sources = layer_sources(y, dy, traction, displacement - reference[pair, None], self.material)
+            result = result + _at_points(fields(sources, x[pair, None]).sum(axis=-1), pair, x.size)
+        return result
+
+    @cached_property
+    def _on_all_elements(self) -> GaussData:
+        """The data at the Gauss points of all elements."""
+        rule = gauss_legendre(N_POINTS + self._data.highest // 2)
+        return self._data.at(np.arange(self.mesh.n_elements), *rule)
 
     def _displacement_terms(
         self, x: ComplexArray, element: IntArray, reference: ComplexArray, is_curved: bool
     ) -> ComplexArray:
         """Return the contribution of each pair to the displacement, (1, n_pairs)."""
-        highest, length = self._highest, self.mesh.diameter
+        kappa, two_mu, length = self.material.kappa, 2.0 * self.material.shear_modulus, self.mesh.diameter
         if is_curved:
-            moments = self._curved.displacement_moments(x, element, highest, length)
-        else:
-            moments = straight_displacement_moments(self.geometry, x, element, highest, length)
-        kappa = self.material.kappa
+            return self._on_arcs(x, element, reference, lambda s, z: s.displacements(z, kappa, length)[None] / two_mu)
+        moments = straight_displacement_moments(self.geometry, x, element, self._data.highest, length)
         factor = 1.0 / (np.pi * (kappa + 1.0))
         result = np.zeros(element.size, complex)
         for k, p in enumerate(self._traction[CENTRE, element].T):
             diagonal = 0.5 * moments.measure[k] - kappa * moments.log[k]
             single = diagonal * p + 0.5 * moments.quotient[k] * p.conj()
-            result += (0.5 * factor / self.material.shear_modulus) * single
+            result += (factor / two_mu) * single
         for k, v in enumerate(self._displacement[CENTRE, element].T):
             v = v - reference if k == 0 else v
             direct = kappa * moments.cauchy[k] - moments.cauchy[k].conj()
@@ -226,11 +250,10 @@ class InteriorFields(PotentialFields):
         self, x: ComplexArray, element: IntArray, reference: ComplexArray, is_curved: bool
     ) -> ComplexArray:
         """Return the contribution of each pair to Phi and D, (2, n_pairs)."""
-        if is_curved:
-            moments = self._curved.gradient_moments(x, element, self._highest)
-        else:
-            moments = straight_gradient_moments(self.geometry, x, element, self._highest)
         kappa = self.material.kappa
+        if is_curved:
+            return self._on_arcs(x, element, reference, lambda sources, z: np.stack(sources.gradients(z, kappa)))
+        moments = straight_gradient_moments(self.geometry, x, element, self._data.highest)
         factor = 1.0 / (np.pi * (kappa + 1.0))
         potential, shear = np.zeros(element.size, complex), np.zeros(element.size, complex)
         for k, p in enumerate(self._traction[moments.origin, element].T):

@@ -1,4 +1,4 @@
-r"""Integrals over single elements for points off the boundary, from which interior fields are computed.
+r"""Integrals over straight elements for points off the boundary, from which interior fields are computed.
 
 Let rho = x - y, rho* its conjugate, tau the unit tangent at y, t the local coordinate of the element, and p the
 Legendre polynomials P_0, P_1, ... of t, or the powers of t - e for points close to an end e of the element:
@@ -8,31 +8,21 @@ Legendre polynomials P_0, P_1, ... of t, or the powers of t - e for points close
     reciprocal   int p / rho ds             spread       int p rho / rho*^2 ds
     hyper        int p tau / rho^2 ds       twist        int p (tau / rho*^2 - 2 rho tau* / rho*^3) ds
 
-On straight elements they have closed forms: with the local coordinate zeta = xi + i eta of x, they are combinations of
+With the local coordinate zeta = xi + i eta of x, they are combinations of
 
     C_k = int P_k / (zeta - t) dt,  G_k = int P_k / (zeta - t)^2 dt,  H_k = int P_k / (zeta - t)^3 dt
-
-Curved elements are bisected until each piece is far enough from the point for one Gauss rule.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
-from bemkit.arrays import BoolArray, ComplexArray, FloatArray, IntArray
-from bemkit.geometry.mesh import BoundaryMesh
-from bemkit.geometry.quadrature import gauss_legendre
+from bemkit.arrays import ComplexArray, FloatArray, IntArray
 from bemkit.operators import kernels
 from bemkit.operators.element_geometry import ElementGeometry
-from bemkit.operators.integrals.splitting import SEPARATION, split_until
 
-Integrands = Callable[[ComplexArray, ComplexArray], list[ComplexArray]]
-"""Integrands as functions of rho and tau."""
-N_POINTS = 14
-"""Gauss points of a piece; (3 + sqrt(8))**-28 is far below round-off, because kernels contain rho to the power -3."""
 CENTRE, START, END = 0, 1, 2
 """Origins of the expansion of densities."""
 AT_END = 0.5
@@ -169,126 +159,3 @@ def _local(
     to_local = geometry.to_local[elements]
     plus, minus = (x - geometry.start[elements]) * to_local, (x - geometry.end[elements]) * to_local
     return plus, minus, kernels.local_coordinate(plus, minus).imag
-
-
-class ArcQuadrature:
-    """Quadrature over curved elements that adapts to the distance of a point.
-
-    Parameters
-    ----------
-    mesh : BoundaryMesh
-    origin : (2,) array [m]
-        Origin of complex coordinates.
-    """
-
-    def __init__(self, mesh: BoundaryMesh, origin: FloatArray) -> None:
-        self._mesh, self._origin = mesh, complex(origin[0], origin[1])
-        self._rules: dict[int, tuple[ComplexArray, ComplexArray]] = {}
-
-    def points(self, elements: IntArray, xi: FloatArray) -> tuple[ComplexArray, ComplexArray]:
-        """Return y and dy/dxi, (n, q), of n elements at local coordinates (q,) or (n, q)."""
-        plane = np.array([1.0, 1j])
-        return self._mesh.points(elements, xi) @ plane - self._origin, self._mesh.derivatives(elements, xi) @ plane
-
-    def displacement_moments(
-        self, x: ComplexArray, elements: IntArray, highest: int, length: float
-    ) -> DisplacementMoments:
-        """Return the moments for displacements; see `straight_displacement_moments`."""
-
-        def integrands(rho: ComplexArray, tau: ComplexArray) -> list[ComplexArray]:
-            conjugate = rho.conj()
-            return [
-                np.log(np.abs(rho) / length) + 0j,
-                np.ones_like(rho),
-                rho / conjugate,
-                tau / rho,
-                (rho * tau.conj() / conjugate - tau) / conjugate,
-            ]
-
-        log, measure, quotient, cauchy, turn = self._integrate(x, elements, highest, integrands)
-        return DisplacementMoments(log.real, measure.real, quotient, cauchy, turn)
-
-    def gradient_moments(self, x: ComplexArray, elements: IntArray, highest: int) -> GradientMoments:
-        """Return the moments for gradients; see `straight_displacement_moments`."""
-
-        def integrands(rho: ComplexArray, tau: ComplexArray) -> list[ComplexArray]:
-            conjugate = rho.conj()
-            squared = conjugate * conjugate
-            return [
-                1.0 / rho,
-                rho / squared,
-                tau / (rho * rho),
-                (tau - 2.0 * rho * tau.conj() / conjugate) / squared,
-            ]
-
-        return GradientMoments(np.full(x.size, CENTRE), *self._integrate(x, elements, highest, integrands))
-
-    def _integrate(
-        self,
-        x: ComplexArray,
-        elements: IntArray,
-        highest: int,
-        integrands: Integrands,
-    ) -> list[ComplexArray]:
-        """Integrate the Legendre polynomials times each integrand; return a list of (highest + 1, n) arrays."""
-        middle, slope = (values[elements, 0] for values in self._rule(1))
-        is_far = _is_away(x, middle, slope, 2.0)
-        sums = []
-        for far, near in zip(
-            self._integrate_whole(x[is_far], elements[is_far], highest, integrands),
-            self._integrate_pieces(x[~is_far], elements[~is_far], highest, integrands),
-            strict=True,
-        ):
-            total = np.empty((highest + 1, x.size), complex)
-            total[:, is_far], total[:, ~is_far] = far, near
-            sums.append(total)
-        return sums
-
-    def _integrate_whole(
-        self, x: ComplexArray, elements: IntArray, highest: int, integrands: Integrands
-    ) -> list[ComplexArray]:
-        """Integrate over elements far from their points; all points share the Gauss points of an element."""
-        n_points = N_POINTS + highest // 2
-        polynomials = kernels.legendre_weights(highest + 1, n_points)
-        y, slope = (values[elements] for values in self._rule(n_points))
-        speed = np.abs(slope)
-        return [(value * speed @ polynomials.T).T for value in integrands(x[:, None] - y, slope / speed)]
-
-    def _integrate_pieces(
-        self, x: ComplexArray, elements: IntArray, highest: int, integrands: Integrands
-    ) -> list[ComplexArray]:
-        """Integrate over elements that are bisected until each piece is far from its point."""
-        pair, low, high = self._split(x, elements)
-        reference, weights = gauss_legendre(N_POINTS + highest // 2)
-        xi = 0.5 * (low + high)[:, None] + 0.5 * (high - low)[:, None] * reference
-        y, slope = self.points(elements[pair], xi)
-        speed = np.abs(slope)
-        measure = 0.5 * (high - low)[:, None] * weights * speed
-        values = integrands(x[pair, None] - y, slope / speed)
-        sums = [np.zeros((highest + 1, x.size), complex) for _ in values]
-        for k, polynomial in enumerate(kernels.legendre_values(highest, xi)):
-            for total, value in zip(sums, values, strict=True):
-                np.add.at(total[k], pair, np.sum(value * measure * polynomial, axis=1))
-        return sums
-
-    def _rule(self, n_points: int) -> tuple[ComplexArray, ComplexArray]:
-        """Return y and dy/dxi (n_elements, n_points) of all elements, from a cache."""
-        if n_points not in self._rules:
-            xi = gauss_legendre(n_points)[0]
-            self._rules[n_points] = self.points(np.arange(self._mesh.n_elements), xi)
-        return self._rules[n_points]
-
-    def _split(self, x: ComplexArray, elements: IntArray) -> tuple[IntArray, FloatArray, FloatArray]:
-        """Bisect elements until each piece [low, high] is far from its point."""
-
-        def is_away(pair: IntArray, low: FloatArray, high: FloatArray) -> BoolArray:
-            y, slope = self.points(elements[pair], 0.5 * (low + high)[:, None])
-            return _is_away(x[pair], y[:, 0], slope[:, 0], high - low)
-
-        return split_until(is_away, x.size, -1.0, 1.0)
-
-
-def _is_away(x: ComplexArray, middle: ComplexArray, slope: ComplexArray, length: FloatArray | float) -> BoolArray:
-    """Return which pieces, of given lengths in the local coordinate, are far enough from their points for one rule."""
-    away: BoolArray = np.abs(x - middle) >= SEPARATION * 0.5 * length * np.abs(slope)
-    return away

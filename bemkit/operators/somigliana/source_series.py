@@ -11,7 +11,8 @@ import numpy as np
 
 from bemkit.arrays import ComplexArray, FloatArray, IntArray
 from bemkit.geometry.proximity.cluster_tree import Clusters
-from bemkit.operators.somigliana.expansions import Expansions, Sources
+from bemkit.operators.somigliana.expansions import Expansions
+from bemkit.operators.somigliana.point_sources import Sources
 from bemkit.threads import for_each_chunk
 
 SourcesOf: TypeAlias = Callable[[IntArray, int], Sources]
@@ -85,8 +86,8 @@ class SourceSeries:
             sources = sources_of(positions[chosen], n_points)
             n_sources = sources.position.shape[1]
             source_leaf = np.repeat(leaf[chosen], n_sources)
-            position, f, g, e = sources.position.ravel(), sources.f.ravel(), sources.g.ravel(), sources.e.ravel()
-            relative = Sources(position - leaves.centre[source_leaf], f, g, e)
+            flat = Sources._make(values.ravel() for values in sources)
+            relative = flat._replace(position=flat.position - leaves.centre[source_leaf])
             result[present - chunk.start] += self.expansions.of_sources(
                 relative, leaves.radius[source_leaf], n_sources * first
             )
