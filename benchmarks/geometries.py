@@ -28,6 +28,7 @@ from bemkit.operators.collocation import compiled
 from bemkit.operators.hierarchy.factor import Factor
 from bemkit.operators.steklov_poincare.hierarchical import HierarchicalCollocation
 from bemkit.threads import blas_threads_for
+from benchmarks.large import largest_rank, n_bytes
 from tests.scenes import Perforated
 
 FLOOR = bk.RigidHalfPlane((0.0, 0.0), (0.0, 1.0))
@@ -131,11 +132,12 @@ def row_of(scene: bk.Scene, n_elements: int) -> Row:
         residual = body.imbalance(state).worst
     factor = body.loaded.system.factor
     assert isinstance(factor, Factor)
-    n_bytes, rank = factor.compression.n_bytes + factor.n_bytes, factor.compression.largest_rank
+    skeletons = factor.compression.skeletons
+    memory, rank = n_bytes((factor._levels, skeletons)), largest_rank(factor.compression)
     del body, factor
     solution = bk.run(replace(scene, linear_solver=bk.Hierarchical()))
     return Row(
-        scene.title, given.mesh.n_elements, build, response, n_bytes, rank, residual,
+        scene.title, given.mesh.n_elements, build, response, memory, rank, residual,
         solution.status.name, solution.outer_steps, solution.certificate.worst,
     )  # fmt: skip
 

@@ -62,6 +62,20 @@ class Row:
     apart: float = math.nan
 
 
+def n_bytes(value: object) -> int:
+    """Return the memory of all arrays in nested tuples, lists and objects."""
+    if isinstance(value, np.ndarray):
+        return value.nbytes
+    parts = value if isinstance(value, tuple | list) else getattr(value, "__dict__", {}).values()
+    return sum(map(n_bytes, parts))
+
+
+def largest_rank(compression: Compression) -> int:
+    """Return the largest number of rows or columns of a skeleton."""
+    skeletons = (skeleton for level in compression.skeletons for skeleton in level)
+    return max(max(skeleton.rows.size, skeleton.columns.size) for skeleton in skeletons)
+
+
 @dataclass
 class Parts:
     """Processor seconds of the parts of a run on the mesh that was compressed last."""
@@ -83,13 +97,13 @@ class Parts:
         def compressed(cls: type, *arguments: Any) -> Compression:
             result: Compression
             result, self.build = timed(compress, cls, *arguments)
-            self.rank, self.updates, self.certificates = result.largest_rank, [], []
+            self.rank, self.updates, self.certificates = largest_rank(result), [], []
             return result
 
         def updated(factor: Factor, *arguments: Any) -> None:
             _, seconds = timed(update, factor, *arguments)
             self.updates.append((factor.n_factored, seconds))
-            self.n_bytes = factor.n_bytes + factor.compression.n_bytes
+            self.n_bytes = n_bytes((factor._levels, factor.compression.skeletons))
 
         def certified(body: HierarchicalBody, *arguments: Any) -> Any:
             result, seconds = timed(certify, body, *arguments)

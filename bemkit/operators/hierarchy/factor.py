@@ -235,11 +235,6 @@ class Factor:
         root = self._loaded(-1, 0)
         return self._of_border(replace(root, of_loads=root.of_loads - self.border_load[:, None]))[:, 0]
 
-    @property
-    def n_bytes(self) -> int:
-        """Memory of all factors [bytes]."""
-        return sum(cluster.n_bytes for level in self._levels for cluster in level if cluster is not None)
-
     def _leaf(self, number: int, factors: FloatArray, given: FloatArray) -> ClusterResponse:
         """Return the response of a leaf under factors (n, 4, 2) and k given parts (4 n, k) of local conditions."""
         positions, columns = self.tree.positions(0, number), self.compression.unknowns[number]

@@ -50,11 +50,6 @@ class Interpolation:
         """Number of all values."""
         return self.skeleton.size + self.rest.size
 
-    @property
-    def n_bytes(self) -> int:
-        """Memory [bytes]."""
-        return self.weights.nbytes + self.skeleton.nbytes + self.rest.nbytes
-
     def matrix(self) -> FloatArray:
         """Return the matrix (n, k) from values of the skeleton to all values."""
         result = np.zeros((self.n, self.skeleton.size))

@@ -33,11 +33,6 @@ class ClusterResponse:
         """Return the same cluster under k zero loads."""
         return replace(self, of_loads=np.zeros((len(self.of_loads), k)), at_rest=np.zeros((len(self.at_rest), k)))
 
-    @property
-    def n_bytes(self) -> int:
-        """Memory [bytes]."""
-        return self.scattering.nbytes + self.of_loads.nbytes + self.response.nbytes + self.at_rest.nbytes
-
 
 def merge_siblings(
     first: ClusterResponse,

@@ -245,17 +245,3 @@ class Compression:
         """
         first, second = self.skeletons[level][2 * pair : 2 * pair + 2]
         return self.equations.block(first.rows, second.columns), self.equations.block(second.rows, first.columns)
-
-    @property
-    def largest_rank(self) -> int:
-        """Largest number of rows or columns of a skeleton."""
-        return max(max(skeleton.rows.size, skeleton.columns.size) for level in self.skeletons for skeleton in level)
-
-    @property
-    def n_bytes(self) -> int:
-        """Memory of all skeletons [bytes]."""
-        return sum(
-            skeleton.row_map.n_bytes + skeleton.column_map.n_bytes + skeleton.rows.nbytes + skeleton.columns.nbytes
-            for level in self.skeletons
-            for skeleton in level
-        )
