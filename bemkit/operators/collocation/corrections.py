@@ -23,7 +23,6 @@ The first field is a source of volume, the second a uniform dilatation; both are
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -148,21 +147,26 @@ class Reciprocity:
 
 
 @dataclass(frozen=True, eq=False)
-class Dilatation:
-    """The field w = (1 - 2 nu) (z - c) divided by the diameter of the body; `value` omits the factor 1 - 2 nu.
+class ReciprocalField:
+    """The field w = a / conj(z - c) of a source in a hole, or (1 - 2 nu) (z - c) / a, a dilatation.
 
     Parameters
     ----------
     centre : complex [m]
-    diameter : float [m]
+        c.
+    size : float [m]
+        a: the distance of a source from the boundary, or the diameter of the body.
+    is_source : bool
     """
 
     centre: complex
-    diameter: float
+    size: float
+    is_source: bool
 
     def value(self, z: ComplexArray) -> ComplexArray:
-        """Return the field at points."""
-        return np.asarray((z - self.centre) / self.diameter)
+        """Return the field at points, that of a dilatation without the factor 1 - 2 nu."""
+        arm = z - self.centre
+        return np.asarray(self.size / arm.conj() if self.is_source else arm / self.size)
 
     def work(self, arcs: Arcs, material: Material) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
         """Return the factors of tractions t, displacements u and gradients g in the work, (n_elements,) each.
@@ -170,53 +174,28 @@ class Dilatation:
         The real part of the sum over elements is the work of t on w, and of u + g (y - x) on t(w) / (2 mu), with the
         midpoint x of an element.
         """
-        factor = (1.0 - 2.0 * material.effective_poisson_ratio) / (2.0 * material.shear_modulus * self.diameter)
-        return (
-            np.sum((arcs.z - self.centre).conj() * np.abs(arcs.dz), axis=1) * factor,
-            1j * (arcs.end - arcs.start).conj() / self.diameter,
-            1j * np.sum(arcs.arm * arcs.dz.conj(), axis=1) / self.diameter,
-        )
+        start, end, arm = arcs.start - self.centre, arcs.end - self.centre, arcs.z - self.centre
+        if self.is_source:
+            factor, change, steps = 1.0, self.size * (end - start) / (start * end), self.size * arcs.dz / arm**2
+        else:
+            factor = 1.0 - 2.0 * material.effective_poisson_ratio
+            change, steps = (end - start).conj() / self.size, arcs.dz.conj() / self.size
+        on_traction = np.sum(self.value(arcs.z).conj() * np.abs(arcs.dz), axis=1)
+        on_traction *= factor / (2.0 * material.shear_modulus)
+        return on_traction, 1j * change, 1j * np.sum(arcs.arm * steps, axis=1)
 
 
-@dataclass(frozen=True, eq=False)
-class HoleSource:
-    """The field w = a / conj(z - c) of a source of volume in a hole.
-
-    Parameters
-    ----------
-    centre : complex [m]
-    radius : float [m]
-        a, the distance of the centre from the boundary.
-    """
-
-    centre: complex
-    radius: float
-
-    def value(self, z: ComplexArray) -> ComplexArray:
-        """Return the field at points."""
-        return np.asarray(self.radius / (z - self.centre).conj())
-
-    def work(self, arcs: Arcs, material: Material) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
-        """Return the factors of tractions, displacements and gradients; see `Dilatation.work`."""
-        c, a = self.centre, self.radius
-        return (
-            np.sum(np.abs(arcs.dz) / (arcs.z - c), axis=1) * (a / (2.0 * material.shear_modulus)),
-            1j * a * (arcs.end - arcs.start) / ((arcs.start - c) * (arcs.end - c)),
-            1j * a * np.sum(arcs.arm * arcs.dz / (arcs.z - c) ** 2, axis=1),
-        )
-
-
-def _reciprocal_fields(mesh: BoundaryMesh, loop: IntArray, area: float) -> Sequence[Dilatation | HoleSource]:
+def _reciprocal_fields(mesh: BoundaryMesh, loop: IntArray, area: float) -> list[ReciprocalField]:
     """Return the fields of a closed curve: a dilatation, or sources in a hole and its images.
 
     A source lies in the centre of the largest circle within the hole.
     """
     if area > 0.0:
-        return [Dilatation(complex(*mesh.centre), mesh.diameter)]
+        return [ReciprocalField(complex(*mesh.centre), mesh.diameter, is_source=False)]
     centre, radius = _largest_circle(mesh, loop)
     symmetry = mesh.symmetry
     images = [centre] if symmetry is None else [symmetry.reflected(centre, signs) for signs in symmetry.images]
-    return [HoleSource(complex(*image), radius) for image in images]
+    return [ReciprocalField(complex(*image), radius, is_source=True) for image in images]
 
 
 def _largest_circle(mesh: BoundaryMesh, loop: IntArray) -> tuple[FloatArray, float]:
