@@ -110,13 +110,7 @@ def dof_points(space: BoundarySpace, mesh: BoundaryMesh | None = None) -> FloatA
     -------
     (n_scalar, 2) array [m]
     """
-    if mesh is None and isinstance(space, LagrangeSpace):
-        return space.dof_points
-    return _points_on(space, space.mesh if mesh is None else mesh)
-
-
-def _points_on(space: BoundarySpace, mesh: BoundaryMesh) -> FloatArray:
-    points = np.empty((space.n_dofs // 2, 2))
+    mesh, points = space.mesh if mesh is None else mesh, np.empty((space.n_dofs // 2, 2))
     points[space.element_dofs] = mesh.points(np.arange(mesh.n_elements), element_nodes(space))
     return points
 
@@ -220,13 +214,6 @@ class LagrangeSpace:
     def n_dofs(self) -> int:
         """Number of vector dofs."""
         return 2 * (int(self.element_dofs.max()) + 1)
-
-    @cached_property
-    def dof_points(self) -> FloatArray:
-        """(n_scalar, 2) array [m], read-only: where the scalar dofs are function values."""
-        points = _points_on(self, self.mesh)
-        read_only(points)
-        return points
 
     @property
     def local_nodes(self) -> FloatArray:
