@@ -179,7 +179,7 @@ class HierarchicalBody(LinearBody):
         self._fields.clear()
         substituted = self._held_friction.substituted(conditions)
         state = self._held_friction.restored(conditions, self._solved(substituted))
-        self._responses.append(_Response(state, substituted, self._current.system.n_answers))
+        self._responses.append(_Response(state, substituted, self._current.system.factor.n_updates))
         del self._responses[:-_KEPT]
         return state
 
@@ -253,7 +253,7 @@ class HierarchicalBody(LinearBody):
             if fields.state is state:
                 return fields
         response = next((response for response in self._responses if response.state is state), None)
-        if response is None or response.answer != self._current.system.n_answers:
+        if response is None or response.answer != self._current.system.factor.n_updates:
             self._solved(stick(state.u_n, state.u_t) if response is None else response.conditions)
         loaded = self._current
         traction, strained = loaded.system.full_state()
@@ -326,7 +326,7 @@ class HierarchicalBody(LinearBody):
 
 @dataclass(frozen=True, eq=False)
 class _Response:
-    """A state, its conditions, and the value of `HierarchicalSystem.n_answers` when it was solved."""
+    """A state, its conditions, and the value of `BodyFactor.n_updates` when it was solved."""
 
     state: ContactState
     conditions: LinearConditions

@@ -107,10 +107,10 @@ class BodyFactor(Protocol):
 
     @property
     def n_updates(self) -> int:
-        """Number of calls of `update`."""
+        """Number of calls of `update`; `HierarchicalSystem.full_state` belongs to the last one."""
 
     def prepare(self, loads: Iterable[FloatArray]) -> None:
-        """Announce, before the first `update`, the given parts of later conditions."""
+        """Announce, before the first `update`, given parts (n_elements, 4): responses to their sums are then cheap."""
 
     def update(self, conditions: LocalConditions) -> None:
         """Set the conditions on all elements."""
@@ -142,15 +142,6 @@ class HierarchicalSystem:
         self._position = np.empty_like(self._order)
         self._position[self._order] = np.arange(self._order.size)
         self._frame = frame
-
-    @property
-    def n_answers(self) -> int:
-        """Number of solved sets of conditions; `full_state` belongs to the last one."""
-        return self.factor.n_updates
-
-    def prepare(self, loads: Iterable[FloatArray]) -> None:
-        """Announce, before the first `state`, given parts (n_elements, 4): responses to their sums are then cheap."""
-        self.factor.prepare(loads)
 
     def state(self, known: LocalConditions, elements: IntArray, conditions: LinearConditions) -> FloatArray:
         """Return (t_1, t_2, u_1, u_2) of some elements, (n, 4), in their frames.

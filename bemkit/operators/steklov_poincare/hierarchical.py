@@ -196,7 +196,7 @@ class LoadedSystem:
         loaded = cls(elastic, conditions, system, may_be_loaded, may_move, force, motions, at_rest)
         if conditions.later:
             later = (loaded.under(conditions.in_plane(given.force), given.displacement) for given in conditions.later)
-            system.prepare(load.known.given for load in (loaded, *later))
+            system.factor.prepare(load.known.given for load in (loaded, *later))
         return loaded
 
     def under(self, force: FloatArray, displacement: FloatArray) -> LoadedSystem:

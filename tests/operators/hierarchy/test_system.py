@@ -248,9 +248,9 @@ def test_loads_that_are_expected_and_their_sums_factor_nothing() -> None:
     shares = np.array([(1, 0, 0), (0.5, 0, 0), (1, 1, 0), (2, -3, 0), (0, 0, 0), (0, 0.1, 1), (1, 0, 0)])
     local = [local_conditions_of(few, mesh, conditions, np.tensordot(share, loads, 1), 0.0 * kept) for share in shares]
     more = [np.cos((6.0 + k) * mesh.centres) * force for k in range(7)]
-    few.prepare(each.given for each in local[:3])
+    few.factor.prepare(each.given for each in local[:3])
     others = (local_conditions_of(many, mesh, conditions, each, 0.0 * kept) for each in more)
-    many.prepare(each.given for each in (*local[:3], *others))
+    many.factor.prepare(each.given for each in (*local[:3], *others))
     factored: dict[str, list[int]] = {"few": [], "many": []}
     for each in local:
         for solver in (few, many, fresh):
