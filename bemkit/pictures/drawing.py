@@ -76,13 +76,18 @@ BELOW = "below"
 
 
 def legend_below(axes: Axes, n_columns: int = 3, size: float = 9.0) -> None:
-    """Put the legend below the axes, clear of the label of the abscissa; the size of its text is in points."""
+    """Put the legend below the axes, clear of the label of the abscissa; the size of its text is in points.
+
+    Of artists with equal labels the first has the entry.
+    """
     from matplotlib.transforms import ScaledTranslation
 
     scale = axes.get_figure(root=True).dpi_scale_trans  # type: ignore[union-attr]
     below = axes.transAxes + ScaledTranslation(0.0, -0.5, scale)
     place: dict[str, Any] = {"loc": "upper center", "bbox_to_anchor": (0.5, 0.0), "bbox_transform": below}
-    axes.legend(**place, ncols=n_columns, frameon=False, fontsize=size).set_gid(BELOW)
+    handles, labels = axes.get_legend_handles_labels()
+    shown = [handles[labels.index(label)] for label in dict.fromkeys(labels)]
+    axes.legend(handles=shown, **place, ncols=n_columns, frameon=False, fontsize=size).set_gid(BELOW)
 
 
 def show_grid(axes: Axes) -> None:

@@ -39,19 +39,14 @@ def draw_loads(axes: Axes, shown: DrawnScene, factor: float) -> FloatArray:
     largest = max((float(np.hypot(*load.T).max()) for _, load in loaded), default=0.0)
     ends = [np.zeros((0, 2))]
     for places, load in loaded if largest > 0.0 else ():
-        label = "load" if len(ends) == 1 else None
-        ends.append(_draw_load(axes, places, _LONGEST * shown.size * load / largest, _LEAST, shown.size, label))
-    ends.append(_draw_connections(axes, shown, factor))
-    ends.append(_draw_weights(axes, shown, factor))
-    ends.append(_draw_forces(axes, shown, factor))
-    return np.concatenate(ends)
+        ends.append(_draw_load(axes, places, _LONGEST * shown.size * load / largest, shown.size, "load"))
+    drawn = (draw(axes, shown, factor) for draw in (_draw_connections, _draw_weights, _draw_forces))
+    return np.concatenate([*ends, *drawn])
 
 
-def _draw_load(
-    axes: Axes, places: BoundaryPoints, arrows: FloatArray, least: float, size: float, label: str | None
-) -> FloatArray:
+def _draw_load(axes: Axes, places: BoundaryPoints, arrows: FloatArray, size: float, label: str) -> FloatArray:
     """Draw arrows whose heads are on the boundary where they press, their tails where they pull; return their ends."""
-    seen = np.hypot(*arrows.T) > least * _LONGEST * size
+    seen = np.hypot(*arrows.T) > _LEAST * _LONGEST * size
     arrows, drawn, normals = arrows[seen], places.drawn[seen], places.normals[seen]
     presses = np.sum(arrows * normals, axis=1) <= 0.0
     tails = np.where(presses[:, None], drawn - arrows, drawn)
@@ -63,22 +58,22 @@ def _draw_connections(axes: Axes, shown: DrawnScene, factor: float) -> FloatArra
     """Draw rigid connections as bars, with the force or else the moment in their middle; return the ends of arrows."""
     from matplotlib.collections import LineCollection
 
-    ends, label = [np.zeros((0, 2))], "rigid connection"
+    ends = [np.zeros((0, 2))]
     connected = [(body, part.condition, elements) for body in shown.bodies for part, elements in body.parts]
     for body, condition, elements in connected:
         if not isinstance(condition, RigidConnection):
             continue
         xi = np.linspace(-1.0, 1.0, _POINTS_OF_BAR)
         lines = body.mesh.points(elements, xi) + factor * body.displacement_at(elements, xi)
-        axes.add_collection(LineCollection(list(lines), colors=VERMILION, linewidths=4.0, zorder=2.5, label=label))
-        label = "_"  # none for the others
+        bars = LineCollection(list(lines), colors=VERMILION, linewidths=4.0, zorder=2.5, label="rigid connection")
+        axes.add_collection(bars)
         places = evenly_spaced(body, elements, _SPACING * shown.size, factor)
         tractions = condition.at(places.points, places.normals)
         middle = BoundaryPoints(*(values.mean(axis=0)[None] for values in places))
         mean = tractions.mean(axis=0)[None]
         if np.hypot(*mean.T) > _LEAST * np.hypot(*tractions.T).max():
             arrow = _LONGEST * shown.size * mean / np.hypot(*mean.T)
-            ends.append(_draw_load(axes, middle, arrow, _LEAST, shown.size, "resultant" if len(ends) == 1 else None))
+            ends.append(_draw_load(axes, middle, arrow, shown.size, "resultant"))
         elif tractions.any():
             is_left = cross(places.drawn - middle.drawn, tractions).sum() > 0.0
             marker = r"$\circlearrowleft$" if is_left else r"$\circlearrowright$"

@@ -40,15 +40,14 @@ def draw_obstacles(axes: Axes, shown: DrawnScene) -> None:
 
     One that is given by its gap is drawn where it faces the body: at the distance of the gap from each point.
     """
-    frame, label = _frame(axes), "obstacle"
+    frame = _frame(axes)
     for loops, is_whole in fixed_obstacles(shown, frame):
         if is_whole:
-            _draw_hatched(axes, loops, frame, label)
+            _draw_hatched(axes, loops, frame, "obstacle")
         else:
-            _draw(axes, loops, _FILLED | {"hatch": "//", "edgecolor": _HATCH, "linewidth": 0.0}, label)
+            _draw(axes, loops, _FILLED | {"hatch": "//", "edgecolor": _HATCH, "linewidth": 0.0}, "obstacle")
             for band in loops:
                 axes.plot(*band[: len(band) // 2].T, color=_EDGE, linewidth=1.0, zorder=0.5)
-        label = ""
     set_frame(axes, frame, margin=0.0)
 
 
@@ -122,11 +121,9 @@ def draw_rigid_bodies(axes: Axes, shown: DrawnScene, factor: float) -> None:
     frame = _frame(axes)
     farthest = 0.5 * float(np.ptp(frame, axis=1).max())
     widest = np.stack([frame[:, 0] - farthest, frame[:, 1] + farthest], axis=1)
-    label = "rigid body"
     for body, loops, moved in rigid_bodies(shown, factor, widest):
         _draw(axes, loops, _BEFORE, "")
-        _draw_hatched(axes, _with_outside(moved, body.obstacle, widest), frame, label)
-        label = ""
+        _draw_hatched(axes, _with_outside(moved, body.obstacle, widest), frame, "rigid body")
         if not _is_endless(body.obstacle):
             places = np.clip(np.concatenate([*loops, *moved]), widest[:, 0], widest[:, 1])
             frame = np.stack(

@@ -42,13 +42,12 @@ def plane_axes(axes: Axes | None, frame: FloatArray, title: str, units: UnitName
 
 def draw_bodies(axes: Axes, shown: DrawnScene, factor: float) -> None:
     """Draw the outlines of bodies, dashed, and the bodies moved by a factor times their displacements."""
-    for number, body in enumerate(shown.bodies):
-        labels = ("initial", f"deformed, displacements \u00d7 {factor:g}") if number == 0 else (None, None)
+    moved = f"deformed, displacements \u00d7 {factor:g}"
+    for body in shown.bodies:
         before, after = body.outlines(0.0), body.outlines(factor)
-        for loop, (initial, deformed) in enumerate(zip(before, after, strict=True)):
-            of_initial, of_deformed = labels if loop == 0 else (None, None)
-            axes.plot(*initial.T, color=GREY, linestyle="--", linewidth=1.0, label=of_initial)
-            axes.plot(*deformed.T, color=BLUE, linewidth=1.6, label=of_deformed)
+        for initial, deformed in zip(before, after, strict=True):
+            axes.plot(*initial.T, color=GREY, linestyle="--", linewidth=1.0, label="initial")
+            axes.plot(*deformed.T, color=BLUE, linewidth=1.6, label=moved)
         fill(axes, body, after, shown.frame)
 
 
@@ -95,7 +94,7 @@ def draw_symmetry_lines(axes: Axes, symmetry: Symmetry | None) -> None:
 
 
 def draw_arrows(
-    axes: Axes, tails: FloatArray, arrows: FloatArray, colour: str, label: str | None, *, is_hollow: bool = False
+    axes: Axes, tails: FloatArray, arrows: FloatArray, colour: str, label: str, *, is_hollow: bool = False
 ) -> None:
     """Draw arrows (n, 2) [m] from their tails (n, 2) [m]."""
     axes.quiver(

@@ -14,37 +14,27 @@ _SPACING, _SIZE = 0.035, 0.012
 """Distance of symbols, and their radius, relative to the picture."""
 _ARROW, _LEAST = 0.06, 1e-9
 """Length of arrows, relative to the picture, and the least displacement that has one, relative to the largest."""
-_COLOUR = "#333333"
+_COLOUR, _GIVEN = "#333333", "given displacement"
 
 
 def draw_supports(axes: Axes, shown: DrawnScene, factor: float) -> None:
     """Draw the supports of all bodies where these are drawn, moved by a factor times their displacements."""
     size = shown.size
-    labelled: set[str] = set()
     for body in shown.bodies:
         for part, elements in body.parts:
             match part.condition:
                 case Clamped():
                     places = evenly_spaced(body, elements, 0.6 * _SPACING * size, factor)
-                    _draw_clamped(axes, places, _SIZE * size, _new("clamped", labelled))
+                    _draw_clamped(axes, places, _SIZE * size)
                 case Roller():
                     places = evenly_spaced(body, elements, _SPACING * size, factor)
-                    _draw_rollers(axes, places, _SIZE * size, _new("roller", labelled))
+                    _draw_rollers(axes, places, _SIZE * size)
                 case PrescribedDisplacement() as given:
                     places = evenly_spaced(body, elements, 2.0 * _SPACING * size, factor)
-                    values = given.at(places.points)
-                    _draw_given(axes, places, values, given.is_prescribed, size, _new("given displacement", labelled))
+                    _draw_given(axes, places, given.at(places.points), given.is_prescribed, size)
 
 
-def _new(label: str, labelled: set[str]) -> str | None:
-    """Return a label the first time, None later."""
-    if label in labelled:
-        return None
-    labelled.add(label)
-    return label
-
-
-def _draw_clamped(axes: Axes, places: BoundaryPoints, size: float, label: str | None) -> None:
+def _draw_clamped(axes: Axes, places: BoundaryPoints, size: float) -> None:
     """Hatch the outside of the boundary."""
     from matplotlib.collections import LineCollection
 
@@ -52,10 +42,10 @@ def _draw_clamped(axes: Axes, places: BoundaryPoints, size: float, label: str | 
     ends = places.drawn + 1.6 * size * (places.normals - tangents)
     lines = np.stack([places.drawn, ends], axis=1)
     axes.add_collection(LineCollection(list(lines), colors=_COLOUR, linewidths=0.9))
-    axes.plot([], [], linestyle="", marker=r"$/\!/\!/$", markersize=13, color=_COLOUR, label=label)
+    axes.plot([], [], linestyle="", marker=r"$/\!/\!/$", markersize=13, color=_COLOUR, label="clamped")
 
 
-def _draw_rollers(axes: Axes, places: BoundaryPoints, size: float, label: str | None) -> None:
+def _draw_rollers(axes: Axes, places: BoundaryPoints, size: float) -> None:
     """Draw circles between the boundary and a line on which they roll."""
     from matplotlib.collections import EllipseCollection, LineCollection
 
@@ -74,7 +64,7 @@ def _draw_rollers(axes: Axes, places: BoundaryPoints, size: float, label: str | 
         zorder=2,
     )
     axes.add_collection(circles)
-    axes.plot([], [], linestyle="", marker="o", color=_COLOUR, markerfacecolor="white", label=label)
+    axes.plot([], [], linestyle="", marker="o", color=_COLOUR, markerfacecolor="white", label="roller")
     tangents = np.stack([-places.normals[:, 1], places.normals[:, 0]], axis=1)
     ground = centres + 1.1 * size * places.normals
     lines = np.stack([ground - 1.6 * size * tangents, ground + 1.6 * size * tangents], axis=1)
@@ -82,7 +72,7 @@ def _draw_rollers(axes: Axes, places: BoundaryPoints, size: float, label: str | 
 
 
 def _draw_given(
-    axes: Axes, places: BoundaryPoints, values: FloatArray, is_given: tuple[bool, bool], size: float, label: str | None
+    axes: Axes, places: BoundaryPoints, values: FloatArray, is_given: tuple[bool, bool], size: float
 ) -> None:
     """Draw arrows along given displacements, with their heads on the boundary; bars along what must not move."""
     from matplotlib.collections import LineCollection
@@ -92,11 +82,11 @@ def _draw_given(
     if largest > 0.0:
         is_moved = lengths > _LEAST * largest
         arrows = _ARROW * size * values[is_moved] / lengths[is_moved, None]
-        draw_arrows(axes, places.drawn[is_moved] - arrows, arrows, GREEN, label)
+        draw_arrows(axes, places.drawn[is_moved] - arrows, arrows, GREEN, _GIVEN)
         return
     marker = "+" if all(is_given) else "_" if is_given[0] else "|"
     for axis in (axis for axis in (0, 1) if is_given[axis]):
         along = _SIZE * size * np.eye(2)[axis]
         bars = np.stack([places.drawn - along, places.drawn + along], axis=1)
         axes.add_collection(LineCollection(list(bars), colors=GREEN, linewidths=1.6, zorder=3))
-    axes.plot([], [], linestyle="", marker=marker, markersize=9, color=GREEN, label=label)
+    axes.plot([], [], linestyle="", marker=marker, markersize=9, color=GREEN, label=_GIVEN)

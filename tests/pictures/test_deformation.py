@@ -77,7 +77,7 @@ def test_no_contact_node_is_drawn_beyond_its_obstacle_nor_apart_from_it(name: st
     solution = run(SCENES[name])
     (body,) = shown(solution).bodies
     axes = draw(solution)  # type: ignore[operator]
-    (line,) = (line for line in axes.lines if str(line.get_label()).startswith("deformed"))
+    line = next(line for line in axes.lines if str(line.get_label()).startswith("deformed"))
     # curves are drawn at 8 points of an element, its ends and its middle, the nodes, among them
     deformed = np.concatenate([line.get_xydata() for line in axes.lines if line.get_linewidth() == 1.6])
     initial = np.concatenate([line.get_xydata() for line in axes.lines if line.get_linestyle() == "--"])
