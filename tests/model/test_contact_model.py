@@ -209,6 +209,6 @@ def test_the_whole_boundary_of_a_disc_faces_a_block_and_a_rigid_plane() -> None:
         pairs = bk.ContactPair(("block.top", f"disc.{lower}")), bk.ContactPair((f"disc.{upper}", "plane"))
         scene = bk.Scene(title="disc", bodies=(block, disc), rigid=(plane,), contacts=pairs, mesh=bk.MeshOptions(80))
         solution = bk.run(dataclasses.replace(scene, law=bk.Coulomb(0.3)))
-        assert solution.is_converged, solution.message
+        check_solution(solution)
         forces.append(solution.rigid["plane"].force_y)
     assert forces[0] == pytest.approx(forces[1], rel=1e-9)

@@ -166,14 +166,16 @@ def reaction_mismatch(contacts: Sequence[MeasuredContact]) -> float:
     Where elastic bodies touch: at each obstacle tractions are compared; see `nodal_mismatch`.
     """
     forces: dict[tuple[str, str], tuple[Side, float, np.ndarray]] = {}
+    between = [side for contact in contacts if contact.partner is not None for side, _ in contact.sides]
+    touching = {(side.body.solved.name, side.part) for side in between}
     for contact in contacts:
-        for side, sign in contact.sides if contact.partner is not None else ():
+        for side, sign in contact.sides:
             key = side.body.solved.name, side.part
             _, size, force = forces.get(key, (side, 0.0, np.zeros(2)))
             size += float(np.abs(contact.forces).sum())
             forces[key] = side, size, force + sign * contact.forces.sum(axis=0)
     worst = [0.0]
-    for side, size, force in forces.values():
+    for side, size, force in (forces[key] for key in touching):
         boundary, stress = side.body.boundary, side.body.scales.stress
         on_elements = boundary.forces[side.elements]
         size += float(np.abs(on_elements).sum()) + stress * float(boundary.lengths.min())
