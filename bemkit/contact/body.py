@@ -150,6 +150,11 @@ class SlipHistory:
         added = np.where(is_closed, np.abs(slip), 0.0)
         return SlipHistory(time, time - self.time, self.slip + added, added)
 
+    def towards(self, other: SlipHistory, share: float) -> SlipHistory:
+        """Return the history at a share of the way to another slip in the same increment."""
+        added = (1.0 - share) * self.last_slip + share * other.last_slip
+        return SlipHistory(self.time, self.time_step, self.slip + (added - self.last_slip), added)
+
     def of(self, nodes: IntArray) -> SlipHistory:
         """Return the history of some nodes."""
         return SlipHistory(self.time, self.time_step, self.slip[nodes], self.last_slip[nodes])

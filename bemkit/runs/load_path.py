@@ -13,6 +13,7 @@ import numpy as np
 from bemkit.arrays import FloatArray
 from bemkit.contact.body import ContactState, SlipHistory
 from bemkit.contact.problem import ContactProblem
+from bemkit.geometry.vectors import norms
 from bemkit.model.model import Model
 from bemkit.results.solution import continued
 from bemkit.solvers.active_sets import NodeStatus
@@ -27,6 +28,7 @@ MOST_HALVINGS = 6
 """Number of times that an increment is halved before the step fails."""
 MOST_LAWS = 60
 """Largest number of solves of one increment under a law that depends on its slip."""
+_LEAST_SHARE = 1e-3
 _SETTLED = 1e-10
 """Change of a converged law, relative to the largest bound."""
 
@@ -108,7 +110,10 @@ class IncrementEnd:
         is_held = (before.state.traction != 0.0).any(axis=1) & (self.state.traction != 0.0).any(axis=1)
         slip = moved[:, 1] - self.obstacle_slip
         of_friction = -sigma[:, 1] * slip
-        dissipation = max(float(of_friction[is_held].sum()), 0.0)
+        # drawn touching, a node is closed before any load
+        rests = before.gap - before.state.displacement[:, 0] <= _RESTED * norms(moved)
+        rests &= (self.state.traction != 0.0).any(axis=1)
+        dissipation = max(float(of_friction[is_held | rests].sum()), 0.0)
         # a node that rested, or slipped the other way, slips under the friction of the end only
         turns = before.state.traction[:, 1] * self.state.traction[:, 1] <= 0.0
         turns |= before.motion.last_slip <= _RESTED * units.displacement * np.abs(slip)
@@ -319,17 +324,23 @@ class _Increments:
             problem = replace(problem, reference_slip=end.state.u_t + path.obstacle_slip(end, target))
         words = "" if target == 1.0 and not n_before else f"increment to {path.name_of(target)}"
         law, unit = problem.law, path.model.units.displacement
-        motion = end.motion.followed(time, np.zeros(problem.n_contact), np.zeros(problem.n_contact, bool))
+        tried = end.motion.followed(time, np.zeros(problem.n_contact), np.zeros(problem.n_contact, bool))
+        share, change = 1.0, np.zeros(problem.n_contact)
         for _ in range(MOST_LAWS):
-            present = problem.with_law(law.at_slip(motion)) if law.needs_history else problem
+            present = problem.with_law(law.at_slip(tried)) if law.needs_history else problem
             result = self._solved(present, start, words, is_last=is_last)
             n_steps = len(self.records) - n_before - 1
             if not result.is_converged:
-                return _Attempt(present, result, motion, n_steps)
+                return _Attempt(present, result, tried, n_steps)
             slip = (result.state.u_t - problem.slip_origin) * unit
             motion = end.motion.followed(time, slip, result.node_status != NodeStatus.SEPARATED)
             if not law.needs_history or _agree(present.law.bound, law.at_slip(motion).bound, result.state):
                 return _Attempt(present, result, motion, n_steps)
+            # where friction rises with slip, iterates overshoot: Aitken's share of the way
+            change, before = motion.last_slip - tried.last_slip, change
+            if (turn := change - before) @ turn > 0.0 and before.any():
+                share = float(np.clip(-share * (before @ turn) / (turn @ turn), _LEAST_SHARE, 1.0))
+            tried = motion if share == 1.0 else tried.towards(motion, share)
             start = result.state
         words = f"{Status.STALLED.value} [the friction law and the slip on which it depends do not come to agree]"
         return _Attempt(present, replace(result, status=Status.STALLED, message=words), motion, n_steps)

@@ -17,6 +17,7 @@ from bemkit.results.load_history import LoadHistory, StepWork
 from bemkit.runs.step_errors import StepErrors
 from bemkit.scene.load_history import load_steps
 from bemkit.solvers.base import Status
+from bemkit.testing import check_solution
 from bemkit.testing.independent_check import violations_of
 from tests.failing_solver import Failing
 from tests.runs.test_rigid_bodies import driven
@@ -387,3 +388,43 @@ def test_slip_under_a_falling_bound_misses_nothing() -> None:
     slip = (0.002 * 100.0 * np.pi - 0.2) / (100.0 * np.pi)
     assert work.dissipation == pytest.approx(0.5 * (0.002 * 100.0 * np.pi + 0.2) * slip, rel=1e-9)
     assert work.missed_dissipation <= 1e-9 * work.dissipation
+
+
+def on_plate(law: bk.FrictionLaw, **changes: Any) -> bk.Scene:
+    """Return a block on a plate, which a rigid plane without friction presses."""
+    plate = bk.Body(
+        name="plate",
+        shape=bk.Rectangle(4.0, 1.0, (-2.0, -1.0)),
+        material=bk.Material(1.0, 0.3),
+        parts=(bk.Part("base", bk.Clamped(), ("bottom",)),),
+        mesh=bk.MeshOptions(elements=80),
+    )
+    block = bk.Body(name="block", shape=bk.Rectangle(1.0, 0.5, (-0.5, 0.0)), material=bk.Material(1.0, 0.3))
+    plane = bk.RigidBody(name="plane", obstacle=bk.RigidHalfPlane((0.0, 0.5), (0.0, -1.0)), y=-2e-3, x=0.0)
+    pairs = bk.ContactPair(("plate.top", "block.bottom"), law=law), bk.ContactPair(("block.top", "plane"))
+    stated = {"bodies": (plate, block), "rigid": (plane,), "contacts": pairs, "mesh": bk.MeshOptions(elements=40)}
+    return bk.Scene(**{"title": "block", **stated, **changes})
+
+
+def test_friction_of_the_first_step_dissipates() -> None:
+    """Under loads in proportion all works grow with the square of the load factor."""
+    plain = on_plate(bk.Coulomb(0.2))
+    pressed = bk.Part("top", bk.Pressure(1e-3), ("top",))
+    block = replace(plain.bodies[1], parts=(pressed,))
+    rest = {"bodies": (plain.bodies[0], block), "rigid": (), "contacts": plain.contacts[:1]}
+    loading = bk.run(replace(plain, **rest, load_factors=(1.0, 2.0))).loading
+    assert loading is not None
+    first, second = (step.work for step in loading.steps)
+    assert first.dissipation > 1e-3 * first.external_work
+    assert first.dissipation == pytest.approx(second.dissipation / 3.0, rel=1e-9)
+    assert abs(first.increment_work) < 1e-9 * first.external_work
+    assert not loading.total().missed_dissipation > 1e-9 * second.dissipation
+
+
+def test_friction_that_rises_steeply_with_the_rate_agrees_with_the_slip() -> None:
+    """In short steps a small slip makes a large rate: the slip of one solve makes a law under which the next rests."""
+    steps = (bk.Step(1.0), bk.Step(1.2, {"rigid.plane.y": -2.5e-3}, increments=2))
+    solution = bk.run(on_plate(bk.RateStrengthening(0.1, 0.02, 1e-4), steps=steps))
+    assert solution.is_converged, solution.message
+    assert "slip" in solution.contact.status_words()
+    check_solution(solution, solution.at_step(2))
