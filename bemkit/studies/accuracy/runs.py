@@ -6,7 +6,7 @@ Measured are run times, memory and errors, or only the errors where runs at the 
 from __future__ import annotations
 
 import tracemalloc
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any
@@ -24,15 +24,12 @@ from bemkit.solvers.base import ContactSolver
 from bemkit.studies.accuracy.records import STAGES, ErrorRecord
 from bemkit.studies.engine import Attempt, StudyError, Task, attempt
 
-ELEMENTS = (40, 80, 160, 320)
-ACCURACIES = (1e-2, 1e-3, 1e-4)
-MOST_ELEMENTS = 500
 _NAN = float("nan")
 
 
 @dataclass(frozen=True)
 class MeshSequence:
-    """Meshes of growing size.
+    """Meshes of growing size: of given numbers of elements, or, without a grading, of given accuracies.
 
     Parameters
     ----------
@@ -40,45 +37,40 @@ class MeshSequence:
         A word for tables and figures.
     sizes : tuple of float
         Keys of the meshes, from coarse to fine: numbers of elements, or accuracies.
-    options : callable (scene, size) -> MeshOptions
-    needs_estimate : bool
-        Whether they follow an error estimate, which some element types do not have.
+    grading : Grading or None
+    most_elements : int, optional
+        Limit of meshes that follow an accuracy.
     """
 
     name: str
     sizes: tuple[float, ...]
-    options: Callable[[Scene, float], MeshOptions]
-    needs_estimate: bool = False
+    grading: Grading | None = None
+    most_elements: int | None = None
+
+    def options(self, scene: Scene, size: float) -> MeshOptions:
+        """Return the options of one mesh; densities of sides are those of the scene."""
+        if self.grading is None:
+            return MeshOptions(accuracy=size, most_elements=self.most_elements)
+        return MeshOptions(elements=int(size), grading=self.grading, density=scene.mesh.density)
 
 
-def uniform(elements: tuple[int, ...] = ELEMENTS) -> MeshSequence:
-    """Return uniform meshes of given numbers of elements; densities of sides are those of the scene."""
-    return _given("uniform", Uniform(), elements)
+def uniform(elements: tuple[int, ...]) -> MeshSequence:
+    """Return uniform meshes of given numbers of elements."""
+    return MeshSequence("uniform", elements, Uniform())
 
 
-def graded(elements: tuple[int, ...] = ELEMENTS, exponent: float = 3.0) -> MeshSequence:
+def graded(elements: tuple[int, ...], exponent: float = 3.0) -> MeshSequence:
     """Return meshes graded towards corners and ends of parts like a power of the distance."""
-    return _given("graded", Algebraic(exponent), elements)
+    return MeshSequence("graded", elements, Algebraic(exponent))
 
 
-def _given(name: str, grading: Grading, elements: tuple[int, ...]) -> MeshSequence:
-    def options(scene: Scene, size: float) -> MeshOptions:
-        return MeshOptions(elements=int(size), grading=grading, density=scene.mesh.density)
-
-    return MeshSequence(name, elements, options)
-
-
-def adaptive(accuracies: tuple[float, ...] = ACCURACIES, most_elements: int = MOST_ELEMENTS) -> MeshSequence:
+def adaptive(accuracies: tuple[float, ...], most_elements: int = 500) -> MeshSequence:
     """Return meshes that follow the solution until an accuracy is reached.
 
     None has more than the given elements; a run that ends there keeps the best result so far. There is no limit of
     time, which would make results differ from run to run.
     """
-
-    def options(scene: Scene, size: float) -> MeshOptions:
-        return MeshOptions(accuracy=size, most_elements=most_elements)
-
-    return MeshSequence("adaptive", accuracies, options, needs_estimate=True)
+    return MeshSequence("adaptive", accuracies, most_elements=most_elements)
 
 
 @dataclass(frozen=True)
@@ -153,8 +145,8 @@ def all_runs(
 
 def _goes_with(element: Discretisation | str, sequence: MeshSequence) -> bool:
     if isinstance(element, str):
-        return sequence.needs_estimate
-    return element.estimates_error or not sequence.needs_estimate
+        return sequence.grading is None
+    return element.estimates_error or sequence.grading is not None
 
 
 def _run(

@@ -51,9 +51,9 @@ def test_runs_are_all_combinations_but_adaptive_constant_elements() -> None:
 def test_nothing_to_run_and_runs_that_are_the_same() -> None:
     scene = bk.load_scene("paper-1")
     with pytest.raises(StudyError, match="no run is possible: give at least one element type"):
-        all_runs(scene, [CONSTANT], [adaptive()], [NEWTON])
+        all_runs(scene, [CONSTANT], [adaptive((1e-2,))], [NEWTON])
     with pytest.raises(StudyError, match="no part of the scene is in contact: errors are measured"):
-        all_runs(bk.load_scene("bending"), [LINEAR], [uniform()], [NEWTON])
+        all_runs(bk.load_scene("bending"), [LINEAR], [uniform((20,))], [NEWTON])
     with pytest.raises(StudyError, match="linear, uniform, semismooth-newton of size 20 is given twice: remove one"):
         all_runs(scene, [LINEAR], [uniform((20, 20))], [NEWTON])
 
