@@ -249,12 +249,7 @@ def shown_progress(quiet: bool) -> AbstractContextManager[Callable[[StepRecord],
 
 
 class StudyProgress(ExitStack):
-    """Shows the preparation of a study in a ``with`` statement, and then its tasks.
-
-    Parameters
-    ----------
-    quiet : bool
-    """
+    """Shows the preparation of a study in a ``with`` statement, and then its tasks."""
 
     def __init__(self, quiet: bool) -> None:
         super().__init__()

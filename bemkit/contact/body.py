@@ -93,11 +93,6 @@ class ContactState:
         """Return the interpolation (1 - fraction) self + fraction other.
 
         An interpolation of two responses is again a response, because the body is linear.
-
-        Parameters
-        ----------
-        other : ContactState
-        fraction : float
         """
         if fraction == 1.0:
             return other

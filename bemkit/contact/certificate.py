@@ -88,10 +88,6 @@ def certify(problem: ContactProblem, state: ContactState) -> Certificate:
     state : ContactState
         Any state; it need not be a response of the body.
 
-    Returns
-    -------
-    Certificate
-
     Raises
     ------
     LawError

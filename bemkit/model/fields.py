@@ -92,10 +92,6 @@ class HeldForces(NamedTuple):
 class TractionRecovery:
     """How the forces of contact nodes are spread over the elements of all contact sides.
 
-    Parameters
-    ----------
-    sides : tuple of RecoveredSide
-
     Notes
     -----
     The nodal forces of a side over the integrals of its basis functions: with Gauss-Lobatto nodes that is exact for

@@ -184,10 +184,6 @@ def particular_solution(scene: BodyScene, mesh: BoundaryMesh, modulus: float, st
     modulus, stress : float [Pa]
         Units of the modulus and of stresses; strains are measured by their quotient.
 
-    Returns
-    -------
-    ParticularSolution
-
     Raises
     ------
     TemperatureError

@@ -142,13 +142,7 @@ class LogarithmicExpansion:
 
 @dataclass(frozen=True)
 class ParticularSolution:
-    """The sum of the states of several body forces and expansions.
-
-    Parameters
-    ----------
-    sources : tuple of Source
-    material : Material
-    """
+    """The sum of the states of several body forces and expansions."""
 
     sources: tuple[Source, ...]
     material: Material

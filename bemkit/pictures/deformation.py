@@ -24,10 +24,6 @@ def draw_deformation(solution: Result, axes: Axes | None = None, *, factor: floa
     factor : float, optional
         Factor by which displacements are enlarged; by default so small that contacts are drawn closed. The picture
         states it.
-
-    Returns
-    -------
-    Axes
     """
     scene = shown(solution)
     if factor is None:  # of a relief that fills the height nothing needs to be enlarged

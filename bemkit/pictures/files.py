@@ -42,10 +42,6 @@ def save_pictures(
         For print, such as 85 for a column: all text in 7 points and no title, which belongs into the caption. Not of
         the animation.
 
-    Returns
-    -------
-    tuple of Path
-
     Raises
     ------
     InputError

@@ -30,14 +30,7 @@ _DEGREES = ("constant", "linear", "quadratic")
 
 @dataclass(frozen=True)
 class PlanItem:
-    """One operator, matrix or library that a scene needs or skips, and why.
-
-    Parameters
-    ----------
-    name : str
-    is_needed : bool
-    reason : str
-    """
+    """One operator, matrix or library that a scene needs or skips, and why."""
 
     name: str
     is_needed: bool

@@ -35,10 +35,6 @@ def find_reference(scene: Scene) -> Reference | None:
     scene : Scene
         Its problem must be that of a shipped scene with a reference, to the last number; mesh, discretisation,
         solvers and names of units may differ.
-
-    Returns
-    -------
-    Reference or None
     """
     for name, make in _REFERENCES.items():
         if _problem(scene) == _problem(load_single_body(name)):

@@ -49,12 +49,7 @@ difference takes nodes nearer to the singular point."""
 
 @dataclass(frozen=True, eq=False)
 class ContactPlaces:
-    """Sides of contacts, ends of their zones, edges and singular corners.
-
-    Parameters
-    ----------
-    solution : SolvedScene
-    """
+    """Sides of contacts, ends of their zones, edges and singular corners."""
 
     solution: SolvedScene
 

@@ -70,10 +70,6 @@ def critical_friction(scene: Scene) -> CriticalFriction:
         which of them slip, is taken from its solution under its own law; one coefficient is then asked for that all
         sliding nodes have in common.
 
-    Returns
-    -------
-    CriticalFriction
-
     Raises
     ------
     NoContactError

@@ -185,12 +185,7 @@ class Force:
 
 @dataclass(frozen=True)
 class RigidConnection(Load):
-    """The part moves as a rigid body under the resultants of a traction: a placed `Force`.
-
-    Parameters
-    ----------
-    traction : Traction
-    """
+    """The part moves as a rigid body under the resultants of a traction: a placed `Force`."""
 
     traction: Traction
 

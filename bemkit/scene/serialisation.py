@@ -70,10 +70,6 @@ def structure(
     field : (type, str), optional
         The class and the name of the field that the table is the value of, whose docstring states its unit.
 
-    Returns
-    -------
-    object of the declared type
-
     Raises
     ------
     StructureError

@@ -59,11 +59,6 @@ def load_scene(source: str | Path) -> Scene:
     source : str or Path
         Path of a TOML file, or the name of a shipped scene such as ``"paper-1"``.
 
-    Returns
-    -------
-    Scene
-
-
     Raises
     ------
     SceneError

@@ -32,10 +32,6 @@ def unstructure(value: Any, declared: Any = None, path: str = "", *, keep_defaul
     keep_defaults : bool
         Whether the object's own fields are written even where they have their default value.
 
-    Returns
-    -------
-    dict, list, str, number or bool
-
     Raises
     ------
     UnstructureError

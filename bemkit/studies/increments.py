@@ -47,10 +47,6 @@ def increment_errors(scene: Scene) -> IncrementErrors:
     scene : Scene
         With steps or load factors, on one mesh.
 
-    Returns
-    -------
-    IncrementErrors
-
     Raises
     ------
     InputError

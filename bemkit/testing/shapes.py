@@ -23,10 +23,6 @@ def check_shape(shape: Shape) -> None:
     The outline is closed, has the body on its left, and is the same at every call; its curves pass `check_curve`, and
     their parameter is proportional to the arc length.
 
-    Parameters
-    ----------
-    shape : Shape
-
     Raises
     ------
     CheckFailed

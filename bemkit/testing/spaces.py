@@ -17,10 +17,6 @@ from bemkit.testing.failure import demand, evaluated
 def check_curve(curve: Curve) -> None:
     """Check everything that `Curve` promises; call it on your own curve.
 
-    Parameters
-    ----------
-    curve : Curve
-
     Raises
     ------
     CheckFailed

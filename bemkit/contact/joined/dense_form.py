@@ -20,10 +20,6 @@ _TIED = "the bodies tied to each other at all contact nodes (remove a tie that f
 class RelativeStiffness:
     """Stiffness of the contact nodes: forces by relative displacements. It does not depend on the loads.
 
-    Parameters
-    ----------
-    joined : CoupledMembers
-
     Raises
     ------
     SingularMatrixError

@@ -55,12 +55,7 @@ class Location:
 
 
 class Locator:
-    """Locates points relative to a body.
-
-    Parameters
-    ----------
-    mesh : BoundaryMesh
-    """
+    """Locates points relative to a body."""
 
     def __init__(self, mesh: BoundaryMesh) -> None:
         self._mesh = mesh

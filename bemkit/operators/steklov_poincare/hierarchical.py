@@ -37,12 +37,7 @@ class InexactEquationsError(SingularMatrixError):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class _EquationsMap(CondensedMap):
-    """A body under one load, solved for a unit displacement of each retained direction.
-
-    Parameters
-    ----------
-    loaded : LoadedSystem
-    """
+    """A body under one load, solved for a unit displacement of each retained direction."""
 
     loaded: LoadedSystem
 

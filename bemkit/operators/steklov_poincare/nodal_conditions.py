@@ -341,11 +341,6 @@ def _check_agreement(
 def free_modes(space: BoundarySpace, conditions: NodalConditions) -> FloatArray:
     """Return the rigid motions (n_motions, n_nodes, 2) of the nodes of a space that no support resists.
 
-    Parameters
-    ----------
-    space : BoundarySpace
-    conditions : NodalConditions
-
     Returns
     -------
     (n_motions, n_nodes, 2) array

@@ -56,10 +56,6 @@ def verify(
     cases : mapping of str to callable
         The known cases, by default all of bemkit; each is made when it is needed.
 
-    Returns
-    -------
-    Verification
-
     Raises
     ------
     InputError

@@ -40,10 +40,6 @@ def violations_of(solution: Solution, before: Solution | None = None) -> Violati
     before : Solution, optional
         The end of the load step before, from which slip counts. Without it friction against slip is not checked at the
         end of a load history, nor if the last step was divided into increments.
-
-    Returns
-    -------
-    Violations
     """
     if not is_finite(solution):
         return Violations.not_finite()
