@@ -78,8 +78,7 @@ def sweep(
         rows, table = study_output(output, Sweep.as_table)
         texts = table, csv_of(csv_file, Sweep.as_table), TextFile(json_file, Sweep.to_json)
         outputs = Outputs(texts, folder, *_figures(tuple(values), over, show or (DEFAULT_SHOWN,)))
-        own = FILE.check(rows)  # reserved by the sweep itself
-        reserve(path for path in outputs.check(own) if path not in own)
+        reserve(outputs.check(FILE.check(rows)))
         chosen = load(scene)
         computed = partial(progress.compute, name="sweep", processes=jobs or 1, cluster=cluster)
         with concerning(scene):

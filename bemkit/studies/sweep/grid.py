@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields, is_dataclass
+from dataclasses import fields, is_dataclass
 from enum import Enum
 from itertools import product
 
@@ -21,22 +21,10 @@ _DECIMAL = 12
 """Largest number of characters of a number that was typed rather than computed."""
 
 
-@dataclass(frozen=True)
-class SweepKey(Key):
-    """The key of a number that a sweep varies."""
-
-    @property
-    def is_of_law(self) -> bool:
-        """Whether it belongs to the friction law of all contacts, or to the solver."""
-        return self.names[0] in _LAWS
-
-    @property
-    def keeps_bodies(self) -> bool:
-        """Whether other values leave the elastic bodies, their meshes and their places as they are."""
-        names = self.names
-        if names[0] == "bodies":  # bodies.NAME.parts.PART.condition...
-            names = names[2:]
-        return self.is_of_law or bool(names and names[0] in _LOADS and names[1:2] != ("within",))
+def keeps_bodies(key: Key) -> bool:
+    """Return whether other values at a key leave the elastic bodies, their meshes and their places as they are."""
+    names = key.names[2:] if key.names[0] == "bodies" else key.names  # bodies.NAME.parts.PART.condition...
+    return key.names[0] in _LAWS or bool(names and names[0] in _LOADS and names[1:2] != ("within",))
 
 
 def read_variation(text: str) -> tuple[str, tuple[float, ...]]:
@@ -85,7 +73,7 @@ def _without_noise(value: float) -> float:
     return rounded if len(repr(rounded)) <= _DECIMAL else value
 
 
-def all_rows(vary: Mapping[str, Sequence[float]]) -> tuple[tuple[SweepKey, ...], list[tuple[float, ...]]]:
+def all_rows(vary: Mapping[str, Sequence[float]]) -> tuple[tuple[Key, ...], list[tuple[float, ...]]]:
     """Return the keys, and every combination of their values; that of the first key changes last.
 
     Raises
@@ -107,7 +95,7 @@ def all_rows(vary: Mapping[str, Sequence[float]]) -> tuple[tuple[SweepKey, ...],
     n_rows = math.prod(map(len, columns))
     if n_rows > MOST_ROWS:
         raise StudyError(f"the sweep has {n_rows} rows: give fewer values, at most {MOST_ROWS} rows")
-    return tuple(SweepKey(name) for name in vary), list(product(*columns))
+    return tuple(Key(name) for name in vary), list(product(*columns))
 
 
 def _finite(value: object, name: str) -> float:
@@ -123,7 +111,7 @@ def _number(text: str, whole: str) -> float:
         raise StudyError(f"vary is {whole!r}: {text.strip()!r} is not a number: give numbers such as 0.5") from None
 
 
-def with_values(scene: Scene, values: Mapping[SweepKey, float]) -> Scene:
+def with_values(scene: Scene, values: Mapping[Key, float]) -> Scene:
     """Return a scene with other numbers at some keys.
 
     Raises
@@ -138,7 +126,7 @@ def with_values(scene: Scene, values: Mapping[SweepKey, float]) -> Scene:
     return scene
 
 
-def check_number(scene: Scene, key: SweepKey) -> None:
+def check_number(scene: Scene, key: Key) -> None:
     """Check that a key leads to a number, or to a formula that a number can replace; see `with_values`."""
     value = value_at(scene, key)
     if isinstance(value, tuple | list | np.ndarray):

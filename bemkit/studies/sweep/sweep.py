@@ -14,10 +14,11 @@ from bemkit.errors import BemkitError
 from bemkit.results.solution import Solution
 from bemkit.runs.run import run
 from bemkit.runs.shared_body import SharedBody
+from bemkit.scene.keys import Key
 from bemkit.scene.scene import Scene, check_scene
 from bemkit.scene.toml import scene_to_toml
 from bemkit.studies.engine import Attempt, StudyError, Task, attempt, compute
-from bemkit.studies.sweep.grid import SweepKey, all_rows, check_number, with_values
+from bemkit.studies.sweep.grid import all_rows, check_number, keeps_bodies, with_values
 from bemkit.studies.sweep.records import FILE, SweepRow, row_of
 from bemkit.studies.sweep.table import Sweep
 
@@ -69,8 +70,9 @@ def sweep(
         If the file cannot be written, or holds another sweep.
     """
     check_scene(scene)
-    n_workers = cpu_count() or 1
-    return run_sweep(scene, vary, partial(compute, executor=executor, n_workers=n_workers), file=file, cold=cold)
+    computed = partial(compute, executor=executor, n_workers=cpu_count() or 1)
+    with reserved(FILE.check(file)):
+        return run_sweep(scene, vary, computed, file=file, cold=cold)
 
 
 def run_sweep(
@@ -81,23 +83,22 @@ def run_sweep(
     file: str | Path | None = None,
     cold: bool = False,
 ) -> Sweep:
-    """Solve a scene under all combinations of some of its numbers; see `sweep`."""
+    """Solve a scene under all combinations of some of its numbers into a file that is checked; see `sweep`."""
     keys, grid = all_rows(vary)
     text = scene_to_toml(scene)  # raises for Python functions, which a file cannot hold
     for key in keys:
         check_number(scene, key)
     names = tuple(key.text for key in keys)
     labels = {"scene": text, "keys": json.dumps(names), "starts": "cold" if cold else "near"}
-    with reserved(FILE.check(file)):
-        by_key = FILE.completed(
-            file, labels, lambda finished: compute(sweep_tasks(scene, keys, grid, finished=finished, cold=cold))
-        )
+    by_key = FILE.completed(
+        file, labels, lambda finished: compute(sweep_tasks(scene, keys, grid, finished=finished, cold=cold))
+    )
     return Sweep(scene, names, tuple(by_key[values] for values in grid))
 
 
 def sweep_tasks(
     scene: Scene,
-    keys: Sequence[SweepKey],
+    keys: Sequence[Key],
     grid: Sequence[Values],
     *,
     finished: Container[object] = (),
@@ -121,7 +122,7 @@ def sweep_tasks(
         raise StudyError(f"no row is a valid scene: {refused[grid[0]]}") from refused[grid[0]]
     groups: dict[Values, list[Values]] = {}
     for values in scenes:
-        of_body = tuple(value for key, value in zip(keys, values, strict=True) if not key.keeps_bodies)
+        of_body = tuple(value for key, value in zip(keys, values, strict=True) if not keeps_bodies(key))
         groups.setdefault(of_body, []).append(values)
     tasks = []
     for of_body, rows in groups.items():
@@ -149,5 +150,5 @@ def _solved_row(values: Values, solve: Callable[[], Solution], done: Callable[[]
     return row
 
 
-def _label(keys: Sequence[SweepKey], values: Values) -> str:
+def _label(keys: Sequence[Key], values: Values) -> str:
     return ", ".join(f"{key.text} = {value:g}" for key, value in zip(keys, values, strict=True))

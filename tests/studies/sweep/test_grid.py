@@ -8,16 +8,16 @@ import numpy as np
 import pytest
 
 import bemkit as bk
-from bemkit.scene.keys import SceneKeyError
+from bemkit.scene.keys import Key, SceneKeyError
 from bemkit.studies.engine import StudyError
-from bemkit.studies.sweep.grid import SweepKey, all_rows, check_number, read_variation, with_values
+from bemkit.studies.sweep.grid import all_rows, check_number, keeps_bodies, read_variation, with_values
 
 SCENE = bk.load_scene("paper-1")
 BODIES = bk.load_scene("two-cylinders")
 
 
 def changed(scene: bk.Scene | bk.Scene, key: str, value: float) -> bk.Scene | bk.Scene:
-    return with_values(scene, {SweepKey(key): value})
+    return with_values(scene, {Key(key): value})
 
 
 def test_numbers_of_a_scene_are_changed_and_nothing_else() -> None:
@@ -62,7 +62,7 @@ def test_numbers_of_several_bodies_are_changed() -> None:
 )
 def test_keys_that_lead_to_no_number_are_named(scene: bk.Scene | bk.Scene, key: str, message: str) -> None:
     with pytest.raises(SceneKeyError, match=message):
-        check_number(scene, SweepKey(key))
+        check_number(scene, Key(key))
 
 
 def test_values_that_a_scene_refuses_are_named_with_their_key() -> None:
@@ -89,11 +89,11 @@ def test_values_that_a_scene_refuses_are_named_with_their_key() -> None:
     ],
 )
 def test_which_keys_keep_the_bodies(key: str, keeps: bool) -> None:
-    assert SweepKey(key).keeps_bodies == keeps
+    assert keeps_bodies(Key(key)) == keeps
 
 
 def test_names_with_dots_stand_in_quotation_marks() -> None:
-    assert SweepKey('parts."a.b".condition.y').names == ("parts", "a.b", "condition", "y")
+    assert Key('parts."a.b".condition.y').names == ("parts", "a.b", "condition", "y")
 
 
 def test_words_of_the_command_line() -> None:

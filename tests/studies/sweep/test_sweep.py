@@ -12,7 +12,8 @@ import pytest
 import bemkit as bk
 from bemkit.errors import BemkitError
 from bemkit.runs import shared_body as shared_module
-from bemkit.studies.sweep.grid import SweepKey, with_values
+from bemkit.scene.keys import Key
+from bemkit.studies.sweep.grid import with_values
 from bemkit.studies.sweep.table import Sweep
 from tests.studies.sweep.tables import equal_rows
 
@@ -27,7 +28,7 @@ def check_rows(scene: bk.Scene | bk.Scene, table: Sweep) -> None:
     """Compare every row with a run of its scene."""
     assert not table.failed
     for row in table.rows:
-        keys = [SweepKey(key) for key in table.keys]
+        keys = [Key(key) for key in table.keys]
         alone = bk.run(with_values(scene, dict(zip(keys, row.values, strict=True))))
         contacts = alone.contacts
         expected = {
