@@ -87,10 +87,14 @@ def with_settings(scene: Node, texts: Sequence[str]) -> Node:
     Raises
     ------
     SceneKeyError
-        If a text has another form, there is no such key, or its value does not fit there.
+        If a text has another form, a key is given twice, there is no such key, or its value does not fit there.
     """
-    for text in texts:
-        scene = with_value(scene, *read_setting(text))
+    known = set[Key]()
+    for key, value in map(read_setting, texts):
+        if key in known:
+            raise SceneKeyError(f"{key.text} is set twice: give it one value")
+        known.add(key)
+        scene = with_value(scene, key, value)
     return scene
 
 

@@ -291,6 +291,7 @@ def one_line_error(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
         (["run", "paper-1", "--bogus"], "--bogus"),
         (["run", "paper-1", "--set", "law.friction"], "set is 'law.friction': give KEY=VALUE"),
         (["run", "paper-1", "--set", "law.friction=1"], "law.friction: unknown key.*did you mean"),
+        (["run", "paper-1", "--set", "thickness=1", "--set", "thickness=2"], "thickness is set twice: give it one"),
         (["run", "paper-1", "--set", "mesh.elements=[1"], r"mesh.elements: '\[1' is not a value of a scene file"),
         (["run", "paper-1", "--set", "mesh.elements=many"], "mesh.elements: .*many"),
         (["run"], "Missing argument"),
