@@ -9,7 +9,7 @@ import numpy as np
 
 from bemkit.arrays import FloatArray
 from bemkit.pictures.drawing import Axes
-from bemkit.pictures.shown import Result
+from bemkit.results.solution import Solution
 from bemkit.scene.unit_names import UnitNames, with_unit
 
 Number = TypeVar("Number", float, FloatArray)
@@ -34,7 +34,7 @@ class Abscissa:
     sign: float = 1.0
 
     @classmethod
-    def along(cls, solution: Result, part: str) -> Abscissa:
+    def along(cls, solution: Solution, part: str) -> Abscissa:
         """Return that of a contact part, or of a contact of several bodies."""
         table, rows = solution.contact, solution.contact.rows(part)
         sign = table.direction(part)

@@ -15,7 +15,8 @@ from bemkit.pictures.deformation import draw_deformation
 from bemkit.pictures.drawing import new_figure
 from bemkit.pictures.magnification import magnification
 from bemkit.pictures.plane import joined_frame, set_frame
-from bemkit.pictures.shown import Result, shown
+from bemkit.pictures.shown import shown
+from bemkit.results.solution import Solution
 
 GIF, MP4 = ".gif", ".mp4"
 _DOTS_PER_INCH = 80
@@ -23,7 +24,7 @@ _MARGIN = 0.15
 """Margin for loads and supports around the bodies, relative to the longer side."""
 
 
-def save_animation(path: str | Path, steps: Sequence[Result], *, steps_per_second: int = 3) -> Path:
+def save_animation(path: str | Path, steps: Sequence[Solution], *, steps_per_second: int = 3) -> Path:
     """Write a moving picture of the deformed bodies over the steps of a load history.
 
     Displacements of all steps are enlarged by the same factor: the smallest factor of all steps.

@@ -21,8 +21,8 @@ from bemkit.pictures.deformation import draw_deformation, draw_scene
 from bemkit.pictures.drawing import Axes, Figure
 from bemkit.pictures.load_history import draw_friction_loop, draw_status_over_time, draw_work, has_friction
 from bemkit.pictures.pressure_distribution import draw_pressure_distribution
-from bemkit.pictures.shown import Result
 from bemkit.pictures.stress import draw_stress
+from bemkit.results.solution import Solution
 from bemkit.results.stress_measures import STRESSES
 from bemkit.stopwatch import announce
 
@@ -56,11 +56,11 @@ class Picture:
     name: str
     shows: str
     draw: Callable[..., Axes]
-    why_not: Callable[[Result], str] = lambda result: ""
-    is_default: Callable[[Result], bool] = lambda result: True
+    why_not: Callable[[Solution], str] = lambda result: ""
+    is_default: Callable[[Solution], bool] = lambda result: True
     is_along_contacts: bool = False
 
-    def axes(self, result: Result) -> dict[str, Axes]:
+    def axes(self, result: Solution) -> dict[str, Axes]:
         """Draw it, and return what was drawn by endings of file names: one, empty, or a number for each contact."""
         if not self.is_along_contacts:
             return {"": self.draw(result)}
@@ -69,7 +69,7 @@ class Picture:
         return {ending: self.draw(result, part) for ending, part in zip(endings, parts, strict=True)}
 
 
-def figures(result: Result, what: Sequence[str] | None = None) -> dict[str, Figure]:
+def figures(result: Solution, what: Sequence[str] | None = None) -> dict[str, Figure]:
     """Draw pictures of a result.
 
     Parameters
@@ -99,7 +99,7 @@ def figures(result: Result, what: Sequence[str] | None = None) -> dict[str, Figu
     return found  # type: ignore[return-value]
 
 
-def plot(result: Result, what: str, part: str | None = None) -> Figure:
+def plot(result: Solution, what: str, part: str | None = None) -> Figure:
     """Return one picture; see `Solution.plot`."""
     picture, parts = find_picture(what), result.contact.parts
     if reason := picture.why_not(result):
@@ -113,7 +113,7 @@ def plot(result: Result, what: str, part: str | None = None) -> Figure:
     return axes.get_figure(root=True)  # type: ignore[return-value]
 
 
-def default_pictures(result: Result) -> list[Picture]:
+def default_pictures(result: Solution) -> list[Picture]:
     """Return the pictures that suit a result."""
     return [picture for picture in PICTURES.values() if not picture.why_not(result) and picture.is_default(result)]
 
@@ -125,42 +125,42 @@ def find_picture(name: str) -> Picture:
     return PICTURES[name]
 
 
-def _without_contact(result: Result) -> str:
+def _without_contact(result: Solution) -> str:
     return "" if result.contact.n_contact else "nothing is in contact"
 
 
-def _without_history(result: Result) -> str:
+def _without_history(result: Solution) -> str:
     return _without_contact(result) or ("" if result.loading is not None else "it has no load history")
 
 
-def _of_several_bodies(result: Result) -> str:
+def _of_several_bodies(result: Solution) -> str:
     return "it shows one body, and there are several" if len(result.bodies) > 1 else ""
 
 
-def _has_few_contacts(result: Result) -> bool:
+def _has_few_contacts(result: Solution) -> bool:
     return len(result.contact.parts) <= MOST_CONTACTS
 
 
-def _has_steps(result: Result) -> bool:
+def _has_steps(result: Solution) -> bool:
     return result.loading is not None and len(result.loading.steps) > 1
 
 
-def _is_loop(result: Result) -> bool:
+def _is_loop(result: Solution) -> bool:
     """Whether a load history of more than two steps has friction."""
     return result.loading is not None and len(result.loading.steps) > 2 and has_friction(result.loading)
 
 
-def _is_fast(result: Result) -> bool:
+def _is_fast(result: Solution) -> bool:
     """Whether stress inside is fast: below a half-plane each point needs all elements."""
     return all(body.mesh.surface is None or body.mesh.n_elements <= _FEW for body in result.bodies.values())
 
 
-def _is_rough(result: Result) -> bool:
+def _is_rough(result: Solution) -> bool:
     """Whether contact has so many zones that a distribution is clearer than a curve."""
     return _has_few_contacts(result) and len(result.transitions) > _MANY_ZONES * len(result.contact.parts)
 
 
-def _never(result: Result) -> bool:
+def _never(result: Solution) -> bool:
     return False
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from bemkit.arrays import BoolArray, FloatArray
 from bemkit.pictures.abscissa import Abscissa
 from bemkit.pictures.drawing import BLUE, GREY, ORANGE, VERMILION, Axes, axes_or_new
-from bemkit.pictures.shown import Result
+from bemkit.results.solution import Solution
 from bemkit.scene.unit_names import UnitNames, amount
 
 STATUS_COLOURS: Mapping[str, str] = MappingProxyType({"separated": "#D9D9D9", "slip": ORANGE, "stick": BLUE})
@@ -28,7 +28,7 @@ _NAMED = 0.12
 """Least length of a zone that has room for its name, relative to the contact."""
 
 
-def contact_axes(axes: Axes | None, solution: Result, part: str, subject: str) -> Axes:
+def contact_axes(axes: Axes | None, solution: Solution, part: str, subject: str) -> Axes:
     """Return axes above a strip that shows the status along a contact.
 
     Parameters
@@ -62,7 +62,7 @@ def axes_with_strip(axes: Axes, title: str) -> Axes:
     return strip
 
 
-def _draw_status(strip: Axes, solution: Result, part: str, abscissa: Abscissa) -> None:
+def _draw_status(strip: Axes, solution: Solution, part: str, abscissa: Abscissa) -> None:
     """Paint the status along a part; name it where there is room, and in a legend where there is none."""
     from matplotlib.patches import Patch
 
@@ -125,7 +125,7 @@ def cut_peaks(
     axes.text(0.5, height, note, transform=axes.transAxes, ha="center", va=anchor, fontsize=9)
 
 
-def near(distance: FloatArray, solution: Result, chosen: BoolArray) -> FloatArray:
+def near(distance: FloatArray, solution: Solution, chosen: BoolArray) -> FloatArray:
     """Blank out distances to the obstacle that are much larger than the displacements and the smallest distance."""
     contact = solution.contact
     sizes = [np.abs(component[chosen]).max() for component in (contact.u_n, contact.u_t)]
@@ -134,14 +134,14 @@ def near(distance: FloatArray, solution: Result, chosen: BoolArray) -> FloatArra
     return np.where(np.abs(distance) <= largest, distance, np.nan)
 
 
-def displacement_scale(solution: Result) -> float:
+def displacement_scale(solution: Solution) -> float:
     """Return the largest relative displacement or finite gap of any contact node [m]."""
     contact = solution.contact
     columns = (contact.u_n, contact.u_t, np.where(np.isfinite(contact.gap), contact.gap, 0.0))
     return max(float(np.abs(column).max(initial=0.0)) for column in columns)
 
 
-def traction_scale(solution: Result) -> float:
+def traction_scale(solution: Solution) -> float:
     """Return the largest contact traction [Pa]."""
     contact = solution.contact
     return max(float(np.abs(column).max(initial=0.0)) for column in (contact.sigma_n, contact.sigma_t))

@@ -18,12 +18,12 @@ from bemkit.pictures.contact_axes import (
 )
 from bemkit.pictures.crowds import MANY, marked
 from bemkit.pictures.drawing import BLUE, VERMILION, Axes, axes_or_new, ignore_round_off, label_values, show_grid
-from bemkit.pictures.shown import Result
 from bemkit.pictures.traction_curves import traction_curve
+from bemkit.results.solution import Solution
 from bemkit.scene.unit_names import with_unit
 
 
-def draw_contact_displacement(solution: Result, part: str, axes: Axes | None = None) -> Axes:
+def draw_contact_displacement(solution: Solution, part: str, axes: Axes | None = None) -> Axes:
     """Draw normal and tangential displacement and the gap along one contact part, above its status.
 
     Contacts on horizontal lines are drawn over x, with slip and friction positive along x; others over the arc length
@@ -55,7 +55,7 @@ def draw_contact_displacement(solution: Result, part: str, axes: Axes | None = N
     return axes
 
 
-def draw_contact_traction(solution: Result, part: str, axes: Axes | None = None) -> Axes:
+def draw_contact_traction(solution: Solution, part: str, axes: Axes | None = None) -> Axes:
     """Draw normal and tangential traction and the friction bound; see `draw_contact_displacement`.
 
     Lines are the tractions of the discretisation: steps where they are constant on each element, straight or curved
@@ -81,7 +81,7 @@ def draw_contact_traction(solution: Result, part: str, axes: Axes | None = None)
     return axes
 
 
-def draw_contact_clearance(solution: Result, part: str, axes: Axes | None = None) -> Axes:
+def draw_contact_clearance(solution: Solution, part: str, axes: Axes | None = None) -> Axes:
     """Draw contact pressure and clearance along one contact part; see `draw_contact_displacement`.
 
     Peaks of the pressure are cut as those of tractions in `draw_contact_traction`.
@@ -107,7 +107,7 @@ def draw_contact_clearance(solution: Result, part: str, axes: Axes | None = None
     return axes
 
 
-def draw_friction_cone(solution: Result, part: str, axes: Axes | None = None) -> Axes:
+def draw_friction_cone(solution: Solution, part: str, axes: Axes | None = None) -> Axes:
     """Draw the tractions of the nodes of one contact over its pressures, within the friction bound.
 
     Nodes that stick lie between the bounds, nodes that slip on one of them. Where the coefficient varies along the

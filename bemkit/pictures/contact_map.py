@@ -14,8 +14,9 @@ from bemkit.pictures.drawing import VERMILION, Axes, legend_below
 from bemkit.pictures.magnification import magnification
 from bemkit.pictures.obstacles import draw_obstacles, draw_rigid_bodies
 from bemkit.pictures.plane import draw_arrows, draw_bodies, draw_initial, joined_frame, plane_axes, set_frame
-from bemkit.pictures.shown import DrawnScene, Result, shown
+from bemkit.pictures.shown import DrawnScene, shown
 from bemkit.results.contact_table import ContactTable
+from bemkit.results.solution import Solution
 from bemkit.scene.unit_names import amount
 
 _TOOTH, _SHARE, _SHORTEST = 0.1, 1.0 / 3.0, 0.03
@@ -31,7 +32,7 @@ _NODES_AROUND = 3.0
 """Size of the frame around a zone of a single node, in distances of neighbouring nodes."""
 
 
-def draw_contact_map(solution: Result, axes: Axes | None = None) -> Axes:
+def draw_contact_map(solution: Solution, axes: Axes | None = None) -> Axes:
     """Draw all bodies, and each contact once: its status by colour, its pressure by the length of a comb.
 
     Parameters
@@ -71,14 +72,14 @@ def _longest_tooth(scene: DrawnScene) -> float:
     return float(np.clip(_SHARE * smallest, _SHORTEST * scene.size, _TOOTH * scene.size))
 
 
-def is_short(solution: Result) -> bool:
+def is_short(solution: Solution) -> bool:
     """Return whether the contact that is closed takes a small share of the picture of all bodies."""
     scene = shown(solution)
     frame = _zone(scene.contact, contact_nodes(solution, scene, 0.0))
     return frame is not None and float(np.hypot(*np.ptp(frame, axis=1))) < SHORT * scene.size
 
 
-def draw_zoom(solution: Result, axes: Axes | None = None) -> Axes:
+def draw_zoom(solution: Solution, axes: Axes | None = None) -> Axes:
     """Draw the zone of contact from near by, with the tractions on the contact nodes as arrows.
 
     Parameters

@@ -12,7 +12,8 @@ from bemkit.arrays import FloatArray, IntArray
 from bemkit.contact.contact_nodes import contact_frame
 from bemkit.geometry.spaces import dof_points
 from bemkit.geometry.symmetry.lines import Symmetry
-from bemkit.pictures.shown import DrawnScene, Result
+from bemkit.pictures.shown import DrawnScene
+from bemkit.results.solution import Solution
 
 _AT = 1e-6
 """Distance within which a point is a node, relative to the picture."""
@@ -32,7 +33,7 @@ class Nodes(NamedTuple):
     directions: FloatArray
 
 
-def contact_nodes(solution: Result, shown: DrawnScene, factor: float) -> Nodes:
+def contact_nodes(solution: Solution, shown: DrawnScene, factor: float) -> Nodes:
     """Return the contact nodes of a result, drawn with displacements times a factor."""
     table, symmetry = solution.contact, solution.scene.symmetry
     rows, points, signs = np.arange(table.n_contact), table.points, np.ones((table.n_contact, 2))

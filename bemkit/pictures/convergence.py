@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from bemkit.pictures.drawing import BLUE, VERMILION, Axes, axes_or_new, show_grid
-from bemkit.pictures.shown import Result
+from bemkit.results.solution import Solution
 
 
-def draw_convergence(solution: Result, axes: Axes | None = None) -> Axes:
+def draw_convergence(solution: Solution, axes: Axes | None = None) -> Axes:
     """Draw the largest violation in the certificate, and how many nodes changed their status, over the linear solves.
 
     Parameters

@@ -9,11 +9,12 @@ from bemkit.pictures.loads import draw_loads
 from bemkit.pictures.magnification import magnification
 from bemkit.pictures.obstacles import draw_obstacles, draw_rigid_bodies, relief_frame
 from bemkit.pictures.plane import draw_bodies, draw_initial, draw_symmetry_lines, joined_frame, plane_axes, set_frame
-from bemkit.pictures.shown import Drawable, DrawnScene, Result, shown
+from bemkit.pictures.shown import Drawable, DrawnScene, shown
 from bemkit.pictures.supports import draw_supports
+from bemkit.results.solution import Solution
 
 
-def draw_deformation(solution: Result, axes: Axes | None = None, *, factor: float | None = None) -> Axes:
+def draw_deformation(solution: Solution, axes: Axes | None = None, *, factor: float | None = None) -> Axes:
     """Draw all bodies before and after, with supports, loads and obstacles.
 
     Parameters

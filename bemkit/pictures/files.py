@@ -10,7 +10,7 @@ from bemkit.errors import InputError
 from bemkit.pictures.animation import GIF, MP4, check_animation, save_animation
 from bemkit.pictures.catalogue import figures, find_picture
 from bemkit.pictures.figure_files import FIGURE_FORMATS, check_figure_folder, write_figure, write_figures
-from bemkit.pictures.shown import Result
+from bemkit.results.solution import Solution
 
 LEAST_WIDTH = 50.0
 """Width [mm] of a picture that has room for its text."""
@@ -19,7 +19,7 @@ ANIMATION = "animation"
 
 
 def save_pictures(
-    result: Result | Sequence[Result],
+    result: Solution | Sequence[Solution],
     place: str | Path,
     what: Sequence[str] | None = None,
     *,

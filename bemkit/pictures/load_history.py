@@ -19,23 +19,23 @@ from bemkit.pictures.drawing import (
     legend_below,
     show_grid,
 )
-from bemkit.pictures.shown import Result
 from bemkit.results.contact_table import STATUS_WORDS
 from bemkit.results.load_history import LoadHistory
+from bemkit.results.solution import Solution
 from bemkit.scene.unit_names import with_unit
 
 _NO_FRICTION = 1e-9
 """Ratio of friction to pressing force that is round-off."""
 
 
-def history_of(solution: Result) -> LoadHistory:
+def history_of(solution: Solution) -> LoadHistory:
     """Return the load history of a result; InputError without one."""
     if solution.loading is None:
         raise InputError(f"{solution.title!r} has no load history: give load factors or steps to the scene")
     return solution.loading
 
 
-def draw_friction_loop(solution: Result, axes: Axes | None = None) -> Axes:
+def draw_friction_loop(solution: Solution, axes: Axes | None = None) -> Axes:
     """Draw the friction force over the mean tangential displacement of the contact nodes, step by step.
 
     If all contacts lie on horizontal lines, both are positive along x, else along the boundary.
@@ -78,7 +78,7 @@ def has_friction(loading: LoadHistory) -> bool:
     return any(abs(step.force_tangential) > _NO_FRICTION * abs(step.force_normal) for step in loading.steps)
 
 
-def draw_work(solution: Result, axes: Axes | None = None) -> Axes:
+def draw_work(solution: Solution, axes: Axes | None = None) -> Axes:
     """Draw the work of loads, the dissipation by friction and the elastic energy over time.
 
     The error of the increments is drawn where it is visible: the external work is the sum of the others.
@@ -105,7 +105,7 @@ def draw_work(solution: Result, axes: Axes | None = None) -> Axes:
     return axes
 
 
-def draw_status_over_time(solution: Result, part: str, axes: Axes | None = None) -> Axes:
+def draw_status_over_time(solution: Solution, part: str, axes: Axes | None = None) -> Axes:
     """Draw where the nodes of a contact are separated, slip or stick, for every step of a load history.
 
     The part is the name of a contact part, or of a contact of several bodies. See `draw_friction_loop`.

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from bemkit.pictures.contact_axes import FIRST
 from bemkit.pictures.drawing import Axes, axes_or_new, show_grid
-from bemkit.pictures.shown import Result
 from bemkit.results.pressure_distribution import pressure_shares
+from bemkit.results.solution import Solution
 from bemkit.scene.unit_names import unit_of, with_unit
 
 
-def draw_pressure_distribution(solution: Result, part: str, axes: Axes | None = None) -> Axes:
+def draw_pressure_distribution(solution: Solution, part: str, axes: Axes | None = None) -> Axes:
     """Draw the probability density of the pressures on one contact that are not zero.
 
     The area below is the share of the contact that touches, which the title states. See

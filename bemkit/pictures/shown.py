@@ -27,8 +27,7 @@ from bemkit.scene.plane_motion import RigidBody
 from bemkit.scene.scene import Scene
 from bemkit.scene.unit_names import UnitNames
 
-Result: TypeAlias = Solution
-Drawable: TypeAlias = Result | Scene
+Drawable: TypeAlias = Solution | Scene
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,7 +8,8 @@ from bemkit.arrays import FloatArray
 from bemkit.pictures.drawing import Axes
 from bemkit.pictures.obstacles import draw_obstacles, draw_rigid_bodies
 from bemkit.pictures.plane import draw_initial, joined_frame, plane_axes, set_frame
-from bemkit.pictures.shown import Result, shown
+from bemkit.pictures.shown import shown
+from bemkit.results.solution import Solution
 from bemkit.results.stress_measures import StressMeasure, find_measure
 from bemkit.results.stress_mesh import StressMesh, stress_mesh
 from bemkit.scene.unit_names import UnitNames, amount, with_unit
@@ -24,7 +25,7 @@ _FLAT = 1e-6
 """Variation of stresses that is drawn as none, relative to the largest."""
 
 
-def draw_stress(solution: Result, axes: Axes | None = None, *, measure: str = "von-mises") -> Axes:
+def draw_stress(solution: Solution, axes: Axes | None = None, *, measure: str = "von-mises") -> Axes:
     """Draw a stress inside all bodies in their final positions.
 
     Parameters

@@ -10,7 +10,7 @@ from bemkit.arrays import FloatArray, IntArray
 from bemkit.contact.contact_nodes import contact_frame
 from bemkit.contact.obstacle import measure_contact
 from bemkit.geometry.neighbours import along_boundary, arc_lengths, drawn_points
-from bemkit.pictures.shown import Result
+from bemkit.results.solution import Solution
 from bemkit.results.solved_body import SolvedBody
 from bemkit.scene.conditions import Contact, name_at_obstacle
 
@@ -31,7 +31,7 @@ class TractionCurve:
     tangential: FloatArray
 
 
-def traction_curve(solution: Result, part: str) -> TractionCurve:
+def traction_curve(solution: Solution, part: str) -> TractionCurve:
     """Return the tractions along a contact, in the directions in which it counts.
 
     Parameters
@@ -71,7 +71,7 @@ def _resolved(
 
 
 def _directions(
-    solution: Result, part: str, body: SolvedBody, elements: IntArray, xi: FloatArray, s: FloatArray
+    solution: Solution, part: str, body: SolvedBody, elements: IntArray, xi: FloatArray, s: FloatArray
 ) -> FloatArray:
     """Return the directions of contact (n, 2) at points of elements, between bodies those of the nodes near by."""
     for own in body.scene.contact_parts:

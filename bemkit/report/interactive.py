@@ -23,9 +23,10 @@ from bemkit.pictures.drawing import BLUE, GREY, VERMILION
 from bemkit.pictures.magnification import magnification
 from bemkit.pictures.obstacles import fixed_obstacles, relief_frame, rigid_bodies
 from bemkit.pictures.plane import joined_frame
-from bemkit.pictures.shown import DrawnScene, Result, shown
+from bemkit.pictures.shown import DrawnScene, shown
 from bemkit.pictures.traction_curves import traction_curve
 from bemkit.report.html import Element, element
+from bemkit.results.solution import Solution
 from bemkit.results.tables import in_units, table_of
 from bemkit.scene.unit_names import UnitNames, with_unit
 from bemkit.stopwatch import announce
@@ -54,7 +55,7 @@ def check_interactive() -> None:
         raise InputError('interactive pages need plotly: pip install "bemkit[interactive]"')
 
 
-def interactive_elements(result: Result) -> list[Element]:
+def interactive_elements(result: Solution) -> list[Element]:
     """Return the drawing of a result as elements of a page.
 
     Parameters
@@ -82,7 +83,7 @@ def interactive_elements(result: Result) -> list[Element]:
     ]
 
 
-def interactive_figure(result: Result) -> Any:
+def interactive_figure(result: Solution) -> Any:
     """Return the drawing as a figure of plotly, with a frame for each load step; see `interactive_elements`."""
     from plotly.graph_objects import Figure, Frame
     from plotly.subplots import make_subplots
@@ -129,7 +130,7 @@ def _slider(count: int) -> dict[str, Any]:
     return {"active": count - 1, "currentvalue": {"prefix": "load step "}, "steps": entries, "pad": {"t": 50}}
 
 
-def _traces(step: Result, bodies: DrawnScene, factor: float, parts: Sequence[str]) -> list[dict[str, Any]]:
+def _traces(step: Solution, bodies: DrawnScene, factor: float, parts: Sequence[str]) -> list[dict[str, Any]]:
     """Return outlines, centres of elements, also of images by symmetry, and tractions of each contact."""
     boundary = _with_images(table_of(step, "boundary"), step)
     at = np.array([boundary.values("x"), boundary.values("y")])
@@ -168,7 +169,7 @@ def _obstacle_traces(bodies: DrawnScene, factor: float, frame: FloatArray) -> li
     return [_line(_joined(loops), name, edge) | filled for name, loops in named.items() if loops]
 
 
-def _with_images(boundary: Table, step: Result) -> Table:
+def _with_images(boundary: Table, step: Solution) -> Table:
     """Return the table of elements with the images by symmetry of those of each body."""
     columns = {head.name: np.array(boundary.values(head.name)) for head in boundary.columns}
     tables, first = [], 0
@@ -185,7 +186,7 @@ def _with_images(boundary: Table, step: Result) -> Table:
     )
 
 
-def _contact_traces(step: Result, part: str) -> list[dict[str, Any]]:
+def _contact_traces(step: Solution, part: str) -> list[dict[str, Any]]:
     """Return pressure and tangential traction along a contact, as curves and at its nodes."""
     table, rows = table_of(step, "contact"), np.flatnonzero(step.contact.rows(part))
     abscissa, along, pressure, friction = None, np.zeros(0), np.zeros(0), np.zeros(0)

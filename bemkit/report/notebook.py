@@ -10,7 +10,6 @@ from bemkit.pictures.catalogue import find_picture
 from bemkit.pictures.deformation import draw_deformation, draw_scene
 from bemkit.pictures.drawing import Axes
 from bemkit.pictures.load_history import draw_friction_loop
-from bemkit.pictures.shown import Result
 from bemkit.plan.plan import Plan
 from bemkit.report.html import Element, element, facts, image, render, table
 from bemkit.report.pictures import has_pictures
@@ -39,13 +38,13 @@ def notebook_html(value: object) -> str:
     return render(element("pre", repr(value)))
 
 
-def _result(result: Result) -> Element:
+def _result(result: Solution) -> Element:
     warnings = [element("li", warning.text) for warning in result.warnings]
     lists = [element("ul", *warnings)] if warnings else []
     return element("div", element("p", badge(result)), facts(summary_rows(result), "Result"), *lists)
 
 
-def _pictures_of(result: Result) -> list[Callable[[], Axes]]:
+def _pictures_of(result: Solution) -> list[Callable[[], Axes]]:
     """Return how to draw the bodies, and the friction loop of a load history."""
     loop = find_picture("friction-loop")
     draws = [lambda: draw_deformation(result)]

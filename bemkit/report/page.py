@@ -6,7 +6,6 @@ from importlib import resources
 from pathlib import Path
 
 from bemkit.atomic_files import OutputFileError, check_target, write_text
-from bemkit.pictures.shown import Result
 from bemkit.report.html import Element, element, facts, render
 from bemkit.report.pictures import has_pictures, picture_elements
 from bemkit.report.sections import (
@@ -20,12 +19,13 @@ from bemkit.report.sections import (
     version_section,
     warnings_section,
 )
+from bemkit.results.solution import Solution
 from bemkit.results.summary_rows import summary_rows
 
 _START = "<!DOCTYPE html>"
 
 
-def report(result: Result, *, interactive: bool = False) -> str:
+def report(result: Solution, *, interactive: bool = False) -> str:
     """Return a page of HTML on a result: summary, pictures, tables, certificate, plan, scene and versions.
 
     Parameters
@@ -77,7 +77,7 @@ def report(result: Result, *, interactive: bool = False) -> str:
     return f"{_START}\n{render(element('html', head, body, lang='en'))}\n"
 
 
-def save_report(path: str | Path, result: Result, *, interactive: bool = False) -> Path:
+def save_report(path: str | Path, result: Solution, *, interactive: bool = False) -> Path:
     """Write the report of a result to a file, replacing an older report at once or not at all; see `report`.
 
     Raises
@@ -112,7 +112,7 @@ def _style() -> str:
     return (resources.files("bemkit") / "report" / "page.css").read_text("utf-8")
 
 
-def _pictures(result: Result, interactive: bool) -> list[Element]:
+def _pictures(result: Solution, interactive: bool) -> list[Element]:
     if interactive:
         from bemkit.report.interactive import interactive_elements
 

@@ -6,8 +6,8 @@ from collections.abc import Iterator
 from importlib.util import find_spec
 
 from bemkit.pictures.catalogue import Picture, default_pictures, find_picture
-from bemkit.pictures.shown import Result
 from bemkit.report.html import Element, element, image
+from bemkit.results.solution import Solution
 from bemkit.scene.unit_names import amount
 from bemkit.stopwatch import announce
 
@@ -20,7 +20,7 @@ def has_pictures() -> bool:
     return find_spec("matplotlib") is not None
 
 
-def picture_elements(result: Result) -> Iterator[Element]:
+def picture_elements(result: Solution) -> Iterator[Element]:
     """Yield each picture of a result with its caption."""
     chosen = default_pictures(result)
     further = [find_picture(name) for name in FURTHER]
@@ -36,7 +36,7 @@ def picture_elements(result: Result) -> Iterator[Element]:
             yield element("figure", image(figure, alternative), element("figcaption", caption))  # type: ignore[arg-type]
 
 
-def _suits(picture: Picture, result: Result) -> bool:
+def _suits(picture: Picture, result: Solution) -> bool:
     """Whether another picture is useful: friction of few contacts, convergence of several steps."""
     if picture.name == "convergence":
         return len(result.history) > 1
@@ -49,7 +49,7 @@ def _caption(picture: Picture, part: str | None) -> str:
     return name if part is None else f"{name} along '{part}'"
 
 
-def _in_words(result: Result, part: str | None) -> str:
+def _in_words(result: Solution, part: str | None) -> str:
     """Return the most important numbers of a contact, or of all."""
     table = result.contact
     if not table.n_contact:

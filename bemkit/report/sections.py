@@ -6,10 +6,10 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from bemkit.hdf5 import provenance
-from bemkit.pictures.shown import Result
 from bemkit.plan.plan import Plan
 from bemkit.report.html import Element, element, facts, number, table
 from bemkit.results.file_meanings import CONTACT_COLUMNS
+from bemkit.results.solution import Solution
 from bemkit.results.tables import RESULTANT_COLUMNS, history_columns, in_units
 from bemkit.scene.toml import SceneError, scene_to_toml
 from bemkit.scene.written_tables import UnstructureError
@@ -19,19 +19,19 @@ _MOST_ROWS = 200
 """Largest number of rows of a table; the files hold all."""
 
 
-def badge(result: Result) -> Element:
+def badge(result: Solution) -> Element:
     """Return the status in a word, with a class for its colour."""
     kind = "good" if result.is_converged else "warned" if result.is_certified else "bad"
     return element("strong", result.status_words, class_=f"badge {kind}")
 
 
-def warnings_section(result: Result) -> list[Element]:
+def warnings_section(result: Solution) -> list[Element]:
     """Return the warnings, one sentence each."""
     sentences = [element("li", warning.text) for warning in result.warnings]
     return [element("ul", *sentences) if sentences else element("p", "No warnings.")]
 
 
-def forces_section(result: Result) -> list[Element]:
+def forces_section(result: Solution) -> list[Element]:
     """Return the forces of contacts and parts, and the transitions."""
     summary = result.summary()
     tables = {
@@ -45,7 +45,7 @@ def forces_section(result: Result) -> list[Element]:
     return found or [element("p", "No part of the boundary has a name.")]
 
 
-def certificate_section(result: Result) -> list[Element]:
+def certificate_section(result: Solution) -> list[Element]:
     """Return the largest violation of each condition, at the nodes and between them."""
     summary = result.summary()
     rows = [(_words(name), number(value, 2)) for name, value in summary["certificate"].items()]
@@ -59,7 +59,7 @@ def certificate_section(result: Result) -> list[Element]:
     return found
 
 
-def convergence_section(result: Result) -> list[Element]:
+def convergence_section(result: Solution) -> list[Element]:
     """Return the history of the solver."""
     columns = history_columns(result.history)
     names = ("step", "linear_solves", "n_separated", "n_stick", "n_slip", "n_changed", "relative_change", "worst")
@@ -74,7 +74,7 @@ def plan_section(plan: Plan) -> list[Element]:
     return [element("p", size), table(rows, "What is computed, what is skipped, and why")]
 
 
-def scene_section(result: Result) -> list[Element]:
+def scene_section(result: Solution) -> list[Element]:
     """Return the scene as a scene file."""
     try:
         text = scene_to_toml(result.stated)
@@ -83,12 +83,12 @@ def scene_section(result: Result) -> list[Element]:
     return [element("pre", element("code", text), tabindex="0")]
 
 
-def timing_section(result: Result) -> list[Element]:
+def timing_section(result: Solution) -> list[Element]:
     """Return how long each stage took."""
     return [facts([(name, f"{seconds:.3g} s") for name, seconds in result.timings.items()], "Run times")]
 
 
-def version_section(result: Result) -> list[Element]:
+def version_section(result: Solution) -> list[Element]:
     """Return the versions that computed the result and the version that drew this page."""
     rows = [*(result.provenance or provenance()).items(), ("page drawn by", f"bemkit {__version__}")]
     return [facts(rows, "Versions")]
