@@ -26,7 +26,7 @@ from bemkit.geometry.meshing.discretise import Algebraic
 from bemkit.model.model import Model, build_model
 from bemkit.model.prepared import prepare
 from bemkit.scene.discretisation import ConstantCollocation, MeshOptions
-from bemkit.scene.toml import load_single_body
+from bemkit.scene.toml import load_scene
 from bemkit.solvers.alm import AugmentedLagrangian
 from bemkit.solvers.base import solve
 from bemkit.solvers.ssn import SemismoothNewton
@@ -124,7 +124,7 @@ def paper_tables(
 
 def paper_model(number: int) -> Model:
     """Return example 1 or 2 on the paper's uniform mesh of plain constant elements, made ready to solve."""
-    scene = load_single_body(f"paper-{number}")
+    scene = load_scene(f"paper-{number}")
     sides = [side for loop in scene.shape.outline().loops for side in loop]
     # as many elements on each side, of any length
     density = {

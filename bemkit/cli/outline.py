@@ -51,13 +51,13 @@ def outline(
         from bemkit.cli.starting_scene import starting_scene
         from bemkit.geometry.files.shape_file import DrawingFile, MeshFile
         from bemkit.pictures.outline import draw_outline
-        from bemkit.scene.toml import load_single_body, shipped_files
+        from bemkit.scene.toml import load_scene, shipped_files, single_body
 
         shape: Shape
         if Path(file).suffix.lower() == ".toml" or (file in shipped_files() and not Path(file).exists()):
             if output or scale or only or corner_angle is not None or tolerance:
                 raise click.UsageError("a scene file says how its shape is read: give no other option than --plot")
-            scene = load_single_body(file)
+            scene = single_body(load_scene(file), file)
             shape, units = scene.only.shape, scene.units
         else:
             shape, units = shape_file(file, scale, only, corner_angle, tolerance), None

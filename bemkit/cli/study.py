@@ -80,14 +80,14 @@ def errors(
         raise click.UsageError("--jobs measures no run times: remove --repeat or --jobs")
     with StudyProgress(quiet) as progress:
         from bemkit.cli.printed_errors import print_reference, print_study
-        from bemkit.scene.toml import load_single_body
+        from bemkit.scene.toml import load_scene, single_body
         from bemkit.studies.accuracy.figures import FIGURE, draw_errors
         from bemkit.studies.accuracy.options import StudyOptions, read_measures
         from bemkit.studies.accuracy.records import FILE, table_of
         from bemkit.studies.accuracy.runs import error_tasks
 
         shown = read_measures(measures)
-        problem = load_single_body(scene)
+        problem = single_body(load_scene(scene), scene)
 
         def figures(records: Sequence[ErrorRecord]) -> dict[str, Figure]:
             return {FIGURE: draw_errors(records, shown, title=problem.title)}

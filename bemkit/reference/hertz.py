@@ -9,7 +9,6 @@ half-width / radius for cylinders, and of half-width / size for bodies of anothe
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Self
@@ -172,8 +171,11 @@ class RoundedPunch(LineContact):
     @cached_property
     def half_width(self) -> float:
         """A [m]."""
+        from scipy.optimize import brentq
+
         of_hertz = np.sqrt(4.0 * self.load * self.radius / (np.pi * self.modulus))
-        return _root(self._load_on, self.load, self.flat, 2.0 * (self.flat + float(of_hertz)))
+        high = 2.0 * (self.flat + float(of_hertz))
+        return float(brentq(lambda a: self._load_on(a) / self.load - 1.0, self.flat, high, xtol=1e-300, rtol=1e-14))
 
     def pressure(self, x: FloatArray) -> FloatArray:
         """Return the pressure [Pa]; logarithms make its slope infinite where the flat ends."""
@@ -191,9 +193,3 @@ class RoundedPunch(LineContact):
     def _load_on(self, a: float) -> float:
         end = float(np.arcsin(min(self.flat / a, 1.0)))
         return self.modulus * a**2 * (np.pi - 2.0 * end - float(np.sin(2.0 * end))) / (4.0 * self.radius)
-
-
-def _root(load_on: Callable[[float], float], load: float, low: float, high: float) -> float:
-    from scipy.optimize import brentq
-
-    return float(brentq(lambda a: load_on(a) / load - 1.0, low, high, xtol=1e-300, rtol=1e-14))

@@ -23,7 +23,7 @@ from bemkit.reference.pressure import places_along
 from bemkit.reference.wavy import WavyObstacle
 from bemkit.scene.discretisation import Galerkin, MeshOptions
 from bemkit.scene.scene import Scene
-from bemkit.scene.toml import load_single_body
+from bemkit.scene.toml import load_scene
 from bemkit.solvers.fallbacks import Fallbacks
 
 
@@ -37,7 +37,7 @@ def find_reference(scene: Scene) -> Reference | None:
         solvers and names of units may differ.
     """
     for name, make in _REFERENCES.items():
-        if _problem(scene) == _problem(load_single_body(name)):
+        if _problem(scene) == _problem(load_scene(name)):
             return make(scene)
     return None
 

@@ -87,19 +87,8 @@ def load_scene(source: str | Path) -> Scene:
     return scene_from_toml(text, name=name, folder=None if str(source) in shipped else Path(source).parent)
 
 
-def load_single_body(source: str | Path) -> Scene:
-    """Read a scene of one body; see `load_scene`.
-
-    Raises
-    ------
-    SceneError
-        As `load_scene`, also if there are several bodies.
-    """
-    return single_body(load_scene(source), str(source))
-
-
 def single_body(scene: Scene, name: str) -> Scene:
-    """Return a scene, and refuse one of several bodies; the name is for the message."""
+    """Return a scene, and refuse one of several bodies with a SceneError; the name is for the message."""
     if scene.shape is None:
         raise SceneError(f"{name}: there are {len(scene.placed_bodies)} bodies: only scenes of one body can do this")
     return scene

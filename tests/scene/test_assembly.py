@@ -35,7 +35,7 @@ from bemkit import (
     scene_to_toml,
 )
 from bemkit.scene.conditions import Contact
-from bemkit.scene.toml import SceneError, load_single_body, shipped_scenes
+from bemkit.scene.toml import SceneError, shipped_scenes, single_body
 
 STEEL = Material(210e9, 0.3)
 LOWER = Body(name="lower", shape=Rectangle(1.0, 1.0), material=STEEL, parts=(Part("base", Clamped(), ("bottom",)),))
@@ -261,4 +261,4 @@ def test_texts_are_refused_by_key(text: str, message: str) -> None:
 
 def test_commands_for_one_body_say_so() -> None:
     with pytest.raises(SceneError, match="two-cylinders: there are 2 bodies: only scenes of one body can do this"):
-        load_single_body("two-cylinders")
+        single_body(load_scene("two-cylinders"), "two-cylinders")
