@@ -175,10 +175,6 @@ def _of_zones(answer: SampledFields, reference: Reference) -> float:
     return worst
 
 
-class OverResolutionError(InputError):
-    """A scene for which two fine solutions could not be made."""
-
-
 def sampled_fields(solution: Solution, places: Sequence[SamplePoints]) -> SampledFields:
     """Evaluate a solution as its elements represent it.
 
@@ -222,13 +218,13 @@ def over_resolved(scene: Scene, most_elements: int) -> Reference:
 
     Raises
     ------
-    OverResolutionError
+    InputError
         If there are no two converged solutions.
     """
     solutions = [each for each in _fine_solutions(scene, most_elements) if each.is_certified]
     solutions.sort(key=lambda solution: len(solution.boundary.points))
     if len(solutions) < 2:
-        raise OverResolutionError(
+        raise InputError(
             f"no two converged solutions with up to {most_elements} quadratic elements: give more, or another scene"
         )
     before, finest = solutions[-2:]

@@ -12,10 +12,6 @@ from bemkit.runs.run import run
 from bemkit.scene.scene import Scene
 
 
-class UnsolvedHistoryError(NoResultError):
-    """A load history that does not converge up to its end."""
-
-
 @dataclass(frozen=True)
 class IncrementErrors:
     """Changes of results when every increment is halved, about half the errors of a method of first order.
@@ -51,7 +47,7 @@ def increment_errors(scene: Scene) -> IncrementErrors:
     ------
     InputError
         If the scene has a single load or an accuracy, whose meshes would differ.
-    UnsolvedHistoryError
+    NoResultError
         If one of the runs does not converge.
     ValueError
         As for `bemkit.run`.
@@ -65,7 +61,7 @@ def increment_errors(scene: Scene) -> IncrementErrors:
     coarse, fine = (run([each]) for each in (scene, with_halved_increments(scene)))
     for steps, words in ((coarse, "as stated"), (fine, "with halved increments")):
         if not steps[-1].is_converged:
-            raise UnsolvedHistoryError(f"the history {words} is not solved: {steps[-1].message}")
+            raise NoResultError(f"the history {words} is not solved: {steps[-1].message}")
     whole, halves = (loading.total() for steps in (coarse, fine) if (loading := steps[-1].loading) is not None)
     return IncrementErrors(
         len(coarse),

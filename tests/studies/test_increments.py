@@ -10,7 +10,8 @@ import pytest
 
 import bemkit as bk
 from bemkit.cli.main import main
-from bemkit.studies.increments import UnsolvedHistoryError, increment_errors, with_halved_increments
+from bemkit.errors import NoResultError
+from bemkit.studies.increments import increment_errors, with_halved_increments
 
 LOOP = replace(bk.load_scene("friction-loop"), mesh=bk.MeshOptions(elements=32))
 
@@ -63,7 +64,7 @@ def test_refusals(scene: bk.Scene, message: str) -> None:
 
 
 def test_a_history_that_fails_has_no_errors() -> None:
-    with pytest.raises(UnsolvedHistoryError, match="the history as stated is not solved: "):
+    with pytest.raises(NoResultError, match="the history as stated is not solved: "):
         increment_errors(replace(loop(1), solver=bk.SemismoothNewton(max_steps=1)))
 
 

@@ -33,6 +33,7 @@ from bemkit.scene.scene import Scene
 from bemkit.solvers.alm import AugmentedLagrangian
 from bemkit.solvers.base import ContactSolver
 from bemkit.solvers.ssn import SemismoothNewton
+from bemkit.studies.engine import StudyError
 from bemkit.studies.stability.case import PRECISION, Case, precision_elsewhere, with_friction
 from bemkit.studies.stability.similarity import Similarity
 from bemkit.studies.stability.transform import AffineMap, transformed_scene, with_gap_offset, with_turned_loads
@@ -77,23 +78,19 @@ def find_axes(names: Sequence[str]) -> tuple[Axis, ...]:
 
     Raises
     ------
-    UnknownAxisError
-        The message lists the names.
+    StudyError
+        If there is no axis of a name; the message lists the names.
     """
     known = {axis.name: axis for axis in AXES}
     for name in names:
         if name not in known:
-            raise UnknownAxisError(f"axis is {name!r}: the axes are {', '.join(known)}")
+            raise StudyError(f"axis is {name!r}: the axes are {', '.join(known)}")
     return tuple(known[name] for name in names) if names else AXES
 
 
 def axes_of(scene: Scene) -> tuple[Axis, ...]:
     """Return the axes that apply to a scene."""
     return tuple(axis for axis in AXES if not axis.reason_against(scene))
-
-
-class UnknownAxisError(InputError):
-    """An axis of a name that does not exist; the message lists the names."""
 
 
 _BLOCK_FRICTION = 0.5

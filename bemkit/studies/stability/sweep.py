@@ -9,13 +9,13 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from bemkit.errors import BemkitError, InputError
+from bemkit.errors import BemkitError
 from bemkit.model.model import build_model
 from bemkit.model.prepared import prepare
 from bemkit.results.solution import Solution
 from bemkit.runs.run import run
 from bemkit.scene.scene import Scene
-from bemkit.studies.engine import REFUSED, Attempt, Task, attempt, compute
+from bemkit.studies.engine import REFUSED, Attempt, StudyError, Task, attempt, compute
 from bemkit.studies.stability.axes import Axis
 from bemkit.studies.stability.case import Case
 from bemkit.studies.stability.records import StabilityRecord, Verdict
@@ -33,10 +33,6 @@ TWIN_OF_BODIES = Similarity(length=3.7e-3, modulus=7.3e5, stress=7.3e5)
 RunTasks: TypeAlias = Callable[[Axis, Sequence[Task[StabilityRecord]]], Iterable[StabilityRecord]]
 
 
-class StabilityError(InputError):
-    """A sweep that cannot begin."""
-
-
 def sweep(
     scene: Scene,
     axes: Sequence[Axis],
@@ -48,20 +44,20 @@ def sweep(
 
     Raises
     ------
-    StabilityError
+    StudyError
         If the scene itself has no converged solution, or no contact, or of one body several load steps, or an axis says
         nothing of it.
     """
     if not scene.bodies and scene.n_steps > 1:
-        raise StabilityError(f"the scene has {scene.n_steps} load steps, but a sweep solves one: give it a single load")
+        raise StudyError(f"the scene has {scene.n_steps} load steps, but a sweep solves one: give it a single load")
     if not scene.has_contact:
-        raise StabilityError("the scene has no contact, which this suite is about: give one that has")
+        raise StudyError("the scene has no contact, which this suite is about: give one that has")
     for axis in axes:
         if reason := axis.reason_against(scene):
-            raise StabilityError(f"axis {axis.name!r} does not apply to this scene: {reason}; remove it")
+            raise StudyError(f"axis {axis.name!r} does not apply to this scene: {reason}; remove it")
     baseline = attempt(lambda: run(scene))
     if baseline.solution is None or not baseline.is_converged:
-        raise StabilityError(f"the scene itself has no converged solution ({baseline.message}): give one that has")
+        raise StudyError(f"the scene itself has no converged solution ({baseline.message}): give one that has")
     for axis in axes:
         tasks = _tasks(axis, baseline.solution)
         yield from compute(tasks) if run_tasks is None else run_tasks(axis, tasks)

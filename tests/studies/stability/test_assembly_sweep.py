@@ -13,9 +13,10 @@ from bemkit.runs.run import run
 from bemkit.scene.load_history import load_steps
 from bemkit.scene.scene import Scene
 from bemkit.scene.toml import load_scene, with_overrides
+from bemkit.studies.engine import StudyError
 from bemkit.studies.stability.axes import axes_of, find_axes
 from bemkit.studies.stability.records import Verdict
-from bemkit.studies.stability.sweep import TWIN_OF_BODIES, StabilityError, difference, sweep
+from bemkit.studies.stability.sweep import TWIN_OF_BODIES, difference, sweep
 from tests.slow import slow_except
 
 EXTREMES = {
@@ -39,9 +40,9 @@ def pin():
 
 def test_every_axis_is_tested_here(pin):
     assert {axis.name for axis in axes_of(pin)} == set(EXTREMES)
-    with pytest.raises(StabilityError, match="axis 'gap' does not apply to this scene: it is about one body; remove"):
+    with pytest.raises(StudyError, match="axis 'gap' does not apply to this scene: it is about one body; remove"):
         list(sweep(pin, find_axes(["gap"])))
-    with pytest.raises(StabilityError, match="axis 'turn' does not apply to this scene: it is about several bodies"):
+    with pytest.raises(StudyError, match="axis 'turn' does not apply to this scene: it is about several bodies"):
         list(sweep(load_scene("paper-1"), find_axes(["turn"])))
 
 

@@ -11,9 +11,10 @@ import pytest
 import bemkit as bk
 from bemkit.geometry.meshing.discretise import Geometric
 from bemkit.operators.half_plane.flexibility import mean_logarithms
+from bemkit.studies.engine import StudyError
 from bemkit.studies.stability.axes import AXES, find_axes
 from bemkit.studies.stability.similarity import Similarity
-from bemkit.studies.stability.sweep import TWIN, StabilityError, difference, solve_and_judge, sweep
+from bemkit.studies.stability.sweep import TWIN, difference, solve_and_judge, sweep
 from bemkit.studies.stability.transform import with_turned_loads
 from bemkit.testing.independent_check import Violations, violations_of
 from bemkit.testing.independent_check.bodies import bodies_of
@@ -183,7 +184,7 @@ def test_axes_say_where_they_say_nothing() -> None:
     assert names_against(WAVY) == ["degenerate-size", "aspect-ratio", "grading"]
     assert names_against(bk.load_scene("paper-1")) == []
     with pytest.raises(
-        StabilityError, match=r"axis 'aspect-ratio' does not apply to this scene: .* no thickness .*; remove it"
+        StudyError, match=r"axis 'aspect-ratio' does not apply to this scene: .* no thickness .*; remove it"
     ):
         list(sweep(PUNCH, find_axes(["aspect-ratio"])))
 
