@@ -42,7 +42,7 @@ NOT_NEEDED = (
 )
 """Of a scene with one body of straight sides on one obstacle, solved by collocation from a number of elements."""
 NOT_NEEDED_BY_COMMAND = (
-    *("operators.somigliana.fields", "operators.somigliana.moments", "operators.matrix_free.factor"),
+    *("operators.somigliana.fields", "operators.somigliana.straight_fields", "operators.matrix_free.factor"),
     *("results.boundary_stress", "pictures.files", "results.result_file", "hdf5", "cli.console"),
     *("runs.adaptive", "contact.mortar", "geometry.free_form.drawn", "operators.forms", "solvers.homotopy"),
 )

@@ -19,10 +19,9 @@ from bemkit.geometry.outline import Outline, Side
 from bemkit.geometry.proximity.location import PointNotInsideError
 from bemkit.geometry.spaces import BoundarySpace, ConstantSpace, LinearSpace, QuadraticSpace, dof_points
 from bemkit.operators.boundary import SteklovPoincareOperator
-from bemkit.operators.element_geometry import ElementGeometry
 from bemkit.operators.material import Material, Plane
 from bemkit.operators.somigliana.fields import InteriorFields
-from bemkit.operators.somigliana.moments import local_moments, straight_gradient_moments
+from bemkit.operators.somigliana.straight_fields import AT_END, local_moments
 from bemkit.operators.somigliana.stress import principal_stresses, von_mises
 from bemkit.operators.steklov_poincare.collocation import CollocationElasticity
 from bemkit.operators.steklov_poincare.galerkin import GalerkinElasticity
@@ -259,20 +258,15 @@ def test_derived_moments_hold_at_every_distance(distance: float, angle: float, h
 
 
 def test_powers_about_an_end_are_those_about_the_centre_shifted() -> None:
-    geometry = ElementGeometry(straight_mesh())
-    element = np.array([3, 3, 3])
+    mesh, material = straight_mesh(), Material(1.0, 0.3)
+    fields = on_boundary(mesh, material, *bending(material))._straight
+    element, reference = np.array([3, 3, 3]), np.array([0.2 - 0.1j, 0.3j, 1.0])
     zeta = np.array([-0.9 + 0.2j, 1.1 + 0.3j, 0.2 + 0.3j])
-    x = geometry.centre[element] + zeta * (geometry.half * geometry.tangent)[element]
-    about_ends = straight_gradient_moments(geometry, x, element, 2)
-    np.testing.assert_array_equal(about_ends.origin, [1, 2, 0])
-    about_centre = straight_gradient_moments(geometry, x, element, 2, at_end=0.0)
-    e = np.array([-1.0, 1.0, 0.0])
-    for name in ("reciprocal", "spread", "hyper", "twist"):
-        m, expected = getattr(about_ends, name), getattr(about_centre, name)
-        square = (2.0 * expected[2] + expected[0]) / 3.0
-        shifted = [expected[0], expected[1] - e * expected[0], square - 2 * e * expected[1] + e**2 * expected[0]]
-        shifted[2][2] = expected[2][2]  # away from both ends they are Legendre polynomials
-        np.testing.assert_allclose(m, shifted, rtol=1e-12)
+    x = fields.geometry.centre[element] + zeta * (fields.geometry.half * fields.geometry.tangent)[element]
+    about_ends, about_centre = (fields.gradients(x, element, reference, at_end) for at_end in (AT_END, 0.0))
+    assert np.all((about_ends != about_centre)[:, :2].any(axis=0))
+    np.testing.assert_array_equal(about_ends[:, 2], about_centre[:, 2])
+    np.testing.assert_allclose(about_ends, about_centre, rtol=1e-12)
 
 
 def test_points_that_are_not_inside_are_named() -> None:

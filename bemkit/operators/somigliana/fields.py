@@ -33,15 +33,9 @@ from bemkit.operators.integrals.splitting import SEPARATION, split_until
 from bemkit.operators.kernels import legendre_of_monomials, legendre_values
 from bemkit.operators.material import Material
 from bemkit.operators.somigliana.far_fields import FarFields
-from bemkit.operators.somigliana.moments import (
-    CENTRE,
-    END,
-    START,
-    straight_displacement_moments,
-    straight_gradient_moments,
-)
 from bemkit.operators.somigliana.point_sources import N_POINTS, BoundaryData, GaussData, Sources, layer_sources
 from bemkit.operators.somigliana.potentials import Background, PotentialFields, as_points
+from bemkit.operators.somigliana.straight_fields import CENTRE, END, START, StraightFields
 from bemkit.threads import for_each_chunk
 
 CHUNK_PAIRS = 8192
@@ -120,6 +114,7 @@ class InteriorFields(PotentialFields):
         curves = tuple(scaled_curve(curve, centre, (1.0, 1.0)) for curve in mesh.curves)
         about_centre = mesh.unchecked_copy(mesh.nodes - mesh.centre, curves)
         self.geometry = ElementGeometry(about_centre)
+        self._straight = StraightFields(self.geometry, material, self._displacement, self._traction, mesh.diameter)
         self._data = BoundaryData(about_centre, self._displacement[CENTRE], self._traction[CENTRE])
 
     def is_inside(self, points: FloatArray) -> BoolArray:
@@ -233,18 +228,7 @@ class InteriorFields(PotentialFields):
         kappa, two_mu, length = self.material.kappa, 2.0 * self.material.shear_modulus, self.mesh.diameter
         if is_curved:
             return self._on_arcs(x, element, reference, lambda s, z: s.displacements(z, kappa, length)[None] / two_mu)
-        moments = straight_displacement_moments(self.geometry, x, element, self._data.highest, length)
-        factor = 1.0 / (np.pi * (kappa + 1.0))
-        result = np.zeros(element.size, complex)
-        for k, p in enumerate(self._traction[CENTRE, element].T):
-            diagonal = 0.5 * moments.measure[k] - kappa * moments.log[k]
-            single = diagonal * p + 0.5 * moments.quotient[k] * p.conj()
-            result += (factor / two_mu) * single
-        for k, v in enumerate(self._displacement[CENTRE, element].T):
-            v = v - reference if k == 0 else v
-            direct = kappa * moments.cauchy[k] - moments.cauchy[k].conj()
-            result += (0.5j * factor) * (direct * v - moments.turn[k] * v.conj())
-        return result[None]
+        return self._straight.displacements(x, element, reference)
 
     def _gradient_terms(
         self, x: ComplexArray, element: IntArray, reference: ComplexArray, is_curved: bool
@@ -253,18 +237,7 @@ class InteriorFields(PotentialFields):
         kappa = self.material.kappa
         if is_curved:
             return self._on_arcs(x, element, reference, lambda sources, z: np.stack(sources.gradients(z, kappa)))
-        moments = straight_gradient_moments(self.geometry, x, element, self._data.highest)
-        factor = 1.0 / (np.pi * (kappa + 1.0))
-        potential, shear = np.zeros(element.size, complex), np.zeros(element.size, complex)
-        for k, p in enumerate(self._traction[moments.origin, element].T):
-            potential -= (0.5 * factor) * moments.reciprocal[k] * p
-            shear -= (0.5 * factor) * (kappa * moments.reciprocal[k].conj() * p + moments.spread[k] * p.conj())
-        double = 1j * factor * self.material.shear_modulus
-        for k, v in enumerate(self._displacement[moments.origin, element].T):
-            v = v - reference if k == 0 else v
-            potential -= double * moments.hyper[k] * v
-            shear += double * (moments.hyper[k].conj() * v - moments.twist[k] * v.conj())
-        return np.stack([potential, shear])
+        return self._straight.gradients(x, element, reference)
 
 
 def _at_points(terms: ComplexArray, point: IntArray, n_points: int) -> ComplexArray:
