@@ -17,7 +17,6 @@ exact local coordinates are listed and corrected (`near`).
 from __future__ import annotations
 
 from collections.abc import Iterator
-from functools import cached_property
 
 import numpy as np
 
@@ -103,12 +102,6 @@ class PairSweep:
             is_close[rows] = between < least + geometry.half[test]
         return level, is_close
 
-    @cached_property
-    def _columns_by_kind(self) -> tuple[IntArray, IntArray]:
-        """Columns of straight and of curved trial elements."""
-        is_straight = self.geometry.is_straight[self.trial]
-        return np.flatnonzero(is_straight), np.flatnonzero(~is_straight)
-
     def chunk(self, rows: slice) -> PairIntegrals:
         """Return the integrals of some rows, of shape (..., n_rows, n_trial).
 
@@ -118,44 +111,35 @@ class PairSweep:
         shape = self.test[rows].size, self.trial.size
         if listed.stop - listed.start == shape[0] * shape[1]:  # on small meshes
             return self._listed.take(self._slots[listed].reshape(shape))
-        straight, curved = self._columns_by_kind
+        is_straight = self.geometry.is_straight[self.trial]
         with np.errstate(all="ignore"):  # listed pairs may overflow here; they are replaced
-            if not curved.size:
-                result = self._sweep_straight(rows, self.trial)
+            if is_straight.all():
+                result = self._swept(rows, self.trial, is_straight=True)
             else:
                 result = PairIntegrals.zeros(self.degrees, shape)
-                result.put(slice(None), straight, self._sweep_straight(rows, self.trial[straight]))
-                result.put(slice(None), curved, self._sweep_curved(rows, self.trial[curved]))
+                for kind in (True, False):
+                    columns = np.flatnonzero(is_straight == kind)
+                    result.put(slice(None), columns, self._swept(rows, self.trial[columns], is_straight=kind))
         result.put(self._rows[listed] - rows.start, self._columns[listed], self._listed.take(self._slots[listed]))
         return result
 
-    def _sweep_straight(self, rows: slice, trial: IntArray) -> PairIntegrals:
-        """Integrate with the base rule on the test elements and far series of closed forms on the trial elements."""
-        geometry, test = self.geometry, self.test[rows]
-        points, _ = gauss_legendre(self._n_points(self.base))
+    def _swept(self, rows: slice, trial: IntArray, *, is_straight: bool) -> PairIntegrals:
+        """Integrate with the base rule on test elements, on straight trial elements with far series of closed forms."""
+        geometry, degrees, test, n_points = self.geometry, self.degrees, self.test[rows], self._n_points(self.base)
+        centre, to_local, polynomials = geometry.centre[trial], geometry.to_local[trial], geometry.polynomials(trial)
         n_terms = kernels.terms_needed(DENSE_DISTANCE)
-        to_local, offset = geometry.to_local[trial], geometry.to_local[trial] * geometry.centre[trial]
         inner = []
-        for xi in points.tolist():
-            zeta = geometry.point(test, xi)[:, None] * to_local
-            zeta -= offset
-            integrals = kernels.far_integrals(zeta, self.degrees.highest_integral, n_terms)
-            log_product = kernels.far_log_product(zeta) if self.degrees.log else zeta.real
-            inner.append(Inner.straight(self.degrees, integrals, log_product, zeta.imag))
-        return self._scaled(PairIntegrals.summed(self.degrees, inner), test, trial)
-
-    def _sweep_curved(self, rows: slice, trial: IntArray) -> PairIntegrals:
-        """Integrate with the base rule on both elements."""
-        geometry, test = self.geometry, self.test[rows]
-        n_points = self._n_points(self.base)
-        points, _ = gauss_legendre(n_points)
-        polynomials, centre, to_local = geometry.polynomials(trial), geometry.centre[trial], geometry.to_local[trial]
-        at_points = [(geometry.point(test, xi)[:, None] - centre) * to_local for xi in points.tolist()]
-        inner = [far_inner(self.degrees, polynomials, zeta, n_points) for zeta in at_points]
-        return self._scaled(PairIntegrals.summed(self.degrees, inner), test, trial)
-
-    def _scaled(self, sums: PairIntegrals, test: IntArray, trial: IntArray) -> PairIntegrals:
-        sums.scale(self.geometry.half[test, None], self.geometry.half[trial], self.geometry.tangent[trial])
+        for xi in gauss_legendre(n_points)[0].tolist():
+            zeta = geometry.point(test, xi)[:, None] - centre
+            zeta *= to_local
+            if is_straight:
+                integrals = kernels.far_integrals(zeta, degrees.highest_integral, n_terms)
+                log_product = kernels.far_log_product(zeta) if degrees.log else zeta.real
+                inner.append(Inner.straight(degrees, integrals, log_product, zeta.imag))
+            else:
+                inner.append(far_inner(degrees, polynomials, zeta, n_points))
+        sums = PairIntegrals.summed(degrees, inner)
+        sums.scale(geometry.half[test, None], geometry.half[trial], geometry.tangent[trial])
         return sums
 
 
