@@ -32,6 +32,11 @@ class Expansions:
         3 - 4 nu.
     log_length : float [m]
         Unit of length in the logarithm.
+
+    Notes
+    -----
+    Methods take series (n, 2, order + 1) of n discs, their radii (n,) [m], and complex arms (n,) [m] between centres:
+    from the larger disc to the smaller one, from a target to its sources, or from a disc to a point.
     """
 
     order: int
@@ -75,17 +80,7 @@ class Expansions:
     def of_parents(
         self, series: ComplexArray, arm: ComplexArray, radius: FloatArray, parent: FloatArray
     ) -> ComplexArray:
-        """Translate the far series of clusters to the centres of their parents.
-
-        Parameters
-        ----------
-        series : (n, 2, order + 1) complex array
-            Series of the clusters.
-        arm : (n,) complex array [m]
-            From the centre of the parent to that of the cluster.
-        radius, parent : (n,) arrays [m]
-            Radii of the cluster and of its parent.
-        """
+        """Translate the far series of clusters to the centres of their parents, of the radii `parent`."""
         scaled = series.copy()
         scaled[:, 1, 1:] -= (arm.conj() / radius)[:, None] * self._of_gradient(series[:, 0])
         scaled *= self._powers_of(radius / parent)[:, None]
@@ -102,17 +97,7 @@ class Expansions:
     def of_fields(
         self, series: ComplexArray, arm: ComplexArray, radius: FloatArray, target: FloatArray
     ) -> ComplexArray:
-        """Convert far series of sources to local series in distant discs.
-
-        Parameters
-        ----------
-        series : (n, 2, order + 1) complex array
-            Series of the sources.
-        arm : (n,) complex array [m]
-            From the centre of the disc to that of the sources.
-        radius, target : (n,) arrays [m]
-            Radii of the sources and of the disc.
-        """
+        """Convert far series of sources to local series in distant discs, of the radii `target`."""
         logs = series[:, :, 0]
         weighted = series * self._powers_of(-radius / arm)[:, None]
         parts = np.stack([weighted.real, weighted.imag]).reshape(-1, self.order + 1) @ self._of_local.T
@@ -127,17 +112,7 @@ class Expansions:
     def of_children(
         self, series: ComplexArray, arm: ComplexArray, radius: FloatArray, child: FloatArray
     ) -> ComplexArray:
-        """Translate local series to the centres of child discs.
-
-        Parameters
-        ----------
-        series : (n, 2, order + 1) complex array
-            Series in the parent discs.
-        arm : (n,) complex array [m]
-            From the centre of the parent to that of the child.
-        radius, child : (n,) arrays [m]
-            Radii of parent and child.
-        """
+        """Translate local series of parent discs along arms to the centres of their children, of the radii `child`."""
         shifted = series.copy()
         shifted[:, 1, :-1] += (arm.conj() / radius)[:, None] * series[:, 0, 1:] * self._powers[1:]
         terms, x = _by_power(shifted), arm / radius
@@ -147,16 +122,7 @@ class Expansions:
         return _by_cluster(terms) * self._powers_of(child / radius)[:, None]
 
     def displacements(self, series: ComplexArray, arm: ComplexArray, radius: FloatArray) -> ComplexArray:
-        """Return 2 mu u (n,) at points of discs.
-
-        Parameters
-        ----------
-        series : (n, 2, order + 1) complex array
-            Local series of the disc of each point.
-        arm : (n,) complex array [m]
-            From the centre of the disc to the point.
-        radius : (n,) array [m]
-        """
+        """Return 2 mu u (n,) at one point of each disc, from its local series."""
         x = arm / radius
         phi, psi, gradient = series[:, 0, -1], series[:, 1, -1], np.zeros_like(x)
         for k in range(self.order - 1, -1, -1):
@@ -166,16 +132,7 @@ class Expansions:
         return displacements
 
     def outer_displacements(self, series: ComplexArray, arm: ComplexArray, radius: float) -> ComplexArray:
-        """Return 2 mu u (n_points, n_series) at points outside of a disc.
-
-        Parameters
-        ----------
-        series : (n_series, 2, order + 1) complex array
-            Far series of the sources in the disc.
-        arm : (n_points,) complex array [m]
-            From the centre of the disc to the points.
-        radius : float [m]
-        """
+        """Return 2 mu u (n_points, n_series) at points (n_points,) outside of one disc, from far series of it."""
         powers = self._powers_of(radius / arm)
         along = radius / arm[:, None] * powers * self._of_slope
         powers[:, 0] = np.log(arm / self.log_length)
