@@ -148,12 +148,7 @@ class CollocationEquations:
     def _fields(self, x: ComplexArray, centred_on: IntArray, columns: IntArray) -> FloatArray:
         """Return the displacements of columns at points, (2 n_points, n_columns), by 2 * point + component.
 
-        Parameters
-        ----------
-        x : (n_points,) complex array
-        centred_on : (n_points,) array
-            The element whose midpoint is x, or `NOWHERE`.
-        columns : (n_columns,) array
+        Each point is the midpoint of the element in `centred_on`, or of none (`NOWHERE`).
         """
         is_double = (columns // 2) % 2 == 1
         if is_double.any() == is_double.all():
@@ -192,16 +187,7 @@ class CollocationEquations:
         return self.layer(self.constants, is_double, x, centred_on, ends, unknowns)
 
     def _unknowns(self, elements: IntArray, columns: IntArray, is_double: bool) -> tuple[IntArray, Unknowns]:
-        """Return the elements on which unknowns of one kind act, ascending, and the unknowns on these.
-
-        Parameters
-        ----------
-        elements : (n,) array
-            Elements of the unknowns.
-        columns : (n_columns,) array
-            See `Unknowns`.
-        is_double : bool
-        """
+        """Return the elements on which unknowns (n,) of one kind act, ascending, and the unknowns on these."""
         if not is_double:
             return elements, Unknowns(
                 np.arange(elements.size)[:, None], np.full((elements.size, 1, 1), -1.0 + 0j), columns
@@ -213,18 +199,7 @@ class CollocationEquations:
 def collocation_equations(
     mesh: BoundaryMesh, material: Material, order: IntArray, *, takes_slopes: bool, layer: Layer | None = None
 ) -> CollocationEquations | FoldedEquations:
-    """Return the equations of collocation of a body, with or without lines of symmetry.
-
-    Parameters
-    ----------
-    mesh : BoundaryMesh
-    material : Material
-    order : (n_elements,) array
-        The element at each position of a tree.
-    takes_slopes : bool
-    layer : Layer, optional
-        Evaluates the layers of straight elements; by default the compiled layer if there are many elements.
-    """
+    """Return the equations of a body with or without lines of symmetry; see `CollocationEquations`."""
     border = collocation_border(mesh, material, order, takes_slopes=takes_slopes)
     if mesh.symmetry is None:
         return CollocationEquations(mesh, material, order, border, takes_slopes=takes_slopes, layer=layer)

@@ -203,20 +203,9 @@ class Compression:
         tolerance: float,
         level_view: type[LevelView] = LevelView,
     ) -> Compression:
-        """Compress the equations.
+        """Compress the equations; see `Factor` for the arguments.
 
-        Parameters
-        ----------
-        equations : BoundaryEquations
-            In the order of the tree.
-        tree : ClusterTree
-        may_differ : (n_elements, 4) bool array
-            Which tractions and displacements may differ from zero, in the order of the tree.
-        tolerance : float
-            Relative tolerance of the skeletons of leaves. It is smaller above, so that errors do not grow with the
-            number of elements.
-        level_view : type of LevelView
-            Chooses the skeletons of a level.
+        The tolerance of skeletons is smaller above the leaves, so that errors do not grow with the number of elements.
         """
         n, supports = equations.points.size, equations.supports
         all_columns = np.arange(4 * n).reshape(-1, 4)

@@ -226,14 +226,7 @@ class LoadedSystem:
         return LinearConditions.given(~self.conditions.is_free, traction, displacement)
 
     def large_motion(self, elements: IntArray, displacement: FloatArray) -> FloatArray | None:
-        """Return the amplitudes of the rigid motion of some elements if it is far larger than their strain.
-
-        Parameters
-        ----------
-        elements : (n,) array
-        displacement : (n, 2) array [m]
-            In x and y.
-        """
+        """Return the amplitudes of the rigid motion of elements (n,) in displacements (n, 2) far above their strain."""
         motions = self.motions[elements].reshape(2 * elements.size, -1)
         if not motions.size:
             return None
