@@ -76,7 +76,7 @@ def _print_series(
 
 def _print_orders(records: Sequence[ErrorRecord], measures: Sequence[str], console: Console) -> None:
     console.print(Text("observed rates in the number n of unknowns, fitted to the last meshes", style="bold"))
-    table = plain_table(("elements", "map", "meshes", "driver"), [SHORT[measure] for measure in measures])
+    table = plain_table(("elements", "method", "meshes", "solver"), [SHORT[measure] for measure in measures])
     for column in table.columns[:3]:
         column.no_wrap = True
     for series in by_series(records):

@@ -155,7 +155,7 @@ def _of_contact(stated: Scene, messages: list[str]) -> Iterator[Method]:
         if keys := LAW_WORKS.get(LAWS.name_of(law)):
             yield Method(f"law {LAWS.name_of(law)}", keys)
     for word in map(SOLVERS.name_of, drivers_at_work(stated.solver, messages)):
-        yield Method(f"driver {word}", DRIVERS.get(word, ()))
+        yield Method(f"solver {word}", DRIVERS.get(word, ()))
 
 
 def _of_run(solution: Solution) -> Iterator[Method]:

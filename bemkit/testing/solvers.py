@@ -36,7 +36,7 @@ def check_solver(solver: ContactSolver, *, problems: Iterable[str] | None = None
         units.
     """
     name = type(solver).__name__
-    demand(is_dataclass(solver), f"{name} is not a dataclass: options of drivers are frozen values")
+    demand(is_dataclass(solver), f"{name} is not a dataclass: options of solvers are frozen values")
     demand(solver.max_steps >= 1, f"{name}.max_steps is {solver.max_steps}; it allows no step")
     for title in KNOWN_PROBLEMS if problems is None else problems:
         known = KNOWN_PROBLEMS[title]()

@@ -122,7 +122,7 @@ def test_every_driver_has_its_works() -> None:
 
 
 def test_a_method_from_elsewhere_is_named_without_works() -> None:
-    assert str(Citations((Method("driver of mine", ()),))) == "% driver of mine: not part of bemkit, ask its author"
+    assert str(Citations((Method("solver of mine", ()),))) == "% solver of mine: not part of bemkit, ask its author"
 
 
 @pytest.mark.parametrize("key", entries())

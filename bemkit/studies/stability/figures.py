@@ -11,7 +11,7 @@ from bemkit.studies.stability.axes import Axis
 from bemkit.studies.stability.records import StabilityRecord, Verdict
 
 _SERIES = (
-    ("certificate", "certificate of the driver", BLUE, "o"),
+    ("certificate", "certificate", BLUE, "o"),
     ("check", "independent check", GREEN, "s"),
     ("scaled_copy", "difference to the scaled copy", ORANGE, "^"),
     ("deviation", "deviation from the reference", GREY, "x"),
