@@ -13,20 +13,16 @@ from bemkit.contact.body import SingularResponse
 from bemkit.contact.critical_friction import critical_coefficient, sliding_response
 from bemkit.contact.laws import LawError
 from bemkit.contact.problem import ContactProblem
-from bemkit.errors import NoResultError
+from bemkit.errors import InputError, NoResultError
 from bemkit.results.solution import Solution
-from bemkit.runs.run import LoadHistoryError, on_its_meshes
+from bemkit.runs.run import on_its_meshes
 from bemkit.runs.solution_of import solution_of, with_missed_contact_named
-from bemkit.runs.steps import NoContactError, UnsolvableSceneError, built, checked, planned
+from bemkit.runs.steps import UnsolvableSceneError, built, checked, planned
 from bemkit.scene.load_history import load_steps
 from bemkit.scene.scene import Scene, check_scene
 from bemkit.solvers.active_sets import NodeStatus
 from bemkit.solvers.base import ContactSolution, solve
 from bemkit.threads import blas_threads_for
-
-
-class NoSlidingStateError(NoResultError):
-    """A scene without a state of contact."""
 
 
 @dataclass(frozen=True)
@@ -72,18 +68,14 @@ def critical_friction(scene: Scene) -> CriticalFriction:
 
     Raises
     ------
-    NoContactError
-        If no part is in contact.
+    InputError
+        If no part is in contact, or there are several load factors.
     LawError
         If there is no friction, or none that grows with the pressure: then there is no such coefficient.
-    LoadHistoryError
-        If there are several load factors.
     UnsolvableSceneError
         If nothing but friction keeps a body from sliding: it does so at any coefficient.
-    NoSlidingStateError
-        If no solution is found, or no node is in contact.
-    NoMeshError
-        If the accuracy is not reached.
+    NoResultError
+        If no solution is found, no node is in contact, or the accuracy is not reached.
 
     Notes
     -----
@@ -105,7 +97,7 @@ def critical_friction(scene: Scene) -> CriticalFriction:
     if not has_friction.any():
         raise LawError("friction does not grow with the pressure: choose Coulomb's law, or one like it")
     if not (is_closed & has_friction).any():
-        raise NoSlidingStateError("no node with friction is in contact under this load: press the sides together")
+        raise NoResultError("no node with friction is in contact under this load: press the sides together")
     return _coefficients(problem, statuses, is_closed, is_closed & has_friction)
 
 
@@ -137,13 +129,13 @@ def _solved(scene: Scene) -> tuple[ContactProblem, np.ndarray[tuple[int], np.dty
     """Return the contact problem of a scene, on the mesh that its accuracy needs, and the statuses of its nodes."""
     check_scene(scene)
     if scene.n_steps > 1:
-        raise LoadHistoryError(f"a load history of {scene.n_steps} steps has no single state: give one load")
+        raise InputError(f"a load history of {scene.n_steps} steps has no single state: give one load")
     if not scene.has_contact:
-        raise NoContactError("no part is in contact: nothing slides")
+        raise InputError("no part is in contact: nothing slides")
     scene, mesh = on_its_meshes(scene)
     (prepared,), plan, clock = planned(load_steps(scene), mesh)
     if not (prepared.n_contact or any(body.scene.contact_parts for body in prepared.bodies)):
-        raise NoContactError("no two bodies are in contact: nothing slides")
+        raise InputError("no two bodies are in contact: nothing slides")
     with blas_threads_for(prepared.largest_matrix):
         model, clock = built(prepared, clock)
         result = checked(model, solve(model.problem, scene.solver, throw=False))
@@ -151,5 +143,5 @@ def _solved(scene: Scene) -> tuple[ContactProblem, np.ndarray[tuple[int], np.dty
         if result.is_converged:
             found = with_missed_contact_named(solution_of(model, result, plan, clock))
     if not found.is_converged:
-        raise NoSlidingStateError(f"the scene has no solution to begin with: {found.message}")
+        raise NoResultError(f"the scene has no solution to begin with: {found.message}")
     return model.problem, result.node_status

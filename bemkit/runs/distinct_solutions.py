@@ -5,9 +5,10 @@ from __future__ import annotations
 from typing import Any
 
 from bemkit.contact.solvability import find_unsolvable_load
-from bemkit.runs.run import LoadHistoryError, UnsolvableSceneError, on_its_meshes
+from bemkit.errors import InputError
+from bemkit.runs.run import UnsolvableSceneError, on_its_meshes
 from bemkit.runs.solution_of import solution_of, with_missed_contact_named
-from bemkit.runs.steps import NoContactError, built, checked, explained, planned
+from bemkit.runs.steps import built, checked, explained, planned
 from bemkit.scene.load_history import load_steps
 from bemkit.scene.scene import Scene, check_scene
 from bemkit.solvers.multistart import probe
@@ -37,14 +38,14 @@ def distinct_solutions(scene: Scene, *, n_starts: int = 8) -> tuple[Any, ...]:
     ------
     UnsolvableSceneError, ValueError
         As for `run`; also if the scene has a load history or `n_starts` is negative.
-    NoMeshError
+    NoResultError
         If the accuracy is not reached.
     """
     check_scene(scene)
     if not scene.has_contact:
-        raise NoContactError("no part is in contact: the solution is the only one, which run returns")
+        raise InputError("no part is in contact: the solution is the only one, which run returns")
     if scene.n_steps > 1:
-        raise LoadHistoryError(
+        raise InputError(
             f"a load history of {scene.n_steps} steps cannot be searched for distinct solutions: give one load"
         )
     scene, mesh = on_its_meshes(scene)

@@ -16,10 +16,6 @@ from bemkit.scene.scene import Scene
 from bemkit.scene.toml import with_overrides
 
 
-class CascadeError(InputError):
-    """A scene that cannot be solved on one mesh after the other."""
-
-
 def run_nested(
     scene: Scene,
     *,
@@ -51,19 +47,18 @@ def run_nested(
 
     Raises
     ------
-    CascadeError
-        If the scene has a load history, whose memory belongs to one mesh, or no contact.
     ValueError
-        If `coarsest` is too small for any mesh, if `ratio` is less than two, or for the reasons of `bemkit.run`.
+        If the scene has a load history, whose memory belongs to one mesh, or no contact, if `coarsest` is too small for
+        any mesh, if `ratio` is less than two, or for the reasons of `bemkit.run`.
     """
     if coarsest < 3:
         raise InputError(f"coarsest = {coarsest}: give at least 3 elements")
     if ratio < 2:
         raise InputError(f"ratio = {ratio}: give a whole number from 2 on")
     if not scene.has_contact:
-        raise CascadeError("no part is in contact: one mesh is enough, where there is nothing to iterate")
+        raise InputError("no part is in contact: one mesh is enough, where there is nothing to iterate")
     if scene.n_steps > 1:
-        raise CascadeError(f"a load history of {scene.n_steps} steps cannot cascade: run it on one mesh")
+        raise InputError(f"a load history of {scene.n_steps} steps cannot cascade: run it on one mesh")
     check_elements(scene)
     counts = [scene.mesh.n_elements]
     while counts[-1] // ratio >= coarsest:

@@ -30,14 +30,6 @@ _LARGE = 5000
 """Number of elements of the mesh whose plan decides whether the equations of such a body are compressed."""
 
 
-class NoMeshError(NoResultError):
-    """A scene does not reach its accuracy on any mesh."""
-
-
-class LoadHistoryError(InputError):
-    """A load history was given where only a single load is possible."""
-
-
 @overload
 def run(
     scene: Scene,
@@ -213,13 +205,13 @@ def on_its_meshes(scene: Scene) -> tuple[Scene, Meshes]:
 
     Raises
     ------
-    NoMeshError
+    NoResultError
         If the accuracy is not reached.
     """
     if scene.mesh.accuracy is None:
         return scene, None
     found = run(scene)
     if not found.is_converged:
-        raise NoMeshError(f"no mesh reaches the accuracy, give elements or ask for less: {found.message}")
+        raise NoResultError(f"no mesh reaches the accuracy, give elements or ask for less: {found.message}")
     placed = {body.name: body.placement for body in scene.placed_bodies}
     return found.scene, {name: placed[name].inverse.mesh(body.mesh) for name, body in found.bodies.items()}

@@ -31,10 +31,6 @@ if TYPE_CHECKING:
     from bemkit.results.solution import Solution
 
 
-class NoContactError(InputError):
-    """A method that needs contact, for a scene without contact."""
-
-
 class UnsolvableSceneError(InputError):
     """The scene has no solution; the message says why."""
 
@@ -331,7 +327,7 @@ def guess_from(scene: Scene, start: Any) -> Callable[[Model], ContactState] | No
     if start is None:
         return None
     if not scene.has_contact:
-        raise NoContactError("start is given, but no part is in contact: remove it; nothing is iterated")
+        raise InputError("start is given, but no part is in contact: remove it; nothing is iterated")
     from bemkit.results.solution import Solution
     from bemkit.runs.warm_start import state_on
 
