@@ -12,7 +12,6 @@ from bemkit.results.file_meanings import CONTACT_COLUMNS
 from bemkit.results.solution import Solution
 from bemkit.results.tables import RESULTANT_COLUMNS, history_columns, in_units
 from bemkit.scene.toml import SceneError, scene_to_toml
-from bemkit.scene.written_tables import UnstructureError
 from bemkit.version import __version__
 
 _MOST_ROWS = 200
@@ -78,7 +77,7 @@ def scene_section(result: Solution) -> list[Element]:
     """Return the scene as a scene file."""
     try:
         text = scene_to_toml(result.stated)
-    except (SceneError, UnstructureError) as error:
+    except SceneError as error:
         return [element("p", f"The scene cannot be written as text: {error}")]
     return [element("pre", element("code", text), tabindex="0")]
 
