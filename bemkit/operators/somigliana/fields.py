@@ -13,9 +13,9 @@ With complex displacements u = u_x + i u_y and z = x + i y, the formula is diffe
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import cached_property
+from functools import cached_property, partial
 from math import comb
-from typing import TypeAlias
+from typing import NamedTuple
 
 import numpy as np
 
@@ -47,11 +47,14 @@ _INTEGRALS = 400
 MOST_ELEMENTS, FEW_POINTS = 300, 30
 """Largest number of elements, or of points, for which all pairs are integrated without series."""
 
-Terms: TypeAlias = Callable[[ComplexArray, IntArray, ComplexArray, bool], ComplexArray]
-"""Contribution of elements at points: a function of points, elements, subtracted displacements, and a curved flag."""
-OfSources: TypeAlias = Callable[[Sources, ComplexArray], ComplexArray]
-"""Fields (n_fields, ...) of sources at points."""
-OfClusters: TypeAlias = Callable[[FarFields, ComplexArray, ComplexArray, list[Pairs]], ComplexArray]
+
+class _Kind(NamedTuple):
+    """Fields (n_fields, n) of straight elements, point sources and far clusters."""
+
+    n_fields: int
+    of_straight: Callable[[ComplexArray, IntArray, ComplexArray], ComplexArray]
+    of_sources: Callable[[Sources, ComplexArray], ComplexArray]
+    of_clusters: Callable[[FarFields, ComplexArray, ComplexArray, list[Pairs]], ComplexArray]
 
 
 class InteriorFields(PotentialFields):
@@ -123,10 +126,16 @@ class InteriorFields(PotentialFields):
 
     def displacement(self, points: FloatArray) -> FloatArray:
         """Evaluate the displacement (n, 2) [m] at points (n, 2) [m]."""
-        points, location = self._located(points)
-        reference = self._at_nearest(location)
+        points, reference = self._located(points)
+        kappa, two_mu, length = self.material.kappa, 2.0 * self.material.shear_modulus, self.mesh.diameter
+        kind = _Kind(
+            1,
+            self._straight.displacements,
+            lambda sources, z: sources.displacements(z, kappa, length)[None] / two_mu,
+            FarFields.displacements,
+        )
         # the representation of a constant displacement c is c in a bounded body, and zero in an exterior
-        result = self._summed(points, reference, 1, self._displacement_terms, FarFields.displacements)[0]
+        result = self._summed(points, reference, kind)[0]
         if not self.mesh.is_exterior:
             result += reference
         displacement = np.column_stack([result.real, result.imag])
@@ -134,30 +143,30 @@ class InteriorFields(PotentialFields):
 
     def potentials(self, points: FloatArray) -> tuple[ComplexArray, ComplexArray]:
         """Return Phi and D (n,) [Pa]."""
-        points, location = self._located(points)
-        potential, shear = self._summed(
-            points, self._at_nearest(location), 2, self._gradient_terms, FarFields.gradients
+        points, reference = self._located(points)
+        kappa = self.material.kappa
+        kind = _Kind(
+            2,
+            self._straight.gradients,
+            lambda sources, z: np.stack(sources.gradients(z, kappa)),
+            FarFields.gradients,
         )
+        potential, shear = self._summed(points, reference, kind)
         return potential, shear
 
-    def _located(self, points: FloatArray) -> tuple[FloatArray, Location]:
+    def _located(self, points: FloatArray) -> tuple[FloatArray, ComplexArray]:
+        """Return points inside the body, and the displacements (n,) of their nearest boundary points."""
         points = as_points(points)
         location = self._locator.locate(points)
         _require_inside(location, points)
-        return points, location
-
-    def _at_nearest(self, location: Location) -> ComplexArray:
-        """Return the displacements (n,) of the nearest boundary points."""
         polynomials = legendre_values(self._displacement.shape[2] - 1, location.xi)
-        return np.asarray(np.einsum("nk,kn->n", self._displacement[CENTRE, location.element], polynomials))
+        return points, np.asarray(np.einsum("nk,kn->n", self._displacement[CENTRE, location.element], polynomials))
 
     @cached_property
     def _far(self) -> FarFields:
         return FarFields(self._locator.clusters, self._data, self.material, self.mesh.diameter)
 
-    def _summed(
-        self, points: FloatArray, reference: ComplexArray, n_fields: int, terms: Terms, of_clusters: OfClusters
-    ) -> ComplexArray:
+    def _summed(self, points: FloatArray, reference: ComplexArray, kind: _Kind) -> ComplexArray:
         """Return the fields of all elements at points, (n_fields, n_points)."""
         relative = points - self.mesh.centre
         x = relative[:, 0] + 1j * relative[:, 1]
@@ -169,31 +178,29 @@ class InteriorFields(PotentialFields):
             chunk, subtracted = x[rows], reference[rows]
             if far is None:
                 pairs = np.repeat(np.arange(chunk.size), n), np.tile(np.arange(n), chunk.size)
-                return self._of_pairs(chunk, subtracted, pairs, n_fields, terms)
+                return self._of_pairs(chunk, subtracted, pairs, kind)
             far_pairs, pairs = far.divided(chunk)
-            near_fields = self._of_pairs(chunk, subtracted, pairs, n_fields, terms)
-            return near_fields + of_clusters(far, chunk, subtracted, far_pairs)
+            near_fields = self._of_pairs(chunk, subtracted, pairs, kind)
+            return near_fields + kind.of_clusters(far, chunk, subtracted, far_pairs)
 
         step = max(1, CHUNK_PAIRS // n) if is_dense else CHUNK_POINTS
         chunks = [slice(first, first + step) for first in range(0, max(1, x.size), step)]
         return np.concatenate(for_each_chunk(of_points, chunks, n_integrals=_INTEGRALS * x.size), axis=1)
 
-    def _of_pairs(
-        self, x: ComplexArray, reference: ComplexArray, pairs: Pairs, n_fields: int, terms: Terms
-    ) -> ComplexArray:
+    def _of_pairs(self, x: ComplexArray, reference: ComplexArray, pairs: Pairs, kind: _Kind) -> ComplexArray:
         """Return the fields of elements at near points, from pairs of points (ascending) and elements."""
         points, elements = pairs
-        is_curved = ~self.mesh.is_straight[elements]
-        result: ComplexArray = np.zeros((n_fields, x.size), complex)
-        for kind in (False, True):
-            chosen = np.flatnonzero(is_curved == kind)
+        is_straight = self.mesh.is_straight[elements]
+        result: ComplexArray = np.zeros((kind.n_fields, x.size), complex)
+        on_arcs = partial(self._on_arcs, kind)
+        for chosen, terms in ((np.flatnonzero(is_straight), kind.of_straight), (np.flatnonzero(~is_straight), on_arcs)):
             for begin in range(0, chosen.size, CHUNK_PAIRS):
                 chunk = chosen[begin : begin + CHUNK_PAIRS]
                 point, element = points[chunk], elements[chunk]
-                result = result + _at_points(terms(x[point], element, reference[point], kind), point, x.size)
+                result = result + _at_points(terms(x[point], element, reference[point]), point, x.size)
         return result
 
-    def _on_arcs(self, x: ComplexArray, element: IntArray, reference: ComplexArray, fields: OfSources) -> ComplexArray:
+    def _on_arcs(self, kind: _Kind, x: ComplexArray, element: IntArray, reference: ComplexArray) -> ComplexArray:
         """Return the contribution of curved elements, bisected until each piece is away from its point."""
         data = self._data
 
@@ -209,10 +216,10 @@ class InteriorFields(PotentialFields):
         middle, half = 0.5 * (low + high)[:, None], 0.5 * (high - low)[:, None]
         on_pieces = data.at(element[near[piece]], middle + half * xi, half * weights)
         on_wholes = (values[element[far]] for values in self._on_all_elements)
-        result: ComplexArray = np.zeros((1, x.size), complex)
+        result: ComplexArray = np.zeros((kind.n_fields, x.size), complex)
         for pair, (y, dy, traction, displacement) in ((far, on_wholes), (near[piece], on_pieces)):
             sources = layer_sources(y, dy, traction, displacement - reference[pair, None], self.material)
-            result = result + _at_points(fields(sources, x[pair, None]).sum(axis=-1), pair, x.size)
+            result = result + _at_points(kind.of_sources(sources, x[pair, None]).sum(axis=-1), pair, x.size)
         return result
 
     @cached_property
@@ -220,24 +227,6 @@ class InteriorFields(PotentialFields):
         """The data at the Gauss points of all elements."""
         rule = gauss_legendre(N_POINTS + self._data.highest // 2)
         return self._data.at(np.arange(self.mesh.n_elements), *rule)
-
-    def _displacement_terms(
-        self, x: ComplexArray, element: IntArray, reference: ComplexArray, is_curved: bool
-    ) -> ComplexArray:
-        """Return the contribution of each pair to the displacement, (1, n_pairs)."""
-        kappa, two_mu, length = self.material.kappa, 2.0 * self.material.shear_modulus, self.mesh.diameter
-        if is_curved:
-            return self._on_arcs(x, element, reference, lambda s, z: s.displacements(z, kappa, length)[None] / two_mu)
-        return self._straight.displacements(x, element, reference)
-
-    def _gradient_terms(
-        self, x: ComplexArray, element: IntArray, reference: ComplexArray, is_curved: bool
-    ) -> ComplexArray:
-        """Return the contribution of each pair to Phi and D, (2, n_pairs)."""
-        kappa = self.material.kappa
-        if is_curved:
-            return self._on_arcs(x, element, reference, lambda sources, z: np.stack(sources.gradients(z, kappa)))
-        return self._straight.gradients(x, element, reference)
 
 
 def _at_points(terms: ComplexArray, point: IntArray, n_points: int) -> ComplexArray:
