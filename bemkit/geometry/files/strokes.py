@@ -140,7 +140,8 @@ def join_strokes(strokes: Sequence[Stroke], tolerance: float) -> tuple[list[list
         notes.append(f"closed: {counted(count, 'gap')} between ends of lines, of up to {2.0 * gaps.max():.2g}")
     _check_degrees(vertices, place_of_end.reshape(-1, 2), [stroke.side.group for stroke in strokes], tolerance)
     strokes = [
-        _with_ends(stroke, *vertices[pair]) for stroke, pair in zip(strokes, place_of_end.reshape(-1, 2), strict=True)
+        Stroke(pair(start), replace(stroke.side, to=pair(end)))
+        for stroke, (start, end) in zip(strokes, vertices[place_of_end.reshape(-1, 2)], strict=True)
     ]
     chains = closed_chains(place_of_end.reshape(-1, 2))
     return [
@@ -254,11 +255,6 @@ def _groups_that_close(ends: IntArray, groups: Sequence[str]) -> str:
     return f"without the lines{dropped} the outline is closed: {remedy}"
 
 
-def _with_ends(stroke: Stroke, start: FloatArray, end: FloatArray) -> Stroke:
-    ends = [(float(x), float(y)) for x, y in (start, end)]
-    return Stroke(ends[0], replace(stroke.side, to=ends[1]))
-
-
 def named_loops(loops: Sequence[list[Stroke]]) -> tuple[Loop, ...]:
     """Put loops in order, the outer one first and anticlockwise, and name their sides.
 
@@ -275,13 +271,12 @@ def named_loops(loops: Sequence[list[Stroke]]) -> tuple[Loop, ...]:
     ordered = [begun[outer], *holes]
     groups = [stroke.side.group for loop in ordered for stroke in loop]
     names = iter(_names(groups))
-    return tuple(
-        Loop(loop[0].start, tuple(_named(stroke.side, next(names), groups) for stroke in loop)) for loop in ordered
-    )
 
+    def named(side: StrokeSide) -> StrokeSide:
+        name = next(names)
+        return replace(side, name=name, group="" if name == side.group else side.group)
 
-def _named(side: StrokeSide, name: str, groups: Sequence[str]) -> StrokeSide:
-    return replace(side, name=name, group="" if name == side.group else side.group)
+    return tuple(Loop(loop[0].start, tuple(named(stroke.side) for stroke in loop)) for loop in ordered)
 
 
 def _names(groups: Sequence[str]) -> list[str]:
