@@ -251,16 +251,6 @@ def log_on_itself(a: int, b: int) -> float:
     return 2.0 * (products[0] - products[1]) / (2 * high + 1)
 
 
-@lru_cache(maxsize=16)
-def legendre_of_monomials(highest: int) -> FloatArray:
-    """Return the read-only square matrix whose row m contains the Legendre coefficients of t**m."""
-    matrix = np.zeros((highest + 1, highest + 1))
-    for m, unit in enumerate(np.eye(highest + 1)):
-        matrix[m, : m + 1] = np.polynomial.legendre.poly2leg(unit[: m + 1])
-    read_only(matrix)
-    return matrix
-
-
 @lru_cache(maxsize=64)
 def legendre_weights(n_polynomials: int, n_points: int) -> FloatArray:
     """Return the read-only products of P_0, P_1, ... at Gauss points and weights, (n_polynomials, n_points)."""

@@ -112,7 +112,9 @@ def _moments_by_parts(
 
     `plus` and `minus` are the local coordinates of the point relative to start and end of the element.
     """
-    coefficients = kernels.legendre_of_monomials(len(polynomials) - 1).T @ polynomials
+    n = len(polynomials)
+    of_powers = [np.append(np.polynomial.legendre.poly2leg(np.eye(m + 1)[m]), np.zeros(n - m - 1)) for m in range(n)]
+    coefficients = np.transpose(of_powers) @ polynomials
     slopes = np.polynomial.legendre.legder(coefficients)
     signs = (-1.0) ** np.arange(len(coefficients))  # P_k at the start; it is one at the end
     at_start, at_end = signs @ coefficients, coefficients.sum(axis=0)

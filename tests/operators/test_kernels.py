@@ -105,9 +105,3 @@ def test_the_logarithm_on_the_element_itself(a: int, b: int) -> None:
         half = u < 1.0
         total += np.sum((weight * outer * kernels.log_integrals(integrals, log_product)[b])[half])
     assert kernels.log_on_itself(a, b) == pytest.approx(total, abs=2e-13)  # round-off of 400 points
-
-
-def test_monomials_in_legendre_polynomials() -> None:
-    t = np.linspace(-1.0, 1.0, 7)
-    powers = kernels.legendre_of_monomials(5) @ kernels.legendre_values(5, t)
-    assert powers == pytest.approx(np.stack([t**m for m in range(6)]), abs=1e-14)

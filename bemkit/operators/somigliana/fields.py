@@ -30,7 +30,7 @@ from bemkit.geometry.quadrature import gauss_legendre
 from bemkit.geometry.spaces import BoundarySpace, local_coefficients
 from bemkit.operators.element_geometry import ElementGeometry
 from bemkit.operators.integrals.splitting import SEPARATION, split_until
-from bemkit.operators.kernels import legendre_of_monomials, legendre_values
+from bemkit.operators.kernels import legendre_values
 from bemkit.operators.material import Material
 from bemkit.operators.somigliana.far_fields import FarFields
 from bemkit.operators.somigliana.point_sources import N_POINTS, BoundaryData, GaussData, Sources, layer_sources
@@ -266,13 +266,11 @@ def _element_polynomials(mesh: BoundaryMesh, space: BoundarySpace, dofs: FloatAr
         )
     on_elements = values_on_elements(space, dofs) @ np.array([1.0, 1j])
     coefficients: ComplexArray = on_elements @ local_coefficients(space)
-    in_powers = coefficients @ np.linalg.inv(legendre_of_monomials(space.degree))
     result = np.zeros((3, *coefficients.shape), complex)
     result[CENTRE] = coefficients
-    for origin, e in ((START, -1.0), (END, 1.0)):
-        for k in range(space.degree + 1):
-            for j in range(k + 1):
-                result[origin, :, j] += comb(k, j) * e ** (k - j) * in_powers[:, k]
+    n = range(space.degree + 1)
+    for origin, e in ((START, -1.0), (END, 1.0)):  # P_k about an end [DLMF, 18.5.7]
+        result[origin] = coefficients @ [[e ** (k + j) * comb(k, j) * comb(k + j, j) / 2.0**j for j in n] for k in n]
     # the exact value at the node, so that two elements have the same value there
     result[[START, END], :, 0] = (on_elements @ space.basis(np.array([-1.0, 1.0]))).T
     return result
