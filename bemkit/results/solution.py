@@ -121,9 +121,10 @@ class Solution(SolvedScene, Explorable):
         loading = self.loading
         if loading is None:
             raise InputError("the result has no load history: give [[steps]] or load_factors")
-        if not 1 <= number <= len(loading.steps):
+        if number not in range(1, len(loading.steps) + 1):
             most = len(loading.steps)
             raise InputError(f"step {number} does not exist: give a number from 1 to {most}")
+        number = int(number)
         end: Any = loading.steps[number - 1].end
         return cast("Self", replace(end, loading=replace(loading, steps=loading.steps[:number])))
 

@@ -6,6 +6,7 @@ from abc import abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
+from numbers import Real
 from typing import Protocol
 
 import numpy as np
@@ -261,6 +262,9 @@ class MeshOptions:
     rising_degrees: bool = False
 
     def __post_init__(self) -> None:
+        for name in ("elements", "accuracy", "most_elements", "most_seconds"):
+            if not isinstance(value := getattr(self, name), Real | None):
+                raise InputError(f"{name} is {value!r}: give a number")
         if self.accuracy is None:
             self._check_without_accuracy()
             return

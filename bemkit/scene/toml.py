@@ -110,6 +110,8 @@ def scene_from_toml(text: str, *, name: str = "scene", folder: Path | None = Non
     SceneError
         If the text is not TOML, or not a valid scene.
     """
+    if not isinstance(text, str):
+        raise SceneError(f"{name} is {text!r}: give the text of a scene file; load_scene(path) reads one")
     try:
         table = tomllib.loads(text.removeprefix("\ufeff"))  # the byte order mark that some editors write
     except tomllib.TOMLDecodeError as error:

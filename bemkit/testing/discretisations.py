@@ -21,7 +21,7 @@ from bemkit.runs.run import run
 from bemkit.scene.conditions import Clamped, Contact, Part, Roller, Traction
 from bemkit.scene.discretisation import Discretisation, MeshOptions
 from bemkit.scene.scene import Scene
-from bemkit.testing.failure import demand
+from bemkit.testing.failure import class_name, demand
 from bemkit.testing.spaces import check_space
 
 _MATERIAL = Material(2.0, 0.3)
@@ -39,7 +39,7 @@ def check_discretisation(discretisation: Discretisation) -> None:
     CheckFailed
         Naming the discretisation, the promise broken, and by how much.
     """
-    name = type(discretisation).__name__
+    name = class_name(discretisation)
     demand(is_dataclass(discretisation), f"{name} is not a dataclass: scenes compare and write it by its fields")
     demand(copy(discretisation) == discretisation, f"{name} does not equal its copy")
     demand(bool(discretisation.method), f"{name}.method is empty: messages name it")

@@ -20,6 +20,13 @@ def demand(is_kept: bool, message: str) -> None:
         raise CheckFailed(message)
 
 
+def class_name(implementation: object) -> str:
+    """Return the name of the class of an object; CheckFailed if the object is a class itself."""
+    if isinstance(implementation, type):
+        raise CheckFailed(f"{implementation.__name__} is a class: give an object, {implementation.__name__}(...)")
+    return type(implementation).__name__
+
+
 def evaluated(label: str, method: Callable[[FloatArray], FloatArray], places: FloatArray, shape: object) -> FloatArray:
     """Return the values of a function at some places, after checks of shape, finiteness, purity and repeatability."""
     before = places.copy()

@@ -5,7 +5,7 @@ import numpy as np
 from bemkit.arrays import FloatArray
 from bemkit.contact.body import SlipHistory
 from bemkit.contact.laws import FrictionLaw
-from bemkit.testing.failure import CheckFailed, demand, evaluated
+from bemkit.testing.failure import CheckFailed, class_name, demand, evaluated
 
 
 def check_law(law: FrictionLaw, *, stress_scale: float = 1.0, n_contact: int = 5) -> None:
@@ -24,7 +24,7 @@ def check_law(law: FrictionLaw, *, stress_scale: float = 1.0, n_contact: int = 5
     CheckFailed
         Naming the law, the promise broken, and where.
     """
-    name = type(law).__name__
+    name = class_name(law)
     random = np.random.default_rng(0)
     for _ in range(20):
         sigma_n = -stress_scale * 10.0 ** random.uniform(-3.0, 3.0, n_contact)

@@ -6,7 +6,7 @@ import numpy as np
 
 from bemkit.arrays import FloatArray
 from bemkit.operators.linear_solvers import LinearSolver, SingularMatrixError
-from bemkit.testing.failure import demand
+from bemkit.testing.failure import class_name, demand
 
 _ORDER = 40
 
@@ -25,7 +25,7 @@ def check_linear_solver(solver: LinearSolver, *, rtol: float = 1e-7) -> None:
     CheckFailed
         Naming the solver, the promise broken, and by how much.
     """
-    name = type(solver).__name__
+    name = class_name(solver)
     random = np.random.default_rng(0)
     matrix = _string(_ORDER)
     before = matrix.copy()

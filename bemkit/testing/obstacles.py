@@ -7,7 +7,7 @@ import numpy as np
 from bemkit.arrays import FloatArray
 from bemkit.contact.obstacle import DirectedObstacle, Obstacle
 from bemkit.geometry.mesh import BoundaryMesh
-from bemkit.testing.failure import demand, evaluated
+from bemkit.testing.failure import class_name, demand, evaluated
 
 _STEP = 1e-5
 """Length of steps, relative to the size of the boundary: the curvature of a surface changes gaps by their squares."""
@@ -32,7 +32,7 @@ def check_obstacle(obstacle: Obstacle, mesh: BoundaryMesh, *, is_everywhere: boo
     CheckFailed
         Naming the obstacle, the promise broken, where, and by how much.
     """
-    name = type(obstacle).__name__
+    name = class_name(obstacle)
     for member in ("gap", "approach") if hasattr(obstacle, "approach") else ("gap",):
         demand(callable(getattr(obstacle, member, None)), f"{name} has no method {member}(points, normals)")
     random = np.random.default_rng(0)

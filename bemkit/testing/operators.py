@@ -10,7 +10,7 @@ from bemkit.geometry.spaces import dof_points
 from bemkit.operators.boundary import BoundaryOperator, mass
 from bemkit.operators.linear_solvers import Tag
 from bemkit.operators.rigid_modes import rigid_motions
-from bemkit.testing.failure import demand
+from bemkit.testing.failure import class_name, demand
 
 
 def check_operator(operator: BoundaryOperator, *, adjoint: BoundaryOperator | None = None, rtol: float = 1e-11) -> None:
@@ -31,7 +31,7 @@ def check_operator(operator: BoundaryOperator, *, adjoint: BoundaryOperator | No
     CheckFailed
         Naming the operator, the promise broken, and by how much.
     """
-    name = type(operator).__name__
+    name = class_name(operator)
     demand(operator.trial.mesh is operator.test.mesh, f"{name}: trial and test space are defined on different meshes")
     demand(
         isinstance(operator.tags, frozenset) and all(isinstance(tag, Tag) for tag in operator.tags),

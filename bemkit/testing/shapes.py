@@ -9,7 +9,7 @@ from bemkit.geometry.meshing.discretise import discretise
 from bemkit.geometry.outline import Outline
 from bemkit.geometry.shapes import Shape
 from bemkit.scene.objects import outline_of
-from bemkit.testing.failure import CheckFailed, demand
+from bemkit.testing.failure import CheckFailed, class_name, demand
 from bemkit.testing.spaces import check_curve
 
 _SEEN = np.linspace(0.0, 1.0, 9)
@@ -28,7 +28,7 @@ def check_shape(shape: Shape) -> None:
     CheckFailed
         Naming the shape, the promise broken, where, and by how much.
     """
-    name = type(shape).__name__
+    name = class_name(shape)
     outline = _outline(shape, name)
     again = _outline(shape, name)
     demand(again.side_names == outline.side_names, f"{name}.outline has other sides the next time: {again.side_names}")

@@ -12,7 +12,7 @@ from bemkit.contact.body import ContactState
 from bemkit.contact.dense_body import DenseBody
 from bemkit.contact.problem import ContactProblem
 from bemkit.solvers.base import ContactSolution, ContactSolver, Iterate, Status, solve
-from bemkit.testing.failure import demand
+from bemkit.testing.failure import class_name, demand
 from bemkit.testing.problems import KNOWN_PROBLEMS, KnownProblem
 
 
@@ -35,7 +35,7 @@ def check_solver(solver: ContactSolver, *, problems: Iterable[str] | None = None
         solution, different answers to one question, a changed problem, uncounted linear solves, or a dependence on
         units.
     """
-    name = type(solver).__name__
+    name = class_name(solver)
     demand(is_dataclass(solver), f"{name} is not a dataclass: options of solvers are frozen values")
     demand(solver.max_steps >= 1, f"{name}.max_steps is {solver.max_steps}; it allows no step")
     for title in KNOWN_PROBLEMS if problems is None else problems:

@@ -11,7 +11,7 @@ from bemkit.geometry.curves import Curve
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.spaces import BoundarySpace
 from bemkit.geometry.vectors import cross, norms
-from bemkit.testing.failure import demand, evaluated
+from bemkit.testing.failure import class_name, demand, evaluated
 
 
 def check_curve(curve: Curve) -> None:
@@ -22,7 +22,7 @@ def check_curve(curve: Curve) -> None:
     CheckFailed
         Naming the curve, the promise broken, where, and by how much.
     """
-    name = type(curve).__name__
+    name = class_name(curve)
     s = np.sort(np.concatenate([[0.0, 1.0], np.random.default_rng(0).uniform(0.0, 1.0, 40)]))
     demand(isinstance(curve.is_straight, bool), f"{name}.is_straight is {curve.is_straight!r}, not a bool")
     demand(isinstance(curve.is_analytic, bool), f"{name}.is_analytic is {curve.is_analytic!r}, not a bool")
@@ -91,7 +91,7 @@ def check_space(space: BoundarySpace) -> None:
     CheckFailed
         Naming the space, the promise broken, where, and by how much.
     """
-    name = type(space).__name__
+    name = class_name(space)
     random = np.random.default_rng(0)
     demand(isinstance(space.mesh, BoundaryMesh), f"{name}.mesh is a {type(space.mesh).__name__}, not a BoundaryMesh")
     demand(isinstance(space.degree, int) and space.degree >= 0, f"{name}.degree is {space.degree!r}, not an int >= 0")

@@ -211,7 +211,7 @@ def test_files_hold_all_fields_of_all_steps(scene: bk.Scene | bk.Scene, tmp_path
     assert last.energy == read.energy
     bk.write_result(tmp_path / "first.h5", first)
     assert bk.read_result(tmp_path / "first.h5").energy == first.energy
-    for number in (0, scene.n_steps + 1):
+    for number in (0, scene.n_steps + 1, "1", None):
         with pytest.raises(bk.InputError, match=f"step {number} does not exist: give a number from 1 to"):
             read.at_step(number)
 

@@ -33,6 +33,8 @@ PAIR = bk.ContactPair(("upper.bottom", "lower.top"))
         (lambda: replace(SCENE, discretisation="linear"), "^discretisation is 'linear': give an object"),
         (lambda: replace(SCENE, linear_solver="automatic"), "^linear_solver is 'automatic': give an object"),
         (lambda: replace(SCENE, mesh=100), r"^mesh is 100: give an object, such as MeshOptions\(elements=320\)"),
+        (lambda: bk.MeshOptions(elements="100"), "^elements is '100': give a number"),
+        (lambda: bk.scene_from_toml(SCENE), r"^scene is Scene\(.*: give the text of a scene file"),
         (lambda: replace(SCENE, shape="disk"), "^shape is 'disk': give an object"),
         (lambda: replace(SCENE, material={"youngs_modulus": 1.0}), "^material is {'youngs_modulus': 1.0}: give an obj"),
         (lambda: replace(SCENE, symmetry=0.5), r"^symmetry is 0.5: give an object, such as Symmetry\(x=0.5\)"),

@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 import pytest
 
+import bemkit as bk
 from bemkit.contact.body import ContactState
 from bemkit.contact.problem import ContactProblem
 from bemkit.scene.registry import SOLVERS
 from bemkit.solvers.alm import AugmentedLagrangian, BoundUpdate
 from bemkit.solvers.base import Iterate, Status, solve
 from bemkit.solvers.ssn import SemismoothNewton
-from bemkit.testing import CheckFailed, check_solver
+from bemkit.testing import CheckFailed, check_discretisation, check_law, check_shape, check_solver
 from bemkit.testing.problems import KNOWN_PROBLEMS
 from tests.handmade import assert_solves
 
@@ -122,3 +123,18 @@ def test_a_wrapped_driver_is_the_driver() -> None:
     check_solver(Wrapped())
     problem = KNOWN_PROBLEMS["floating"]().problem
     assert solve(problem, Wrapped()).steps == solve(problem, SemismoothNewton()).steps
+
+
+@pytest.mark.parametrize(
+    ("check", "implementation"),
+    [
+        (check_law, bk.Coulomb),
+        (check_solver, bk.SemismoothNewton),
+        (check_discretisation, bk.Galerkin),
+        (check_shape, bk.Disk),
+    ],
+)
+def test_a_class_in_place_of_an_object_is_named(check: Callable[[object], None], implementation: type) -> None:
+    name = implementation.__name__
+    with pytest.raises(CheckFailed, match=rf"{name} is a class: give an object, {name}\("):
+        check(implementation)
