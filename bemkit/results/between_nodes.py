@@ -12,6 +12,7 @@ import numpy as np
 from bemkit.arrays import FloatArray
 from bemkit.contact.body import SlipHistory
 from bemkit.contact.laws import FrictionLaw, LawOfCoefficients
+from bemkit.geometry.vectors import norms
 from bemkit.results.contact_table import ContactTable, free_contacts
 from bemkit.results.part_forces import RigidResult
 from bemkit.results.points_between import (
@@ -197,7 +198,7 @@ def violations_between_nodes(
             forces[body] += float(contact.weight[rows] @ size[rows])
             stresses[body] = max(stresses[body], float(size[rows].max(initial=0.0)))
     violations = dict(known or {})
-    moved = {name: float(np.abs(body.boundary.displacement).max()) for name, body in bodies.items()}
+    moved = {name: float(norms(body.boundary.displacement).max()) for name, body in bodies.items()}
     for name, partners, law, measure in stated:
         if name in violations or (names is not None and name not in names):
             continue

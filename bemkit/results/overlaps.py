@@ -12,6 +12,7 @@ from bemkit.arrays import BoolArray, FloatArray
 from bemkit.contact.obstacle import Obstacle
 from bemkit.errors import ResultWarning
 from bemkit.geometry.proximity.overlap import ROUND_OFF, Polyline, deepest_overlap, near_pairs
+from bemkit.geometry.vectors import norms
 from bemkit.model.overlaps import finite_obstacles, is_finite
 from bemkit.results.points_between import Interpolation
 from bemkit.results.solved_body import SolvedBody
@@ -108,7 +109,7 @@ def _deepest(obstacle: Obstacle, points: FloatArray, places: FloatArray) -> tupl
 def _least_overlap(solution: Solution, names: Collection[str], pairs: Collection[ContactPair] = ()) -> float:
     """Return the depth [m] that may be round-off, the error of small displacements, or a gap that contacts add."""
     bodies, table = [solution.bodies[name] for name in names], solution.contact
-    moved = max(float(np.abs(body.boundary.displacement).max()) for body in bodies)
+    moved = max(float(norms(body.boundary.displacement).max()) for body in bodies)
     gaps = (pair.gap_at(table.points[table.rows(pair.name)]).max(initial=0.0) for pair in pairs)
     added = max(map(float, gaps), default=0.0)
     return ROUND_OFF * min(body.mesh.diameter for body in bodies) + LEAST_OVERLAP * moved + added

@@ -149,7 +149,7 @@ def test_a_contact_without_forces_is_measured_by_what_its_own_bodies_move(presse
     bodies = {**pressed.bodies, "far": replace(far, boundary=replace(own, displacement=1e6 + own.displacement))}
     table = replace(pressed.contact, sigma_n=np.zeros_like(pressed.contact.s), sigma_t=np.zeros_like(pressed.contact.s))
     found = changed(replace(pressed, contact=table, bodies=bodies), "upper", -DEPTH)
-    moved = max(float(np.abs(body.boundary.displacement).max()) for body in pressed.bodies.values())
+    moved = max(float(np.hypot(*body.boundary.displacement.T).max()) for body in pressed.bodies.values())
     assert found.penetration == pytest.approx(DEPTH / moved, rel=1e-9)
 
 
