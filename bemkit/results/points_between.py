@@ -230,8 +230,8 @@ def with_least_clearances(sample: Sample, n_pieces: int, xi: FloatArray) -> Poin
     A parabola falls below the least of three equidistant points by at most a quarter of the difference between them,
     and the distance from a sharp corner between two points by at most what it rises beyond them. An interval about the
     least of the points is searched where the difference of the points beside it leads below zero: about each minimum of
-    a piece that is free of traction or apart at all points, because its contact may be missed (also beside points that
-    face nothing), and on the deepest of the others.
+    a piece that is free of traction or apart at all points, because its contact may be missed, on the deepest of the
+    others, and wherever points beside them face nothing.
     """
     pieces, low, high = np.arange(n_pieces), np.full(n_pieces, -1.0), np.ones(n_pieces)
     values = sample(pieces, low, high)
@@ -241,7 +241,8 @@ def with_least_clearances(sample: Sample, n_pieces: int, xi: FloatArray) -> Poin
     least_overlap = _SAME * float(values.s.max(initial=0.0))
     while pieces.size:
         clearance, size = values.clearance.reshape(pieces.size, xi.size), high - low
-        row, nearest = np.nonzero(_least(clearance) | ((is_free & (size == 2.0))[:, None] & _minima(clearance)))
+        chosen = _least(clearance) | _beside_nothing(clearance)
+        row, nearest = np.nonzero(chosen | ((is_free & (size == 2.0))[:, None] & _minima(clearance)))
         least = clearance[row, nearest]
         first = np.minimum(np.maximum(nearest - 1, 0), xi.size - 3)
         beside = np.minimum(np.maximum(nearest[:, None] + np.arange(-2, 3), 0), xi.size - 1)
@@ -268,6 +269,15 @@ def _least(clearance: FloatArray) -> BoolArray:
     """Mark the least of each row (m, q) of clearances that are not all infinite."""
     places = np.arange(clearance.shape[1]) == np.argmin(clearance, axis=1)[:, None]
     return np.asarray(places & np.isfinite(clearance))
+
+
+def _beside_nothing(clearance: FloatArray) -> BoolArray:
+    """Mark the points (m, q) beside those that face nothing: an obstacle ends between them."""
+    known = np.isfinite(clearance)
+    is_beside = np.zeros_like(known)
+    is_beside[:, 1:] |= ~known[:, :-1]
+    is_beside[:, :-1] |= ~known[:, 1:]
+    return known & is_beside
 
 
 def _minima(clearance: FloatArray) -> BoolArray:

@@ -164,3 +164,26 @@ def test_what_is_not_finite_is_nan() -> None:
     lost = replace(solution.boundary, displacement=np.full_like(solution.boundary.displacement, np.inf))
     found = measured(changed_solution(solution, boundary=lost))
     assert np.isnan(found.worst)
+
+
+def test_the_end_of_an_obstacle_between_two_closed_nodes_overlaps_in_the_mirror_too() -> None:
+    """Round-off of the clearances of both nodes decided whether the corner beside one of them was found."""
+    found = []
+    for sign in (1.0, -1.0):
+        corners = [(-0.5, -1.0), (0.525, -1.0), (0.525, 0.0), (-0.5, 0.0)]
+        box = bk.RigidPolygon(tuple((sign * x, y) for x, y in corners))
+        foot = bk.Part("foot", bk.Contact(box), ("bottom",))
+        top = bk.Part("top", bk.PrescribedDisplacement(1e-3 * sign, -3e-3), ("top",))
+        scene = bk.Scene(
+            title="block on a box",
+            shape=bk.Rectangle(1.2, 0.5, (-0.3 if sign > 0.0 else -0.9, 0.0)),
+            material=bk.Material(1.0, 0.3),
+            parts=(foot, top),
+            law=bk.Coulomb(0.3),
+            discretisation=bk.Galerkin(2),
+            mesh=bk.MeshOptions(elements=40),
+        )
+        found.append(bk.run(scene).contacts_between_nodes["foot"])
+    assert found[0].penetration > 0.03
+    assert found[0].penetration == pytest.approx(found[1].penetration, rel=1e-6)
+    assert abs(found[0].place[0]) == pytest.approx(0.525, abs=1e-6)
