@@ -47,14 +47,15 @@ def inner_integrals(
     zeta = local_coordinates(geometry, trial, from_start)
     near = np.flatnonzero(np.abs(zeta) < geometry.distance_at(curved_geometry.ELLIPSE)[trial])
     t_plus, t_minus, is_found = curved_geometry.find_parameters(geometry.curved, trial[near], plus[near], minus[near])
-    near = near[is_found]
-    _store(result, near, near_inner(degrees, geometry.polynomials(trial[near]), t_plus[is_found], t_minus[is_found]))
-    is_far = np.ones(trial.size, bool)
-    is_far[near] = False
-    far = np.flatnonzero(is_far)
-    _store(
-        result, far, far_inner(degrees, geometry.polynomials(trial[far]), zeta[far], N_SMOOTH + degrees.extra_points)
-    )
+    near, parameters = near[is_found], (t_plus[is_found], t_minus[is_found])
+    far = np.setdiff1d(np.arange(trial.size), near, assume_unique=True)
+    n_points = N_SMOOTH + degrees.extra_points
+    for chosen, values in (
+        (near, near_inner(degrees, geometry.polynomials(trial[near]), *parameters)),
+        (far, far_inner(degrees, geometry.polynomials(trial[far]), zeta[far], n_points)),
+    ):
+        result.log[:, chosen], result.quotient[:, chosen] = values.log, values.quotient
+        result.cauchy[:, chosen] = values.cauchy
     return result
 
 
@@ -62,13 +63,6 @@ def local_coordinates(geometry: ElementGeometry, trial: IntArray, from_start: Co
     """Return the local coordinates of points from their position relative to the start of their element."""
     zeta: ComplexArray = ((geometry.start - geometry.centre)[trial] + from_start) * geometry.to_local[trial]
     return zeta
-
-
-def _store(result: Inner, chosen: IntArray, values: Inner) -> None:
-    """Write the integrals of chosen points."""
-    result.log[:, chosen] = values.log
-    result.quotient[:, chosen] = values.quotient
-    result.cauchy[:, chosen] = values.cauchy
 
 
 def near_inner(degrees: Degrees, coefficients: ComplexArray | None, plus: ComplexArray, minus: ComplexArray) -> Inner:
@@ -86,11 +80,7 @@ def near_inner(degrees: Degrees, coefficients: ComplexArray | None, plus: Comple
     straight = Inner.straight(degrees, integrals, log_product, root.imag)
     if coefficients is None:
         return straight
-    return _sum(straight, bending(degrees, coefficients, root, root.imag, integrals))
-
-
-def _sum(straight: Inner, smooth: Inner) -> Inner:
-    """Add the smooth remainders; the quotient of `smooth` is already complete."""
+    smooth = bending(degrees, coefficients, root, root.imag, integrals)  # its quotient is complete
     return Inner(straight.log + smooth.log, smooth.quotient, straight.cauchy + smooth.cauchy)
 
 
