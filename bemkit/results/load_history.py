@@ -65,7 +65,7 @@ class StepWork:
         slip. It is no part of the balance.
     missed_dissipation : float [J/m]
         Estimate of what the trapezoidal rule misses in `dissipation` at nodes that begin to slip, or slip the other
-        way, within an increment: it takes the mean of the friction at both ends, but they slip under that of the end.
+        way, within an increment: it takes the mean of the friction at both ends, but they slip under their bound.
         It is no part of the balance.
 
     Notes

@@ -61,6 +61,8 @@ class IncrementEnd:
         The models whose loads act there, each with its share; none at rest.
     dragged : (n_contact,) array
         How far obstacles have travelled along the tangents in this increment, dimensionless.
+    bound : (n_contact,) array
+        Largest friction there, dimensionless.
     """
 
     state: ContactState
@@ -68,6 +70,7 @@ class IncrementEnd:
     gap: FloatArray
     loads: tuple[tuple[float, Model], ...] = ()
     obstacle_slip: FloatArray | float = 0.0
+    bound: FloatArray | float = 0.0
 
     @property
     def share(self) -> float:
@@ -93,7 +96,10 @@ class IncrementEnd:
     @classmethod
     def under(cls, model: Model, state: ContactState, motion: SlipHistory) -> IncrementEnd:
         """Return the end of a step of a model."""
-        return cls(state, motion, model.problem.gap, ((1.0, model),))
+        problem = model.problem
+        if problem.law.needs_history:
+            problem = problem.with_law(problem.law.at_slip(motion))
+        return cls(state, motion, problem.gap, ((1.0, model),), bound=_bound(problem, state))
 
     def work_from(self, before: IncrementEnd, model: Model) -> StepWork:
         """Return the work from the end of the increment before to this one, by the trapezoidal rule."""
@@ -114,10 +120,9 @@ class IncrementEnd:
         rests = before.gap - before.state.displacement[:, 0] <= _RESTED * norms(moved)
         rests &= (self.state.traction != 0.0).any(axis=1)
         dissipation = max(float(of_friction[is_held | rests].sum()), 0.0)
-        # a node that rested, or slipped the other way, slips under the friction of the end only
-        turns = before.state.traction[:, 1] * self.state.traction[:, 1] <= 0.0
-        turns |= before.motion.last_slip <= _RESTED * units.displacement * np.abs(slip)
-        of_turns = weights * (before.state.traction - self.state.traction)[:, 1] * slip
+        # a node that rested, or slipped the other way, slips under no less than the smaller bound of both ends
+        friction = np.minimum(-self.state.traction[:, 1] * slip, before.bound * np.abs(slip))
+        missed = weights * (friction + before.state.traction[:, 1] * slip)
         along_slip = 2.0 * weights * self.state.traction[:, 1] * slip
         (forces_before, displacements_before), (forces, displacements) = before.acting, self.acting
         of_forces = 0.5 * model.depth * float((forces_before + forces) @ (displacements - displacements_before))
@@ -126,7 +131,7 @@ class IncrementEnd:
             dissipation=dissipation,
             increment_work=float(sigma[:, 0] @ (approached - moved[:, 0])) + float(of_friction.sum()) - dissipation,
             friction_gain=float(np.maximum(along_slip, 0.0).sum()),
-            missed_dissipation=float(np.maximum(of_turns[is_held & turns], 0.0).sum()),
+            missed_dissipation=float(np.maximum(missed[is_held], 0.0).sum()),
         )
 
 
@@ -220,10 +225,10 @@ class Path:
     def end_of(self, attempt: _Attempt, share: float, start: IncrementEnd) -> IncrementEnd:
         """Return the end of an increment that has begun at another end."""
         state, motion, gap = attempt.result.state, attempt.motion, attempt.problem.gap
-        obstacle_slip = self.obstacle_slip(start, share)
+        obstacle_slip, bound = self.obstacle_slip(start, share), _bound(attempt.problem, state)
         if self.before is None or share == 1.0:
-            return IncrementEnd(state, motion, gap, ((1.0, self.model),), obstacle_slip)
-        return IncrementEnd(state, motion, gap, ((1.0 - share, self.before), (share, self.model)), obstacle_slip)
+            return IncrementEnd(state, motion, gap, ((1.0, self.model),), obstacle_slip, bound)
+        return IncrementEnd(state, motion, gap, ((1.0 - share, self.before), (share, self.model)), obstacle_slip, bound)
 
 
 def advance(path: Path, guess: ContactState | None = None, callback: Callback = None) -> ReachedStep:
@@ -372,6 +377,10 @@ def _for_increments(solver: ContactSolver, *, is_last: bool) -> ContactSolver:
     if not isinstance(solver, Fallbacks):
         return solver
     return solver.without_whole_path() if is_last else solver.without_new_starts()
+
+
+def _bound(problem: ContactProblem, state: ContactState) -> FloatArray:
+    return problem.friction_bound(np.minimum(state.sigma_n, 0.0))
 
 
 def _agree(

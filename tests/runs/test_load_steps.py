@@ -381,6 +381,13 @@ def test_the_dissipation_that_coarse_increments_miss_is_estimated(n_increments: 
         assert cycle.dissipation < 0.8 * exact
 
 
+def test_slip_under_a_rising_bound_misses_little() -> None:
+    """Friction of 0.785 rises with its bound from 0.8 to 1.6; its mean is that of the slip to 1 %."""
+    first = bk.Step(1.0, {"far.x": 0.0025})
+    work = slider(first, bk.Step(2.0, {"far.x": 0.0125, "far.force_y": 4.0})).total(1)
+    assert 0.0 < work.missed_dissipation < 0.01 * work.dissipation
+
+
 def test_slip_under_a_falling_bound_misses_nothing() -> None:
     """The bound meets a friction of 0.63 and falls to 0.2: the mean of both is that of the slip."""
     loading = slider(bk.Step(1.0, {"far.x": 0.002}), bk.Step(2.0, {"law.friction_coefficient": 0.1}))
