@@ -29,7 +29,7 @@ from bemkit.contact.dense_body import DenseBody
 from bemkit.contact.problem import ContactProblem
 from bemkit.geometry.quadrature import gauss_legendre
 from bemkit.results.contact_table import ContactTable
-from bemkit.results.transitions import find_transitions
+from bemkit.results.transitions import Transition, find_transitions
 from bemkit.solvers.base import solve
 from bemkit.threads import blas_threads_for
 
@@ -184,7 +184,7 @@ class FiniteElementSolution:
     contact: ContactTable
     force_tangential: float
     energy: float
-    transitions: tuple[bk.Transition, ...]
+    transitions: tuple[Transition, ...]
 
 
 def solve_scene(scene: bk.Scene, x: Line, y: Line) -> FiniteElementSolution:

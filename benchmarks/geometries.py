@@ -137,7 +137,7 @@ def row_of(scene: bk.Scene, n_elements: int) -> Row:
     del body, factor
     solution = bk.run(replace(scene, linear_solver=bk.Hierarchical()))
     return Row(
-        scene.title, given.mesh.n_elements, build, response, memory, rank, residual,
+        scene.title, given.only.own_space.mesh.n_elements, build, response, memory, rank, residual,
         solution.status.name, solution.outer_steps, solution.certificate.worst,
     )  # fmt: skip
 

@@ -104,7 +104,7 @@ def told_mesh(scene: bk.Scene, places: Sequence[float], n_even: int, n_others: i
     towards `n_others`, and more where a long element would meet a short one.
     """
     outline = scene.shape.outline()
-    bottom, base = outline.side_names.index("bottom"), divide(outline, scene.selections)
+    bottom, base = outline.side_names.index("bottom"), divide(outline, scene.only.selections)
     division, parameters = base.cut({bottom: places}), []
     for piece in division.pieces:
         is_told = [piece.side == bottom and bool(np.isclose(places, end, atol=0.0).any()) for end in piece.span]
