@@ -53,7 +53,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--repetitions", type=int, default=5)
     arguments = parser.parse_args()
-    console = Console(highlight=False)
+    console = Console(highlight=False, width=140)
     table = Table(title="planned against measured")
     for column in ("scene", "planned", "time", "ratio", "planned", "memory", "ratio", "counts"):
         table.add_column(column, justify="right" if column != "scene" else "left", no_wrap=True)
