@@ -11,6 +11,7 @@ import numpy as np
 from bemkit.contact.certificate import Certificate
 from bemkit.errors import counted
 from bemkit.geometry.shapes import Shape
+from bemkit.geometry.vectors import norms
 from bemkit.results.between_nodes import BetweenNodes
 from bemkit.results.solution import Solution
 from bemkit.results.solved_scene import contact_facts, part_facts, place_in
@@ -146,8 +147,9 @@ def _part_rows(solution: Solution) -> Iterator[tuple[str, str]]:
     forces, least = part_facts(solution), _force_of_round_off(solution)
     if len(forces) > _MANY_CONTACTS:
         forces.sort(key=lambda fact: _rank(fact, solution))
+    least_moment = least * max(float(norms(body.mesh.nodes).max()) for body in solution.bodies.values())
     for fact in forces[:_MANY_CONTACTS]:
-        moment = _amount(fact["moment"], "energy", units)
+        moment = _amount(_without_round_off(fact["moment"], least_moment), "energy", units)
         name = f"{fact['body']}.{fact['name']}" if "body" in fact else fact["name"]
         yield f"force on {name}", f"{_force(fact['force_x'], fact['force_y'], least, units)}, moment {moment}"
     yield from _more(len(forces), "parts")
@@ -157,7 +159,7 @@ def _part_rows(solution: Solution) -> Iterator[tuple[str, str]]:
             body.name,
             f"moved by {_vector(body.x, body.y, 'length', units)}, turned by {body.turn:.8g} rad; "
             f"force {_force(body.force_x, body.force_y, least, units)}, "
-            f"moment {_amount(body.moment, 'energy', units)} on it",
+            f"moment {_amount(_without_round_off(body.moment, least_moment), 'energy', units)} on it",
         )
     yield from _more(len(rigid), "rigid bodies")
 
