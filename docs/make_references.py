@@ -14,7 +14,7 @@ import bemkit as bk
 from bemkit.reference import Reference, over_resolved
 
 FOLDER = Path(bk.__file__).parent / "reference" / "data"
-MOST_ELEMENTS = 900
+MOST_ELEMENTS = 1200
 
 
 def main() -> None:
