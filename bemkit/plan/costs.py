@@ -97,7 +97,7 @@ LINEAR_GALERKIN = Rates(
 )
 HIGHER_GALERKIN = Rates(
     pair=(8e-7, 2e-6), element=(6e-4, 1.1e-3), cube=0.67e-10, square=2.3e-10,
-    entry=12.5, factored=20, chunk=11, near=(2.4e6, 5.2e6),
+    entry=12.5, factored=20, chunk=11, near=(2.4e6, 5.5e6),
 )
 COMPRESSED = Rates(
     element=(1e-4, 1e-4), contact=2e-5, contact_fixed=0.16, response=2e-7,
