@@ -241,8 +241,8 @@ def with_least_clearances(sample: Sample, n_pieces: int, xi: FloatArray) -> Poin
     least_overlap = _SAME * float(values.s.max(initial=0.0))
     while pieces.size:
         clearance, size = values.clearance.reshape(pieces.size, xi.size), high - low
-        chosen = _least(clearance) | _beside_nothing(clearance)
-        row, nearest = np.nonzero(chosen | ((is_free & (size == 2.0))[:, None] & _minima(clearance)))
+        places = _least(clearance) | _beside_nothing(clearance)
+        row, nearest = np.nonzero(places | ((is_free & (size == 2.0))[:, None] & _minima(clearance)))
         least = clearance[row, nearest]
         first = np.minimum(np.maximum(nearest - 1, 0), xi.size - 3)
         beside = np.minimum(np.maximum(nearest[:, None] + np.arange(-2, 3), 0), xi.size - 1)

@@ -28,6 +28,7 @@ from bemkit.solvers.active_sets import NodeStatus
 _PARALLEL = 1e-6
 """Component along the normal or the tangent that counts as zero."""
 _BESIDE = 1e-3
+"""Local coordinate beside the middle of an element: the nearer one of its two ends is then certain."""
 DIGITS = 6
 """Digits to which angles are rounded: round-off of short elements must not separate equal ones."""
 BEFORE, AFTER = 0, 1

@@ -29,6 +29,7 @@ MOST_HALVINGS = 6
 MOST_LAWS = 60
 """Largest number of solves of one increment under a law that depends on its slip."""
 _LEAST_SHARE = 1e-3
+"""Least share of the way to the slip found that the next guess goes."""
 _SETTLED = 1e-10
 """Change of a converged law, relative to the largest bound."""
 
